@@ -40,6 +40,8 @@ RADIUS, SHADING, TOWARDS, NOISE = 10.0, 0.25, 0.6, 4.0
 PLACES, FRAMES, SETTLE = 12, 40, 12
 EXPOSED, MOMENTS, FASTEST = 0.16, 5, 9.0  # of a frame; per exposure; px per frame
 SIZE = (112, 96)
+DISC_AIMS = ("aim", None, "0.016", 1.15, 0.01, None, None, 0.1, 0.035, None)  # as the columns of the table
+TWIN_AIMS = ("aim", 0.03, 0.03, 0.2, 0.05, None, None)
 
 Array = np.ndarray
 
@@ -173,14 +175,14 @@ def main() -> int:
             [[name, f"{one['bound']:.4f}", f"{one['grey']['fast']['jitter']:.4f}",
               one["grey"]["fast"]["jitter"] / one["bound"], one["grey"]["fast"]["bias"], one["grey"]["box"]["jitter"],
               one["grey"]["box"]["bias"], one["edge"]["fast"]["bias"], one["moving"]["fast"], one["moving"]["box"]]
-             for name, one in result["disc"].items()]))
+             for name, one in result["disc"].items()] + [DISC_AIMS]))
     if args.only != "disc":
         result["twin"] = twin(args.poses)
         printed.append(table(
             ["the twin's hand; px", "jitter x", "y", "bias", "left - right", "thesis's box: bias", "left - right"],
             [[f"{scene}, {name}", *(figures[key] for key in ("jitter_x", "jitter_y", "bias", "left_minus_right",
                                                              "box_bias", "box_left_minus_right"))]
-             for scene, markers in result["twin"].items() for name, figures in markers.items()]))
+             for scene, markers in result["twin"].items() for name, figures in markers.items()] + [TWIN_AIMS]))
     publish(args, result, *printed)
     return 0
 
