@@ -64,9 +64,9 @@ def on_an_edge(marker: Marker, x: float, y: float) -> Canvas:
     return canvas.paint(disc(x, y, RADIUS), marker.display_rgb, (50.0, 44.0), RADIUS + 3.0, SHADING, TOWARDS)
 
 
-def seen_by(detector: Detector, images: Iterator[YuvImage] | list[YuvImage]) -> Array:
-    """(F, M, 2) px; NaN where lost."""
-    return np.array([[(mark.x, mark.y) for mark in detector.detect(image)] for image in images])
+def seen_by(detector: Detector, images: Iterator[YuvImage] | list[YuvImage], count: int = 1) -> Array:
+    """(F, M, 2) px of the first observation of each of `count` markers; NaN where lost."""
+    return np.array([[(mark.x, mark.y) for mark in detector.detect(image)[:count]] for image in images])
 
 
 def still_disc(marker: Marker, edge: bool) -> dict[str, dict[str, float]]:
@@ -141,8 +141,8 @@ def twin(poses: int) -> dict[str, Any]:
 def _score(pose: Pose, name: str, store: list[list[Array]]) -> None:
     """Of each marker that both cameras see whole, (2 cameras, 5): mean error (x, y), variance (x, y), and the mean
     horizontal error against the outline, whose perspective the master knows and mends (`geometry.silhouette`)."""
-    seen = [seen_by(FastDetector(MARKERS) if name == "fast" else ReferenceDetector(MARKERS), frames)[4:]
-            for frames in pose.frames]
+    kind = FastDetector if name == "fast" else ReferenceDetector
+    seen = [seen_by(kind(MARKERS), frames, len(MARKERS.ids))[4:] for frames in pose.frames]
     for index, marker in enumerate(MARKERS.markers):
         truth = pose.centre[:, index] if marker.shape == "band" else pose.outline[:, index]
         points = np.array([part[:, index] for part in seen])
