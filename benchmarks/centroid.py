@@ -13,7 +13,7 @@ Then the twin's painted fingertips and wrist band, at 0.6 m with its own noise: 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -64,9 +64,17 @@ def on_an_edge(marker: Marker, x: float, y: float) -> Canvas:
     return canvas.paint(disc(x, y, RADIUS), marker.display_rgb, (50.0, 44.0), RADIUS + 3.0, SHADING, TOWARDS)
 
 
-def seen_by(detector: Detector, images: Iterator[YuvImage] | list[YuvImage], count: int = 1) -> Array:
-    """(F, M, 2) px of the first observation of each of `count` markers; NaN where lost."""
-    return np.array([[(mark.x, mark.y) for mark in detector.detect(image)[:count]] for image in images])
+def seen_by(detector: Detector, images: Sequence[YuvImage], truth: Array) -> Array:
+    """(F, M, 2) px: of every marker the candidate nearest to `truth` (M, 2) or (F, M, 2), for the master chooses one of
+    them; NaN where there is none."""
+    truth = np.broadcast_to(truth, (len(images), *np.shape(truth)[-2:]))
+    out = np.full(truth.shape, np.nan)
+    for number, image in enumerate(images):
+        for mark in detector.detect(image):
+            place, true = np.array([mark.x, mark.y]), truth[number, mark.index]
+            if not np.linalg.norm(out[number, mark.index] - true) <= np.linalg.norm(place - true):
+                out[number, mark.index] = place
+    return out
 
 
 def still_disc(marker: Marker, edge: bool) -> dict[str, dict[str, float]]:
@@ -77,7 +85,7 @@ def still_disc(marker: Marker, edge: bool) -> dict[str, dict[str, float]]:
         canvas = on_an_edge(marker, x, y) if edge else drawn(on_grey(marker, x, y))
         images = [canvas.expose(rng, NOISE) for _ in range(FRAMES)]
         for name, detector in detectors(marker).items():
-            found[name].append(seen_by(detector, images)[SETTLE:, 0] - (x, y))
+            found[name].append(seen_by(detector, images, np.array([[x, y]]))[SETTLE:, 0] - (x, y))
     return {name: {"jitter": float(np.sqrt(np.mean([np.var(part, axis=0, ddof=1) for part in parts]))),
                    "bias": float(np.sqrt(np.mean([part.mean(axis=0) ** 2 for part in parts]))),
                    "worst": float(max(np.hypot(*part.mean(axis=0)) for part in parts))}
@@ -97,7 +105,8 @@ def moving_disc(marker: Marker) -> dict[str, float]:
                                                 SHADING, TOWARDS).seen() / MOMENTS
         images.append(to_yuv(np.clip(rgb + rng.normal(0.0, NOISE, rgb.shape), 0.0, 255.0)))
         truth.append((210.0 + FASTEST / 0.1 * np.sin(0.1 * step), 60.3 + 20.0 * np.sin(0.037 * step)))
-    return {name: float(np.sqrt(np.nanmean((seen_by(detector, images)[SETTLE:, 0] - np.array(truth)[SETTLE:]) ** 2)))
+    return {name: float(np.sqrt(np.nanmean((seen_by(detector, images, np.array(truth)[:, None])[SETTLE:, 0]
+                                             - np.array(truth)[SETTLE:]) ** 2)))
             for name, detector in detectors(marker).items()}
 
 
@@ -142,7 +151,7 @@ def _score(pose: Pose, name: str, store: list[list[Array]]) -> None:
     """Of each marker that both cameras see whole, (2 cameras, 5): mean error (x, y), variance (x, y), and the mean
     horizontal error against the outline, whose perspective the master knows and mends (`geometry.silhouette`)."""
     kind = FastDetector if name == "fast" else ReferenceDetector
-    seen = [seen_by(kind(MARKERS), frames, len(MARKERS.ids))[4:] for frames in pose.frames]
+    seen = [seen_by(kind(MARKERS), frames, truth)[4:] for frames, truth in zip(pose.frames, pose.centre, strict=True)]
     for index, marker in enumerate(MARKERS.markers):
         truth = pose.centre[:, index] if marker.shape == "band" else pose.outline[:, index]
         points = np.array([part[:, index] for part in seen])

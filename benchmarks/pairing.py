@@ -87,7 +87,7 @@ def detected(scene: Scene, folder: Path) -> Frames:
         film_data = np.memmap(folder / name / FRAMES_NAME, np.uint8, "r").reshape(-1, header.frame_bytes)
         detector = FastDetector(scene.markers)
         for data, t_ns in zip(film_data, header.times_ns, strict=True):
-            seen = detector.detect(from_i420(data, header.width, header.height))
+            seen = detector.detect(from_i420(data, header.width, header.height))[:len(scene.markers.ids)]
             frames.append(CameraObservations(
                 camera, t_ns, header.row_time_ns, 0.0, t_ns + header.exposure_ns // 2 + 480 * header.row_time_ns,
                 0.0, 0.0, np.array([(mark.x, mark.y) for mark in seen]),

@@ -59,7 +59,7 @@ def film(scene: Scene, motion: Path, camera: int, row_time_us: float, seconds: f
     found = []
     for number, t_ns in enumerate(times):
         pixels, _ = renderer.render(shot.scene_object.source, 1e-9 * t_ns, number)
-        markers = detector.detect(from_i420(pixels, width, height))
+        markers = detector.detect(from_i420(pixels, width, height))[:len(scene.markers.ids)]
         found.append(CameraObservations(
             camera=camera, t_row0_master_ns=t_ns, row_time_ns=round(1e3 * row_time_us), clock_bound_s=1e-4,
             t_receive_ns=t_ns, detect_s=0.0, network_s=0.0, pixels=np.array([(m.x, m.y) for m in markers]),
