@@ -90,8 +90,8 @@ def main() -> int:
             table(["figure", "seed 1 (95 % interval)", "true", "intervals that hold it", "mean half width"],
                   [[what, *first[what], f"{sum(each)} of {len(each)}", float(np.mean(widths[what]))]
                    for what, each in held.items()]),
-            f"{sum(total)} of {len(total)} intervals hold the truth. {perfect.count('differs')} of {len(perfect)} lines "
-            f"of a perfect rig differ. A baseline wrong by 1 % is named in {sum(wrong)} of {len(wrong)} lines.")
+            f"{sum(total)} of {len(total)} intervals hold the truth. {perfect.count('differs')} of {len(perfect)} "
+            f"lines of a perfect rig differ. A baseline wrong by 1 % is named in {sum(wrong)} of {len(wrong)} lines.")
     return 0
 
 

@@ -21,7 +21,7 @@ USER = "rhot-node"
 STATE_FOLDER = Path("/var/lib/rhot-node")
 WATCHDOG_S = 20
 START_S = 900  # the first start compiles; on a Pi 3 that takes minutes
-MEMORY_MAX_MB = 700  # compiling takes 360 to 430 MB, running 225
+MEMORY_MAX_MB = 700  # compiling takes 360 to 480 MB, running 225
 
 
 @dataclass(frozen=True, slots=True)
