@@ -26,6 +26,7 @@ need_programs() {
 make_userland() {
   local root="$1" suite="$2" architecture="$3"
   [ ! -e "$root/complete" ] || return 0
+  [ ! -e "$root" ] || [ -e "$root.log" ] || fail "$root is there and is not of these scripts: name another folder."
   rm -rf "$root"
   mkdir -p "$root"
   local IFS=,
