@@ -319,7 +319,7 @@ def follow(dh: DhArrays, limits: Array, mean: Array, information: Array, mirror:
     if solved:
         world[:], angles[:] = palm_world, palm_angles
         solve_fingers_arrays(angles, world, mirror, base, base_rotation, chain, bends, limits, tips, mean,
-                             information, TOLERANCE, FABRIK_ITERATIONS, TARGET_SD_M, np.empty(5),
+                             information, TOLERANCE, int(FABRIK_ITERATIONS), TARGET_SD_M, np.empty(5),
                              np.empty(5, np.int64), np.empty(5, np.uint8))
     forward_arrays(dh, world, angles, np.empty((dh.parent.shape[0], 3, 4)), points)
     _know(wrist_knowledge, tip_knowledge, solved and placed, joint_knowledge, angle_knowledge)

@@ -60,9 +60,12 @@ def from_bgr(bgr: Plane) -> YuvImage:
 
 
 def to_bgr(image: YuvImage) -> Plane:
-    """(H, W, 3) BGR of an image, for people and for the reference detector; chroma is interpolated linearly."""
+    """(H, W, 3) BGR of an image, for people and for the reference detector; chroma is interpolated linearly.
+
+    INTER_LINEAR rounds otherwise on ARM than on x86; INTER_LINEAR_EXACT does not.
+    """
     size = image.size
-    chroma = [cv2.resize(plane, size, interpolation=cv2.INTER_LINEAR) for plane in (image.v, image.u)]
+    chroma = [cv2.resize(plane, size, interpolation=cv2.INTER_LINEAR_EXACT) for plane in (image.v, image.u)]
     bgr = cv2.cvtColor(cv2.merge([image.y, *chroma]), cv2.COLOR_YCrCb2BGR)
     return np.asarray(bgr, dtype=np.uint8)
 

@@ -123,7 +123,7 @@ def label_runs(y, u, v, words_u, words_v, bright, dull, table, wanted, luma_limi
     height, width = u.shape
     by_words = words_u.shape[1] > 0 and dull[0, 0] <= dull[0, 1]
     block = WORD if by_words else width
-    count = above_start = above_end = 0
+    count = above_start = above_end = np.int64(0)
     for row in range(first_row, height, step):
         row_start = count
         current = 0

@@ -25,7 +25,7 @@ _MORE_PROBABLE = 2.0  # of -2 log probability: the natural bend is taken when it
 _FIRST_ANGLE = np.array([angles.start for angles in ANGLE_SLICES] + [21])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def most_probable_pose(dh, limits, mean, information, world, angles):
     """The most probable pose by the places that the markers have at `world` (4, 4) m and `angles` (21,) rad.
 
@@ -38,14 +38,15 @@ def most_probable_pose(dh, limits, mean, information, world, angles):
     """
     places, observed = np.empty((dh.point_row.shape[0], 3)), np.empty((3 * dh.point_row.shape[0], _POSE))
     _place_markers(dh, world, angles, places, observed)
-    inverse, prior, rows, cost = _descend(dh, limits, mean, information, places, world, angles, _STEPS)
+    inverse, prior, rows, cost = _descend(dh, limits, mean, information, places, world, angles, int(_STEPS))
     for finger in range(5):
         own = slice(_FIRST_ANGLE[finger], _FIRST_ANGLE[finger + 1])
         if np.all(angles[own] >= limits[own, 0]) and np.all(angles[own] <= limits[own, 1]):
             continue
         other_world, other = world.copy(), angles.copy()
         other[own] = mean[own]
-        found = _descend(dh, limits, mean, information, places, other_world, other, _RESTART_STEPS)
+        found = _descend(dh, limits, mean, information, places, other_world, other,
+                         int(_RESTART_STEPS))
         if found[3] < cost - _MORE_PROBABLE:
             inverse, prior, rows, cost = found
             world, angles = other_world, other

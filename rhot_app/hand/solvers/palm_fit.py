@@ -120,7 +120,7 @@ def any_marker(wrist: Array, tips: Array) -> bool:
     return not math.isnan(wrist[0] + wrist[1] + wrist[2])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def track_arrays(dh: DhArrays, limits: Array, mean: Array, information: Array, wrist: Array, tips: Array, dt_s: float,
                  world: Array, angles: Array) -> None:
     """`fit_palm` from a previous pose `dt_s` seconds ago, `world` (4, 4) and `angles` (21,), in place and without its
@@ -132,7 +132,7 @@ def track_arrays(dh: DhArrays, limits: Array, mean: Array, information: Array, w
     for i in range(angles.shape[0]):
         angles[i] = min(max(angles[i], limits[i, 0]), limits[i, 1])
     descend_arrays(dh, limits, mean, information, wrist, tips, previous_world, previous_angles, max(dt_s, SHORTEST_S),
-                   STEPS_WARM, world, angles)
+                   int(STEPS_WARM), world, angles)
 
 
 # -- the descent of the palm fit ---------------------------------------------------------------------------------------

@@ -27,8 +27,8 @@ _OUTSIDE_PX: Final = 64.0  # rays that the lens model is asked for beyond the pi
 
 
 @njit(cache=True, fastmath=True)
-def project_at(series: Array, timing: Array, offset: float, intrinsics: Array, used: NDArray[np.uint8], steps: int,
-               rows: Array, out: Array) -> None:
+def project_at(series: Array, timing: Array, offset: float, intrinsics: Array, used: NDArray[np.uint8],
+               steps: int | np.int64, rows: Array, out: Array) -> None:
     """Fill `out` (V, 3): px, px and 1/z of vertices whose camera coordinates are `series` (V, 3, NODES) in tau, at
     `offset` in tau from the mid-exposure of their own rows; `rows` (V,) is where they were seen, and are seen now
     after `steps` of iteration. Only vertices that are `used` (V,) count."""
@@ -103,8 +103,8 @@ def accumulate(series: Array, timing: Array, intrinsics: Array, triangles: Indic
     rows, points, others, used, kept = work
     rows[:] = 0.5 * height
     used[:] = 1
-    project_at(series, timing, -0.5 * timing[2], intrinsics, used, 3, rows, others)
-    project_at(series, timing, 0.5 * timing[2], intrinsics, used, 2, rows, points)
+    project_at(series, timing, -0.5 * timing[2], intrinsics, used, np.int64(3), rows, others)
+    project_at(series, timing, 0.5 * timing[2], intrinsics, used, np.int64(2), rows, points)
     sweep = _bound(others, points, width, height, box)
     if box[0] >= box[2] or box[1] >= box[3]:
         box[:] = 0
@@ -117,7 +117,7 @@ def accumulate(series: Array, timing: Array, intrinsics: Array, triangles: Indic
         oy = (((_STEP_Y * k) % samples) + 0.5) / samples - 0.5
         moment = (((_STEP_T * k) % samples) + 0.5) / samples - 0.5
         if sweep > STILL_PX:
-            project_at(series, timing, moment * timing[2], intrinsics, used, 1, rows, points)
+            project_at(series, timing, moment * timing[2], intrinsics, used, np.int64(1), rows, points)
         draw(points, kept[:count], colours, ox, oy, box, depth, shown)
         for y in range(box[1], box[3]):
             for x in range(box[0], box[2]):

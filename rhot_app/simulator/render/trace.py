@@ -158,7 +158,7 @@ def trace(moving: Moving, view: View, canvas: Canvas, seed: int) -> tuple[int, i
     return left, top, right, bottom
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, inline="always")
 def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int]:
     """First pass: one ray per pixel. Returns the range of rows that the hand may touch."""
     series, meta, size, rgb, margin, paint, sweep = moving
@@ -210,7 +210,7 @@ def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int
     return top, bottom
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, inline="always")
 def _trace_edges(moving: Moving, view: View, canvas: Canvas, top: int, bottom: int, seed: int) -> None:
     """Second pass: the marked pixels again, by 16 rays over area and exposure; and the markers' areas."""
     series, meta, size, rgb, margin, paint, sweep = moving
@@ -243,7 +243,7 @@ def _trace_edges(moving: Moving, view: View, canvas: Canvas, top: int, bottom: i
                 block = x // SAMPLES
                 nears = in_block(active, actives, scanline_bounds, y, block * SAMPLES, near)
             scatter(x, y, slots, seed, rays, ray, slot)
-            _cast(SAMPLES, ray, slot, near, nears, prepared, meta, size, margin, paint, up, tied, met, depth)
+            _cast(int(SAMPLES), ray, slot, near, nears, prepared, meta, size, margin, paint, up, tied, met, depth)
             _gather(x, y, ray, slot, prepared, meta, size, rgb, paint, up, met, depth, light, shading, background,
                     image, visible, whole)
 

@@ -234,7 +234,7 @@ def segment(u, v, sector, label, direction, level, window, mask, stack, componen
             belongs = (sector[u[row, column], v[row, column]] == label
                        and cb * direction[0] + cr * direction[1] >= threshold)
             mask[row, column] = _NEW if belongs else 0
-    count = 0
+    count = np.int64(0)
     for row in range(y0, y1 + 1):
         for column in range(x0, x1 + 1):
             if mask[row, column] != _NEW:

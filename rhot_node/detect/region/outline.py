@@ -22,7 +22,7 @@ def classify(region, own, mask, kind, stack):
     `own[n]` says whether component n belongs to the marker. Returns its area and how much of that is interior.
     """
     x0, x1, y0, y1 = region
-    area = 0
+    area = np.int64(0)
     for row in range(y0, y1 + 1):
         for column in range(x0, x1 + 1):
             number = mask[row, column]

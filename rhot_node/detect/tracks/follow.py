@@ -251,7 +251,7 @@ def _outline(y, u, v, track, look, radius, rim, noise, pixels, work, soft, fitte
         radius[j] *= growth
     before_u, before_v = look[c.PAINT_U], look[c.PAINT_V]
     contrast = math.hypot(before_u - look[c.AROUND_U], before_v - look[c.AROUND_V])
-    if not fit(y, u, v, soft[0], soft[1], look, radius, rim, 1, pixels, work, fitted):
+    if not fit(y, u, v, soft[0], soft[1], look, radius, rim, np.int64(1), pixels, work, fitted):
         return False
     area = fitted[c.AREA]
     return (track[t.AREA] < AREA_RATIO * area and area < AREA_RATIO * track[t.AREA]

@@ -153,7 +153,7 @@ def start(y, u, v, x, y_at, var_long, var_high, axis_x, axis_y, area, noise, is_
         project(look)
         if not look[c.GAIN] * noise < NOISE_MOST:
             return
-        if not fit(y, u, v, x, y_at, look, radius, rim, 3, pixels, work, fitted):
+        if not fit(y, u, v, x, y_at, look, radius, rim, np.int64(3), pixels, work, fitted):
             return
         x, y_at = fitted[c.X], fitted[c.Y]
     mark[SAG_FRAMES] = mark[SAG_ZERO] = 0.0
