@@ -30,8 +30,14 @@ SKIN_CB, SKIN_CR = (77, 127), (133, 173)
 UNUSUAL = 0.02
 """Probability that a pixel shows what the learnt colours do not: highlights, shadows, new things."""
 
+USUAL_IMAGES = 8
+"""Images whose worth the median pixel's variance has for every pixel: a few images show one pixel's variance badly."""
+
 _BIN = 256 // BINS  # values of a channel in one bin
 _INVERSE_ROOT_2PI = 0.3989423
+_SAMPLED_PX = 8  # pixels between those of which the exposure is estimated
+_DARK, _BRIGHT = 16.0, 240.0  # of 255: less is noise, more is clipped
+_GAIN_LOG, _GAIN_BINS = 0.7, 70  # exposures differ by a factor of 2 at most; bins of 2 %
 _FOREIGN = 4.0  # standard deviations of the background
 _OPEN_PX, _LEAST_PIXELS = 3, 400  # smaller patches of skin are none
 _LEAST_SD = 2.0  # of 255: quantisation and compression, below which no background is known
@@ -106,17 +112,19 @@ class BackgroundSums:
         if not self.count:
             raise ValueError("the background needs at least one image of the scene without a hand")
         mean = self._sum / self.count
-        sd = np.sqrt(np.maximum(self._squares / self.count - mean * mean, _LEAST_SD**2))
-        return model._replace(mean=mean.astype(np.float32), sd=sd.astype(np.float32))
+        square = np.maximum(self._squares / self.count - mean * mean, 0.0)
+        usual = np.median(square.reshape(-1, square.shape[2]), axis=0)
+        variance = (self.count * square + USUAL_IMAGES * usual) / (self.count + USUAL_IMAGES) * (1.0 + 1.0 / self.count)
+        return model._replace(mean=mean.astype(np.float32),
+                              sd=np.sqrt(np.maximum(variance, _LEAST_SD**2)).astype(np.float32))
 
 
 def learn_background(model: Foreground, images: Sequence[Image]) -> Foreground:
     """The model with a background from images (H, W, 3) RGB of the empty scene. Raises ValueError without images."""
-    if not images:
-        raise ValueError("the background needs at least one image of the scene without a hand")
-    stack = np.stack(images).astype(np.float32)
-    mean = stack.mean(axis=0)
-    return model._replace(mean=mean, sd=np.maximum(stack.std(axis=0), _LEAST_SD).astype(np.float32))
+    sums = BackgroundSums()
+    for image in images:
+        sums.add(image)
+    return sums.learnt(model)
 
 
 def learn_colours(model: Foreground, image: Image, hand: Mask, rest: Mask) -> Foreground:
@@ -151,37 +159,51 @@ def _density(pixels: Image) -> Array32:
     return ((1.0 - UNUSUAL) * BINS**3 * ANY * cube / total + UNUSUAL * ANY).astype(np.float32).ravel()
 
 
+def gain_of(image: Image, model: Foreground) -> Array32:
+    """(3,) how much brighter each channel of an image is than where the background was learnt: an automatic exposure
+    or white balance. It is the most frequent ratio of its pixels to the background's, so the hand does not matter."""
+    if not model.mean.size:
+        return np.ones(3, np.float32)
+    at = (slice(_SAMPLED_PX // 2, None, _SAMPLED_PX),) * 2
+    now, before = image[at].reshape(-1, 3).astype(np.float32), model.mean[at].reshape(-1, 3)
+    usable = np.all((now > _DARK) & (now < _BRIGHT) & (before > _DARK) & (before < _BRIGHT), axis=1)
+    if np.count_nonzero(usable) < _GAIN_BINS:
+        return np.ones(3, np.float32)
+    ratio = np.log(now[usable] / before[usable])
+    whole = ratio.mean(axis=1)
+    counts, edges = np.histogram(whole, _GAIN_BINS, (-_GAIN_LOG, _GAIN_LOG))
+    top = int(np.argmax(np.convolve(counts, np.ones(3), "same")))
+    width = edges[1] - edges[0]
+    own = ratio[np.abs(whole - edges[top] - 0.5 * width) < 1.5 * width]
+    return np.exp(np.median(own, axis=0)).astype(np.float32) if len(own) else np.ones(3, np.float32)
+
+
 @njit(cache=True)
-def foreground_at(image, row, column, hand, rest, mean, sd):
-    """Probability that a pixel shows the hand."""
+def foreground_at(image, row, column, hand, rest, mean, sd, gain):
+    """Probability that a pixel shows the hand, in an image `gain` (3,) times brighter than the background's."""
     r, g, b = image[row, column, 0], image[row, column, 1], image[row, column, 2]
     index = (np.int64(r) // _BIN * BINS + np.int64(g) // _BIN) * BINS + np.int64(b) // _BIN
     ours, theirs = hand[index], rest[index]
     if mean.shape[0]:
         squared, density = 0.0, 1.0
         for k in range(3):
-            z = (image[row, column, k] - mean[row, column, k]) / sd[row, column, k]
+            own = sd[row, column, k] * max(gain[k], np.float32(1.0))
+            z = (image[row, column, k] - gain[k] * mean[row, column, k]) / own
             squared += z * z
-            density *= _INVERSE_ROOT_2PI / sd[row, column, k]
+            density *= _INVERSE_ROOT_2PI / own
         theirs = (1.0 - UNUSUAL) * density * np.exp(-0.5 * squared) + UNUSUAL * theirs
     return ours / (ours + theirs)
 
 
 @njit(cache=True)
-def _fill(image, hand, rest, mean, sd, out):
+def _fill(image, hand, rest, mean, sd, gain, step, out):
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
-            out[i, j] = foreground_at(image, i, j, hand, rest, mean, sd)
+            out[i, j] = foreground_at(image, i * step + step // 2, j * step + step // 2, hand, rest, mean, sd, gain)
 
 
 def foreground_map(image: Image, model: Foreground, step: int = 4) -> Array32:
     """(H // step, W // step) foreground probabilities of an image (H, W, 3) RGB, of every `step`-th pixel."""
-    height, width = image.shape[0] // step, image.shape[1] // step
-    mean, sd = model.mean, model.sd
-    if step > 1:
-        image = np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-        mean, sd = model.mean[step // 2::step, step // 2::step], model.sd[step // 2::step, step // 2::step]
-    out = np.empty((height, width), np.float32)
-    _fill(image, model.hand, model.rest, np.ascontiguousarray(mean[:height, :width]),
-          np.ascontiguousarray(sd[:height, :width]), out)
+    out = np.empty((image.shape[0] // step, image.shape[1] // step), np.float32)
+    _fill(image, model.hand, model.rest, model.mean, model.sd, gain_of(image, model), step, out)
     return out
