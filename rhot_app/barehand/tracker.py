@@ -219,7 +219,7 @@ class BareHandTracker:
         prediction, since_s = self.filter.predict(t_s), t_s - self.filter.newest.t_s
         self.take(images, t_s)
         seen = self._silhouettes(images)
-        start = None if seen is None or self._fresh or not self._doubtful(seen, prediction) else self.relocate(
+        start = None if seen is None or not (self._fresh or self._doubtful(seen, prediction)) else self.relocate(
             seen, prediction, since_s)
         initial = prediction[0] if start is None else start
         passes = START_PASSES if self._fresh or start is not None else PASSES
