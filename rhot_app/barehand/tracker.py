@@ -19,8 +19,8 @@ from rhot_app.barehand.contour_residual import GROUPS, SAME_TIME_S, ContourFrame
 from rhot_app.barehand.contours import STEP_M, contour_points
 from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
-from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, search, silhouettes
-from rhot_app.barehand.start import STEP, Found, find_hand
+from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, silhouettes
+from rhot_app.barehand.start import STEP, Found, find_hand, settle
 from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, PALM, SHAPE, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
@@ -99,7 +99,7 @@ SAME_POSE_S = 1.0
 """s: images within this time show the hand in much the same pose, and count as one for its phalanges: a grasp takes a
 second. Errors of edges and of the surface last as long, and would move the lengths otherwise."""
 
-DRAWS = 100, 4, 10
+DRAWS = 60, 4, 8
 """Poses drawn in each round of a search, rounds, and how many of them the next round is drawn about."""
 
 RELOCATION_LOG_ODDS = 5.0
@@ -302,8 +302,8 @@ class BareHandTracker:
         spread = covariance[:POSE, :POSE] + pace**2 * self.process.stationary[:POSE, :POSE]
         world = np.eye(4)
         world[:3] = state[:ANGLES].reshape(3, 4)
-        world, angles, value = search(self.surface, world, state[ANGLES:VELOCITY].copy(), spread, self.model.limits,
-                                      state[BIAS:BIAS + SHAPE].copy(), seen, self._rng, *DRAWS)
+        world, angles, value = settle(self.surface, world, state[ANGLES:VELOCITY].copy(), spread, self.model,
+                                      state[BIAS:BIAS + SHAPE].copy(), seen, self._rng, DRAWS)
         if value < self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS:
             return None
         out = state.copy()
