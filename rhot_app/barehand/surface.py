@@ -93,7 +93,7 @@ def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, 
         add(carpal, roots[k], radius, 0.5 * (radius + float(model.radii[k + 1, 0])))
     for k in range(3):
         add(roots[k], roots[k + 1], float(model.radii[k + 1, 0]), float(model.radii[k + 2, 0]))
-    beside = np.array([0.0, -HYPOTHENAR * 2.0 * thick, -0.5 * HYPOTHENAR * 2.0 * thick])
+    beside = np.array([0.0, -HYPOTHENAR * 2.0 * thick, 0.0])
     add(carpal + beside, carpal + 0.7 * (roots[3] - carpal) + beside, radius, 0.9 * radius)
     heel = np.array([CARPAL_X, 0.4 * thumb[1], -0.006])
     add(heel, thumb, thick, float(model.radii[0, 0]))
