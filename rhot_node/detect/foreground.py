@@ -35,7 +35,7 @@ USUAL_IMAGES = 8
 
 _BIN = 256 // BINS  # values of a channel in one bin
 _INVERSE_ROOT_2PI = 0.3989423
-_SAMPLED_PX = 8  # pixels between those of which the exposure is estimated
+_SAMPLES = 1200  # pixels of which the exposure is estimated, about
 _DARK, _BRIGHT = 16.0, 240.0  # of 255: less is noise, more is clipped
 _GAIN_LOG, _GAIN_BINS = 0.7, 70  # exposures differ by a factor of 2 at most; bins of 2 %
 _FOREIGN = 4.0  # standard deviations of the background
@@ -162,20 +162,45 @@ def _density(pixels: Image) -> Array32:
 def gain_of(image: Image, model: Foreground) -> Array32:
     """(3,) how much brighter each channel of an image is than where the background was learnt: an automatic exposure
     or white balance. It is the most frequent ratio of its pixels to the background's, so the hand does not matter."""
-    if not model.mean.size:
-        return np.ones(3, np.float32)
-    at = (slice(_SAMPLED_PX // 2, None, _SAMPLED_PX),) * 2
-    now, before = image[at].reshape(-1, 3).astype(np.float32), model.mean[at].reshape(-1, 3)
-    usable = np.all((now > _DARK) & (now < _BRIGHT) & (before > _DARK) & (before < _BRIGHT), axis=1)
-    if np.count_nonzero(usable) < _GAIN_BINS:
-        return np.ones(3, np.float32)
-    ratio = np.log(now[usable] / before[usable])
-    whole = ratio.mean(axis=1)
-    counts, edges = np.histogram(whole, _GAIN_BINS, (-_GAIN_LOG, _GAIN_LOG))
-    top = int(np.argmax(np.convolve(counts, np.ones(3), "same")))
-    width = edges[1] - edges[0]
-    own = ratio[np.abs(whole - edges[top] - 0.5 * width) < 1.5 * width]
-    return np.exp(np.median(own, axis=0)).astype(np.float32) if len(own) else np.ones(3, np.float32)
+    gain = np.ones(3, np.float32)
+    if model.mean.size:
+        _gain(image, model.mean, gain)
+    return gain
+
+
+@njit(cache=True)
+def _gain(image, mean, gain):
+    step = max(1, int(np.sqrt(image.shape[0] * image.shape[1] / _SAMPLES)))
+    rows, columns = image.shape[0] // step, image.shape[1] // step
+    ratio, whole, used = np.empty((rows * columns, 3)), np.empty(rows * columns), 0
+    counts = np.zeros(_GAIN_BINS, np.int64)
+    for n in range(rows * columns):
+        row, column = n // columns * step + step // 2, n % columns * step + step // 2
+        usable = True
+        for k in range(3):
+            now, before = float(image[row, column, k]), float(mean[row, column, k])
+            usable = usable and _DARK < now < _BRIGHT and _DARK < before < _BRIGHT
+        if not usable:
+            continue
+        whole[used] = 0.0
+        for k in range(3):
+            ratio[used, k] = np.log(float(image[row, column, k]) / float(mean[row, column, k]))
+            whole[used] += ratio[used, k] / 3.0
+        place = int((whole[used] / _GAIN_LOG + 1.0) * 0.5 * _GAIN_BINS)
+        if whole[used] > -_GAIN_LOG and place < _GAIN_BINS:
+            counts[place] += 1
+            used += 1
+    if used < _GAIN_BINS:
+        return
+    top, most = 1, -1
+    for k in range(1, _GAIN_BINS - 1):
+        number = counts[k - 1] + counts[k] + counts[k + 1]
+        if number > most:
+            top, most = k, number
+    low, high = (top - 1) * 2.0 / _GAIN_BINS - 1.0, (top + 2) * 2.0 / _GAIN_BINS - 1.0
+    kept = (whole[:used] >= low * _GAIN_LOG) & (whole[:used] < high * _GAIN_LOG)
+    for k in range(3):
+        gain[k] = np.exp(np.median(ratio[:used, k][kept]))
 
 
 @njit(cache=True)
