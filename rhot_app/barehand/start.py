@@ -20,7 +20,7 @@ from rhot_app.barehand.surface import Surface
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.skeleton import FLEXIONS, HandPose
+from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS, HandPose
 from rhot_node.detect.foreground import Foreground, foreground_map
 
 Array = NDArray[np.float64]
@@ -38,6 +38,7 @@ PALMS = 6
 """Candidates of each camera."""
 
 _CURLS_DEG = ((5.0, 10.0, 5.0), (20.0, 30.0, 20.0), (65.0, 80.0, 45.0))  # MCP, PIP, DIP: open, relaxed, closed
+_ASIDE = 0.5  # rad to either side of a relaxed thumb: a third of its range
 _SPREAD = 0.03, 0.35, 0.35  # m, rad, rad between the poses tried
 _PALM_RADIUS = 0.6, 1.7  # of half the palm's breadth: thinner or thicker foreground is none
 
@@ -83,24 +84,34 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
     covariance = np.diag(np.repeat(np.square(_SPREAD), (3, 3, 21)))
     covariance[6:, 6:] = np.linalg.inv(model.pose_prior.information + np.eye(21) / _SPREAD[2] ** 2)
     for _, world, angles in _distinct(tried, KEPT * max(min(len(centres), 2), 1)):
-        moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, seen, rng, 60, 4, 8)
-        bent = bend_fingers(surface, moved, bent, model.limits, size, seen)
-        moved, bent, value = search(surface, moved, bent, 0.25 * covariance, model.limits, size, seen, rng, 60, 4, 8)
+        moved, bent, value = settle(surface, world, angles, covariance, model, size, seen, rng, (60, 4, 8))
         found.append(Found(HandPose(moved, bent), value))
     found.sort(key=lambda one: -one.score)
     return found[:most]
 
 
-def bend_fingers(surface: Surface, world: Array, angles: Array, limits: Array, size: Array,
+def settle(surface: Surface, world: Array, angles: Array, covariance: Array, model: HandModel, size: Array,
+           images: Silhouettes, rng: np.random.Generator, draws: tuple[int, int, int]) -> tuple[Array, Array, float]:
+    """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, each finger bent or
+    straight, and its score (`silhouette.search`, which takes `draws`)."""
+    moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, images, rng, *draws)
+    bent = bend_fingers(surface, moved, bent, model, size, images)
+    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, images, rng, *draws)
+
+
+def bend_fingers(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array,
                  images: Silhouettes) -> Array:
-    """The angles (21,) with each finger as it is, open, relaxed or closed, whichever the foreground says, one finger
-    after the other, twice."""
+    """The angles (21,) with each finger as it is, open, relaxed or closed, and the thumb as it is, relaxed or to either
+    side, whichever the foreground says, one after the other, twice."""
     angles = angles.copy()
-    for flexions in [*FLEXIONS[1:], *FLEXIONS[1:]]:
-        steps = np.zeros((1 + len(_CURLS_DEG), 27))
-        for k, curl in enumerate(_CURLS_DEG):
-            steps[1 + k, 6 + np.array(flexions)] = np.radians(curl) - angles[list(flexions)]
-        best = int(np.argmax(score_steps(surface, world, angles, steps, limits, size, images)))
+    thumbs = [model.pose_prior.mean[ANGLE_SLICES[0]] + aside * np.eye(5)[which]
+              for which, aside in ((0, 0.0), *product((0, 1), (-_ASIDE, _ASIDE)))]
+    choices = [(ANGLE_SLICES[0], thumbs)] + [(list(flexions), np.radians(_CURLS_DEG)) for flexions in FLEXIONS[1:]]
+    for where, options in [*choices, *choices]:
+        steps = np.zeros((1 + len(options), 27))
+        for k, option in enumerate(options):
+            steps[1 + k, 6:][where] = option - angles[where]
+        best = int(np.argmax(score_steps(surface, world, angles, steps, model.limits, size, images)))
         angles += steps[best, 6:]
     return angles
 

@@ -8,19 +8,19 @@ contours are then. Marker and landmark residuals of the same state may be added 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import GROUPS, ContourFrame, Contours, JointLimits, slices_of
+from rhot_app.barehand.contour_residual import GROUPS, SAME_TIME_S, ContourFrame, Contours, JointLimits, slices_of
 from rhot_app.barehand.contours import STEP_M, contour_points
 from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
-from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, search, silhouettes
-from rhot_app.barehand.start import STEP, Found, find_hand
+from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, silhouettes
+from rhot_app.barehand.start import STEP, Found, find_hand, settle
 from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, PALM, SHAPE, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
@@ -99,7 +99,7 @@ SAME_POSE_S = 1.0
 """s: images within this time show the hand in much the same pose, and count as one for its phalanges: a grasp takes a
 second. Errors of edges and of the surface last as long, and would move the lengths otherwise."""
 
-DRAWS = 100, 4, 10
+DRAWS = 60, 4, 8
 """Poses drawn in each round of a search, rounds, and how many of them the next round is drawn about."""
 
 RELOCATION_LOG_ODDS = 5.0
@@ -112,9 +112,6 @@ twenty slices."""
 COVER_DROP, COVER_SHARE = 0.3, 0.1
 """Log odds per pixel by which a prediction may cover the foreground worse than the hand did of late, a factor of 1.35,
 and the share of a new image in that memory."""
-
-SAME_TIME_S = 1e-3
-"""s: images nearer in time are solved together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,34 +202,46 @@ class BareHandTracker:
     def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
         """The hand after one image (H, W, 3) RGB of each camera, None where it has none, of master times `t_ns`."""
         begun = time.perf_counter()
-        order = sorted((t, c) for c, (t, image) in enumerate(zip(t_ns, images, strict=True)) if image is not None)
         if not self.tracking:
             raise TrackingError("the bare hand has no start; give one by start(pose, t_ns), or find one by "
                                 "find(images, t_ns)")
-        while order:
-            t = order[0][0]
-            group = [c for u, c in order if 1e-9 * (u - t) < SAME_TIME_S]
-            order = [(u, c) for u, c in order if c not in group]
-            self.see({c: images[c] for c in group}, t)  # type: ignore[misc]
+        given = {c: image for c, image in enumerate(images) if image is not None}
+        if given:
+            newest = max(t_ns[c] for c in given)
+            self.see(given, newest, late_s={c: 1e-9 * (t_ns[c] - newest) for c in given})
         return self.state(begun)
 
-    def see(self, images: dict[int, Image], t_ns: int, extra: Sequence[Residual] = ()) -> Knot:
-        """Weigh the images of some cameras at one instant, and other residuals of the same state."""
-        t_s = 1e-9 * (t_ns - self._epoch_ns)
-        prediction = self.filter.predict(t_s)
+    def see(self, images: dict[int, Image], t_ns: int, extra: Sequence[Residual] = (),
+            late_s: Mapping[int, float] | None = None) -> Knot:
+        """Weigh the images of some cameras at one instant, and other residuals of the same state. `late_s`: each
+        image's time less that instant, 0 by default."""
+        t_s, late = 1e-9 * (t_ns - self._epoch_ns), late_s or {}
+        prediction, since_s = self.filter.predict(t_s), t_s - self.filter.newest.t_s
         self.take(images, t_s)
         seen = self._silhouettes(images)
-        start = None if seen is None or self._fresh else self.relocate(seen, prediction, t_s - self.filter.newest.t_s)
+        start = None if seen is None or not (self._fresh or self._doubtful(seen, prediction)) else self.relocate(
+            seen, prediction, since_s)
+        initial = prediction[0] if start is None else start
         passes = START_PASSES if self._fresh or start is not None else PASSES
-        knot = self._fit(images, t_s, prediction, prediction[0] if start is None else start, extra, passes)
+        knot = self._fit(images, late, t_s, prediction, initial, extra, passes)
         if seen is not None:
             covered = self.covered(seen, knot.state)
             if start is not None and covered < self.covered(seen, start) - COVER_DROP:
-                knot = self._anew(images, t_s, start, extra)  # the contour led away from the foreground
+                # the contour led away from the foreground
+                knot = self._fit(images, late, t_s, self.restart(t_s, start), start, extra, START_PASSES)
                 covered = self.covered(seen, knot.state)
             self.cover += (1.0 if self._fresh else COVER_SHARE) * (covered - self.cover)
         self._fresh = False
         return knot
+
+    def _doubtful(self, seen: Silhouettes, prediction: tuple[Array, Array]) -> bool:
+        """Whether a prediction is too uncertain to tell fingers apart, covers the foreground worse than the hand did of
+        late, or follows an image in which the contour of a finger was not found."""
+        state, covariance = prediction
+        depth = self.poses[0][2] @ np.array([*state[[3, 7, 11]], 1.0])
+        wide = np.sqrt(np.trace(covariance[:3, :3]) / 3.0) * self.cameras[0].intrinsics[0] / depth
+        unfound = float(np.min(np.nan_to_num(self.fit.support, nan=1.0))) < LEAST_SUPPORT
+        return bool(wide > CONFUSED_PX or unfound or self.covered(seen, state) < self.cover - COVER_DROP)
 
     def take(self, cameras: Iterable[int], t_s: float) -> None:
         """Note that images of `cameras` of the time `t_s`, s since the start, are weighed next."""
@@ -240,11 +249,6 @@ class BareHandTracker:
             self._repeated[camera] = max(1.0 / (FASTEST * max(t_s - self._taken_s[camera], SAME_TIME_S)), 1.0)
             self._taken_s[camera] = t_s
         self.filter.partial = Partial(PHALANGES, min(max(t_s - self.filter.newest.t_s, 0.0) / SAME_POSE_S, 1.0))
-
-    def _anew(self, images: dict[int, Image], t_s: float, start: Array, extra: Sequence[Residual]) -> Knot:
-        """Begin again at rest in the state `start`."""
-        prediction = self.restart(t_s, start)
-        return self._fit(images, t_s, prediction, prediction[0], extra, START_PASSES)
 
     def restart(self, t_s: float, start: Array) -> tuple[Array, Array]:
         """Begin at rest in the state `start`; what is known of the size stays. Returns state and covariance."""
@@ -256,18 +260,18 @@ class BareHandTracker:
         self.filter.start(t_s, state, covariance)
         return state, covariance
 
-    def _fit(self, images: dict[int, Image], t_s: float, prediction: tuple[Array, Array], initial: Array,
-             extra: Sequence[Residual], passes: int) -> Knot:
-        """Search the images and estimate, `passes` times; the first time about the state `initial`."""
+    def _fit(self, images: dict[int, Image], late_s: Mapping[int, float], t_s: float,
+             prediction: tuple[Array, Array], state: Array, extra: Sequence[Residual], passes: int) -> Knot:
+        """Search the images and estimate, `passes` times; the first time about `state`."""
         residuals: list[Residual] = []
-        state, covariance = initial, prediction[1]
+        covariance = prediction[1]
         for number in range(passes):
-            frames = [self._search(camera, image, state, covariance * 0.25**number, number == passes - 1)
-                      for camera, image in images.items()]
+            frames = [self._search(camera, image, state, covariance * 0.25**number, number == passes - 1,
+                                   late_s.get(camera, 0.0)) for camera, image in images.items()]
             residuals = [Contours(frames), self.limits, *extra]
             if number < passes - 1:
-                initial = state = update(self.process, t_s, prediction, residuals, initial, self.filter.partial).state
-        return self.filter.add(t_s, residuals, prediction, initial)
+                state = update(self.process, t_s, prediction, residuals, state, self.filter.partial).state
+        return self.filter.add(t_s, residuals, prediction, state)
 
     def _silhouettes(self, images: dict[int, Image]) -> Silhouettes | None:
         """The images' foreground, None while no camera knows any."""
@@ -290,55 +294,49 @@ class BareHandTracker:
         _, parts = score(self.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE], seen)
         return float((parts[:, 0] - parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
 
-    def relocate(self, seen: Silhouettes, prediction: tuple[Array, Array], dt_s: float) -> Array | None:
-        """A state that covers the foreground better than the prediction by RELOCATION_LOG_ODDS, or None.
-
-        It is searched for where the prediction covers the foreground worse than the hand did of late, where it is too
-        uncertain to tell fingers apart, or where a finger's contour was not found. Such a state, or such a finger,
-        widens the prediction by how far hands go in `dt_s`.
-        """
-        state, covariance = prediction
-        depth = self.poses[0][2] @ np.array([*state[[3, 7, 11]], 1.0])
-        wide = np.sqrt(np.trace(covariance[:3, :3]) / 3.0) * self.cameras[0].intrinsics[0] / depth
-        unfound = float(np.min(np.nan_to_num(self.fit.support, nan=1.0))) < LEAST_SUPPORT
-        if wide < CONFUSED_PX and not unfound and self.covered(seen, state) > self.cover - COVER_DROP:
-            return None
+    def relocate(self, seen: Silhouettes, found: tuple[Array, Array], dt_s: float) -> Array | None:
+        """A state that covers the foreground better than the `found` one, with its covariance (n, n), by
+        RELOCATION_LOG_ODDS, or None. It is searched for as far about it as hands go in `dt_s`."""
+        state, covariance = found
         pace = FASTEST / np.sqrt(3.0) * dt_s
         spread = covariance[:POSE, :POSE] + pace**2 * self.process.stationary[:POSE, :POSE]
-        best: tuple[float, Array | None] = self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS, None
-        for begin in (state, self.filter.newest.state):
-            world = np.eye(4)
-            world[:3] = begin[:ANGLES].reshape(3, 4)
-            world, angles, value = search(self.surface, world, begin[ANGLES:VELOCITY].copy(), spread, self.model.limits,
-                                          begin[BIAS:BIAS + SHAPE].copy(), seen, self._rng, *DRAWS)
-            if value > best[0]:
-                out = state.copy()
-                out[:ANGLES], out[ANGLES:VELOCITY] = world[:3].ravel(), angles
-                best = value, out
-        if best[1] is not None or unfound:
-            covariance[:POSE, :POSE] = spread
-        return best[1]
+        world = np.eye(4)
+        world[:3] = state[:ANGLES].reshape(3, 4)
+        world, angles, value = settle(self.surface, world, state[ANGLES:VELOCITY].copy(), spread, self.model,
+                                      state[BIAS:BIAS + SHAPE].copy(), seen, self._rng, DRAWS)
+        if value < self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS:
+            return None
+        out = state.copy()
+        out[:ANGLES], out[ANGLES:VELOCITY] = world[:3].ravel(), angles
+        return out
 
-    def _search(self, camera: int, image: Image, state: Array, covariance: Array, last: bool) -> ContourFrame:
+    def _search(self, camera: int, image: Image, state: Array, covariance: Array, last: bool,
+                late_s: float = 0.0) -> ContourFrame:
         """Search one image along the contours of a hand in `state`."""
         if not self.noise[camera]:
             self.noise[camera] = noise_of(image)
-        frame = self.expected(camera, state, covariance, STEP_M if last else 2.0 * STEP_M)
+        frame = self.expected(camera, state, covariance, STEP_M if last else 2.0 * STEP_M, late_s)
         frame.observe(find_edges(image, frame.slices, self.foreground[camera], self.noise[camera]))
         if last:
             self.frames[camera] = frame
         return frame
 
-    def expected(self, camera: int, state: Array, covariance: Array, step_m: float = STEP_M) -> ContourFrame:
-        """The slices across the contours, `step_m` apart, of a hand in `state` before one camera; not yet searched."""
-        model = self.cameras[camera]
+    def expected(self, camera: int, state: Array, covariance: Array, step_m: float = STEP_M,
+                 late_s: float = 0.0) -> ContourFrame:
+        """The slices across the contours, `step_m` apart, of a hand in `state` before one camera, in an image of
+        `late_s` s later; not yet searched."""
+        model, then = self.cameras[camera], state
+        if abs(late_s) > SAME_TIME_S:
+            step = np.zeros(self.process.size)
+            step[:POSE] = late_s * state[VELOCITY:ACCELERATION]
+            then = self.process.retract(state, step)
         size, pose, image_size = state[BIAS:BIAS + SHAPE].copy(), self.poses[camera], (model.width, model.height)
         if self.mode == "feature":
-            points = feature_points(self.surface, state, size, pose, model.intrinsics, image_size)
+            points = feature_points(self.surface, then, size, pose, model.intrinsics, image_size)
         else:
-            points = contour_points(self.surface, state, size, pose, model.intrinsics, image_size, step_m)
+            points = contour_points(self.surface, then, size, pose, model.intrinsics, image_size, step_m)
         frame = slices_of(self.surface, state, covariance, pose, model.intrinsics, points, MOTION, self.row_s[camera],
-                          REACH, LONGEST_PX, self._repeated[camera])
+                          REACH, LONGEST_PX, self._repeated[camera], late_s)
         frame.expected_sd = np.minimum(frame.expected_sd, CONFUSED_PX)
         return frame
 

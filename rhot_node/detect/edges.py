@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect.foreground import Foreground, foreground_at
+from rhot_node.detect.foreground import Foreground, foreground_at, gain_of
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -69,7 +69,7 @@ def find_edges(image: Image, slices: Array, foreground: Foreground, noise: float
     edges = Edges(np.zeros(n, np.int64), *(np.zeros((n, MOST)) for _ in range(5)))
     longest = 2 * math.ceil(slices[:, 4].max()) + 1 + 2 * BEYOND if n else 1
     _find(image, slices, foreground.hand, foreground.rest, foreground.mean, foreground.sd,
-          noise, np.empty((longest, 4)), np.empty(longest), np.empty(longest), *edges)
+          gain_of(image, foreground), noise, np.empty((longest, 4)), np.empty(longest), np.empty(longest), *edges)
     return edges
 
 
@@ -95,8 +95,8 @@ def _sample(image, x, y, out, weight):
 
 
 @njit(cache=True)
-def _find(image, slices, hand, rest, mean, sd, noise, profile, ours, slope, count, offset, spread, strength, inside,
-          outside):
+def _find(image, slices, hand, rest, mean, sd, gain, noise, profile, ours, slope, count, offset, spread, strength,
+          inside, outside):
     noise_slope = noise * _TAPS_NOISE
     derivative = np.empty((profile.shape[0], 4))
     for s in range(slices.shape[0]):
@@ -114,7 +114,7 @@ def _find(image, slices, hand, rest, mean, sd, noise, profile, ours, slope, coun
             ours[i] = profile[i, 3] = 0.0
             if good:
                 first, last = min(first, i), i
-                ours[i] = foreground_at(image, int(y + 0.5), int(x + 0.5), hand, rest, mean, sd)
+                ours[i] = foreground_at(image, int(y + 0.5), int(x + 0.5), hand, rest, mean, sd, gain)
                 profile[i, 3] = FOREGROUND_STEP * ours[i]
         for i in range(length):
             slope[i] = 0.0

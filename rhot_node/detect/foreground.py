@@ -30,8 +30,14 @@ SKIN_CB, SKIN_CR = (77, 127), (133, 173)
 UNUSUAL = 0.02
 """Probability that a pixel shows what the learnt colours do not: highlights, shadows, new things."""
 
+USUAL_IMAGES = 8
+"""Images whose worth the median pixel's variance has for every pixel: a few images show one pixel's variance badly."""
+
 _BIN = 256 // BINS  # values of a channel in one bin
 _INVERSE_ROOT_2PI = 0.3989423
+_SAMPLES = 1200  # pixels of which the exposure is estimated, about
+_DARK, _BRIGHT = 16.0, 240.0  # of 255: less is noise, more is clipped
+_GAIN_LOG, _GAIN_BINS = 0.7, 70  # exposures differ by a factor of 2 at most; bins of 2 %
 _FOREIGN = 4.0  # standard deviations of the background
 _OPEN_PX, _LEAST_PIXELS = 3, 400  # smaller patches of skin are none
 _LEAST_SD = 2.0  # of 255: quantisation and compression, below which no background is known
@@ -106,17 +112,19 @@ class BackgroundSums:
         if not self.count:
             raise ValueError("the background needs at least one image of the scene without a hand")
         mean = self._sum / self.count
-        sd = np.sqrt(np.maximum(self._squares / self.count - mean * mean, _LEAST_SD**2))
-        return model._replace(mean=mean.astype(np.float32), sd=sd.astype(np.float32))
+        square = np.maximum(self._squares / self.count - mean * mean, 0.0)
+        usual = np.median(square.reshape(-1, square.shape[2]), axis=0)
+        variance = (self.count * square + USUAL_IMAGES * usual) / (self.count + USUAL_IMAGES) * (1.0 + 1.0 / self.count)
+        return model._replace(mean=mean.astype(np.float32),
+                              sd=np.sqrt(np.maximum(variance, _LEAST_SD**2)).astype(np.float32))
 
 
 def learn_background(model: Foreground, images: Sequence[Image]) -> Foreground:
     """The model with a background from images (H, W, 3) RGB of the empty scene. Raises ValueError without images."""
-    if not images:
-        raise ValueError("the background needs at least one image of the scene without a hand")
-    stack = np.stack(images).astype(np.float32)
-    mean = stack.mean(axis=0)
-    return model._replace(mean=mean, sd=np.maximum(stack.std(axis=0), _LEAST_SD).astype(np.float32))
+    sums = BackgroundSums()
+    for image in images:
+        sums.add(image)
+    return sums.learnt(model)
 
 
 def learn_colours(model: Foreground, image: Image, hand: Mask, rest: Mask) -> Foreground:
@@ -151,37 +159,76 @@ def _density(pixels: Image) -> Array32:
     return ((1.0 - UNUSUAL) * BINS**3 * ANY * cube / total + UNUSUAL * ANY).astype(np.float32).ravel()
 
 
+def gain_of(image: Image, model: Foreground) -> Array32:
+    """(3,) how much brighter each channel of an image is than where the background was learnt: an automatic exposure
+    or white balance. It is the most frequent ratio of its pixels to the background's, so the hand does not matter."""
+    gain = np.ones(3, np.float32)
+    if model.mean.size:
+        _gain(image, model.mean, gain)
+    return gain
+
+
 @njit(cache=True)
-def foreground_at(image, row, column, hand, rest, mean, sd):
-    """Probability that a pixel shows the hand."""
+def _gain(image, mean, gain):
+    step = max(1, int(np.sqrt(image.shape[0] * image.shape[1] / _SAMPLES)))
+    rows, columns = image.shape[0] // step, image.shape[1] // step
+    ratio, whole, used = np.empty((rows * columns, 3)), np.empty(rows * columns), 0
+    counts = np.zeros(_GAIN_BINS, np.int64)
+    for n in range(rows * columns):
+        row, column = n // columns * step + step // 2, n % columns * step + step // 2
+        usable = True
+        for k in range(3):
+            now, before = float(image[row, column, k]), float(mean[row, column, k])
+            usable = usable and _DARK < now < _BRIGHT and _DARK < before < _BRIGHT
+        if not usable:
+            continue
+        whole[used] = 0.0
+        for k in range(3):
+            ratio[used, k] = np.log(float(image[row, column, k]) / float(mean[row, column, k]))
+            whole[used] += ratio[used, k] / 3.0
+        place = int((whole[used] / _GAIN_LOG + 1.0) * 0.5 * _GAIN_BINS)
+        if whole[used] > -_GAIN_LOG and place < _GAIN_BINS:
+            counts[place] += 1
+            used += 1
+    if used < _GAIN_BINS:
+        return
+    top, most = 1, -1
+    for k in range(1, _GAIN_BINS - 1):
+        number = counts[k - 1] + counts[k] + counts[k + 1]
+        if number > most:
+            top, most = k, number
+    low, high = (top - 1) * 2.0 / _GAIN_BINS - 1.0, (top + 2) * 2.0 / _GAIN_BINS - 1.0
+    kept = (whole[:used] >= low * _GAIN_LOG) & (whole[:used] < high * _GAIN_LOG)
+    for k in range(3):
+        gain[k] = np.exp(np.median(ratio[:used, k][kept]))
+
+
+@njit(cache=True)
+def foreground_at(image, row, column, hand, rest, mean, sd, gain):
+    """Probability that a pixel shows the hand, in an image `gain` (3,) times brighter than the background's."""
     r, g, b = image[row, column, 0], image[row, column, 1], image[row, column, 2]
     index = (np.int64(r) // _BIN * BINS + np.int64(g) // _BIN) * BINS + np.int64(b) // _BIN
     ours, theirs = hand[index], rest[index]
     if mean.shape[0]:
         squared, density = 0.0, 1.0
         for k in range(3):
-            z = (image[row, column, k] - mean[row, column, k]) / sd[row, column, k]
+            own = sd[row, column, k] * max(gain[k], np.float32(1.0))
+            z = (image[row, column, k] - gain[k] * mean[row, column, k]) / own
             squared += z * z
-            density *= _INVERSE_ROOT_2PI / sd[row, column, k]
+            density *= _INVERSE_ROOT_2PI / own
         theirs = (1.0 - UNUSUAL) * density * np.exp(-0.5 * squared) + UNUSUAL * theirs
     return ours / (ours + theirs)
 
 
 @njit(cache=True)
-def _fill(image, hand, rest, mean, sd, out):
+def _fill(image, hand, rest, mean, sd, gain, step, out):
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
-            out[i, j] = foreground_at(image, i, j, hand, rest, mean, sd)
+            out[i, j] = foreground_at(image, i * step + step // 2, j * step + step // 2, hand, rest, mean, sd, gain)
 
 
 def foreground_map(image: Image, model: Foreground, step: int = 4) -> Array32:
     """(H // step, W // step) foreground probabilities of an image (H, W, 3) RGB, of every `step`-th pixel."""
-    height, width = image.shape[0] // step, image.shape[1] // step
-    mean, sd = model.mean, model.sd
-    if step > 1:
-        image = np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-        mean, sd = model.mean[step // 2::step, step // 2::step], model.sd[step // 2::step, step // 2::step]
-    out = np.empty((height, width), np.float32)
-    _fill(image, model.hand, model.rest, np.ascontiguousarray(mean[:height, :width]),
-          np.ascontiguousarray(sd[:height, :width]), out)
+    out = np.empty((image.shape[0] // step, image.shape[1] // step), np.float32)
+    _fill(image, model.hand, model.rest, model.mean, model.sd, gain_of(image, model), step, out)
     return out

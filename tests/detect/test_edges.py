@@ -71,6 +71,22 @@ def test_the_foreground_tells_the_sides_of_an_edge() -> None:
     assert edges.outside[0, strongest] < 0.1
 
 
+@pytest.mark.parametrize("gain", [(1.0, 1.0, 1.0), (1.3, 1.3, 1.3), (0.75, 0.7, 0.8)])
+def test_an_automatic_exposure_makes_no_background_a_hand(gain: tuple[float, ...]) -> None:
+    rng = np.random.default_rng(0)
+    scene = rng.uniform(50.0, 180.0, (120, 160, 1)) * [1.0, 0.8, 0.6]
+
+    def photo(values: np.ndarray, factor: tuple[float, ...]) -> np.ndarray:
+        return np.clip(values * factor + rng.normal(0.0, 2.0, values.shape) + 0.5, 0.0, 255.0).astype(np.uint8)
+
+    model = learn_background(skin_foreground(), [photo(scene, (1.0, 1.0, 1.0)) for _ in range(8)])
+    with_hand = scene.copy()
+    with_hand[:, 40:120] = SKIN  # half of the picture
+    probability = foreground_map(photo(with_hand, gain), model, 2)
+    assert np.mean(probability[:, 22:58] > 0.5) > 0.95
+    assert np.mean(probability[:, :18] > 0.5) < 0.03
+
+
 def test_nothing_learnt_is_said_and_decides_nothing() -> None:
     image, _ = half_plane(0.0, 0.0, 1)
     assert "No background is learnt" in no_foreground().sentence
