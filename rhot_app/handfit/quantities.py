@@ -71,12 +71,13 @@ def numbers_of(base: HandAnatomy) -> tuple[Number, ...]:
                   for k, (low, high) in zip(range(own.start, own.stop), limits.tolist(), strict=True)]
     found += [Number("Forearm", name, "°", -limit, limit, "bend", k, "Of the forearm behind the wrist.")
               for k, (name, limit) in enumerate(zip(("flexion", "deviation"), np.degrees(BEND_LIMIT), strict=True))]
-    for name, index, meaning in (("whole hand", WHOLE, "Every length of the hand."),
-                                 ("fingers", FINGERS, "All phalanges, beside the size of the whole hand."),
-                                 ("thickness", THICKNESS, "All radii but the forearm's, and the palm's thickness."),
-                                 ("forearm", FOREARM_RADIUS, "The forearm's thickness.")):
-        low, high = 100.0 * np.exp([-SHAPE_LIMIT[index], SHAPE_LIMIT[index]])
-        found.append(Number("Sizes", name, "%", float(low), float(high), "size", index, meaning + " Of the first hand."))
+    for name, index, meaning in (("whole hand", WHOLE, "every length"),
+                                 ("fingers", FINGERS, "all phalanges, beside the size of the whole hand"),
+                                 ("thickness", THICKNESS, "all radii but the forearm's, and the palm's thickness"),
+                                 ("forearm", FOREARM_RADIUS, "the forearm's thickness")):
+        most = float(SHAPE_LIMIT[index])
+        found.append(Number("Sizes", name, "%", 100.0 * math.exp(-most), 100.0 * math.exp(most), "size", index,
+                            f"Relative to the hand of the beginning: {meaning}."))
     found += [_phalanx(base, "length", k) for k in range(15)] + [_phalanx(base, "radius", k) for k in range(15)]
     for k in range(15):
         finger, value = FINGER_NAMES[k // 3], base.fingers[FINGER_NAMES[k // 3]].base_mm[k % 3]

@@ -196,6 +196,10 @@ class HandFit:
         self._steps[keep:] = [_Step(state, done)]
         self._at = keep
 
+    def begin(self) -> None:
+        """Forget how the state came about: what there is now is the beginning."""
+        self._steps, self._at = [_Step(self.state, "")], 0
+
     # -- pictures --------------------------------------------------------------------------------------------------
 
     def add_pictures(self, images: Mapping[int, Image], pose: HandPose | None = None) -> None:

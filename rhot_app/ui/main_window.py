@@ -155,6 +155,7 @@ class MainWindow(QMainWindow):
         for action, wizard in zip(self.actions_.wizards, WIZARDS, strict=True):
             action.triggered.connect(lambda checked=False, wizard=wizard: self.wizards.open(wizard))
         self.actions_.earlier.triggered.connect(self.wizards.open_versions)
+        self.actions_.fit.triggered.connect(self.wizards.open_fit)
         self.toolbar.calibrate_menu.aboutToShow.connect(self._show_ages)
         self.wizards.rig_used.connect(self.rig_watch.look_soon)
         self.wizards.failed.connect(self._show_failure)
@@ -300,8 +301,8 @@ class MainWindow(QMainWindow):
 
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
-        return [*a.wizards, a.earlier, a.tracker, a.outputs, a.add_object, a.close_rig, a.properties.menuAction(),
-                a.frame, a.home, a.names, a.clouds, a.now]
+        return [*a.wizards, a.earlier, a.fit, a.tracker, a.outputs, a.add_object, a.close_rig,
+                a.properties.menuAction(), a.frame, a.home, a.names, a.clouds, a.now]
 
     def _show_busy(self) -> None:
         if self.controller.opened is None:
