@@ -17,7 +17,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel, neutral_pose
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
-from rhot_app.hand.skeleton import JOINTS, HandPose
+from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, JOINTS, HandPose
 from rhot_app.handfit.contour_search import find_hand, fit_to_contours
 from rhot_app.handfit.hand_shape import SIZE, Shapes
 from rhot_app.handfit.pictures import require_calibrated, require_size
@@ -298,14 +298,20 @@ class HandFit:
         self.take(FitState(np.zeros(SIZE), instants), "resetting the hand")
 
     def fitted_to_anchors(self) -> FitState:
-        """The most probable state by the anchors; with lengths free, of all instants that have any. Raises
-        CalibrationError without anchors."""
+        """The most probable state by the anchors; with lengths free, of all instants that have any. A finger without
+        anchors stays as it is. Raises CalibrationError without anchors."""
         state = self._bare()
         wanted = [k for k in self._wanted() if state.instants[k].anchors]
         if not wanted:
             raise CalibrationError("There is no anchor to fit to. Drag a joint to its place in a picture first.")
-        return self.solver.solve(state, Evidence(state, FREE_SD, self.anchor_sd_px),
-                                 free_numbers(state, wanted, self.freedom))
+        free = free_numbers(state, wanted, self.freedom)
+        for k in wanted:
+            for finger, angles in enumerate(ANGLE_SLICES):
+                if not any(JOINT_SLICES[finger].start < one.joint < JOINT_SLICES[finger].stop
+                           for one in state.instants[k].anchors):
+                    first = state.own(k).start + 6
+                    free[first + angles.start:first + angles.stop] = False
+        return self.solver.solve(state, Evidence(self.solver.natural(state), FREE_SD, self.anchor_sd_px), free)
 
     def fitted_to_contours(self) -> FitState:
         """The state fitted to the edges in the pictures; with lengths free, of all instants. Raises CalibrationError,

@@ -1,14 +1,14 @@
 """Solves pose and shape for anchors and contours by least squares with priors; joint limits hold exactly.
 
-Every instant has its own pose; all share the shape. What no evidence determines stays where it was: the prior of a pose
-is centred at the pose with which a drag or a fit begins, and has the couplings of `hand.limits.pose_prior`. The prior
-of the shape is centred at the base hand.
+Every instant has its own pose; all share the shape. The prior of the shape is centred at the base hand, that of the
+angles is `hand.limits.pose_prior`. In a drag it is centred at the pose with which the drag began instead, so that what
+the anchors do not determine stays where it was.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -25,7 +25,7 @@ from rhot_app.geometry.transforms import log_so3
 from rhot_app.hand.kinematics import empty_frames, forward_arrays, jacobian_arrays
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, POSE, VELOCITY
-from rhot_app.hand.skeleton import JOINTS
+from rhot_app.hand.skeleton import JOINTS, HandPose
 from rhot_app.handfit.hand_shape import ROOTS, SHAPE_LIMIT, SHAPE_SD, SIZE, Shapes
 from rhot_app.handfit.state import BEND_LIMIT, OWN, Contour, FitState, Instant
 
@@ -55,7 +55,7 @@ _AT_LIMIT = 1e-9  # rad and logarithms
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """What a solution goes by. `reference`: the state to which undetermined numbers stay near, with `palm_sd` m, rad;
+    """What a solution goes by. `reference`: the poses at which the prior is centred; `palm_sd` m, rad, is the palm's;
     `anchor_sd_px`; `contours`: of each instant, None where none were searched."""
 
     reference: FitState
@@ -72,6 +72,12 @@ class Solver:
         model = shapes.model(np.zeros(SIZE))
         self.limits = model.limits
         self._root = np.linalg.cholesky(model.pose_prior.information).T
+
+    def natural(self, state: FitState) -> FitState:
+        """The state with the angles at the mean of `pose_prior`: where it is centred when nothing else is known."""
+        mean = self.shapes.model(np.zeros(SIZE)).pose_prior.mean
+        return replace(state, instants=tuple(
+            replace(one, pose=HandPose(one.pose.world_from_palm, mean)) for one in state.instants))
 
     def solve(self, state: FitState, evidence: Evidence, free: NDArray[np.bool_], steps: int = FIT_STEPS) -> FitState:
         """The most probable state from `state` on; only numbers that are `free` (n,) change."""

@@ -78,8 +78,8 @@ class FitPicture(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(f"Picture of camera {name}")
         self.setToolTip("Drag a joint to its place; the right button frees it. The wheel zooms, the middle button "
-                        "moves the picture, a double click shows all of it, F frames the hand. Without a mouse: comma and "
-                        "point choose a joint, arrows move it, Delete frees it.")
+                        "moves the picture, a double click shows all of it, F frames the hand. Without a mouse: comma "
+                        "and point choose a joint, arrows move it, Delete frees it.")
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Four by three."""
@@ -270,7 +270,7 @@ class FitPicture(QWidget):
         paint_tag(painter, shown.topLeft() + QPointF(6, 6), self.name, bold=True)
         if self.usable and self.joint >= 0 and np.isfinite(self.joints[self.joint]).all():
             error = self._errors.get(self.joint)
-            words = JOINTS[self.joint].replace("_", " ") + ("" if error is None else f", anchor {error:.1f} px away")
+            words = JOINTS[self.joint].replace("_", " ") + ("" if error is None else f", {error:.1f} px away")
             at = place.to_widget(self.joints[self.joint][None])[0]
             wide = painter.fontMetrics().horizontalAdvance(words) + _TAG_PX
             left = min(max(at.x() + _TAG_PX, shown.left()), shown.right() - wide)
