@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import msgspec
 import numpy as np
-from bare_scenes import left_hand, poses, right_hand, rig_of, scene
+from bare_scenes import left_hand, poses, rig_of, right_hand, scene
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy

@@ -1,4 +1,4 @@
-"""Fitting a hand by anchors and contours: what is dragged gets there, limits hold, lengths are found as well as said."""
+"""Fitting a hand by anchors and contours: what is dragged gets there, limits hold, lengths are as good as is said."""
 
 from __future__ import annotations
 
@@ -161,8 +161,8 @@ def test_a_whole_drag_is_one_step():
     fit.grab(0, INDEX_TIP)
     start = fit.joints(0)[INDEX_TIP]
     for part in np.linspace(0.1, 1.0, 10):
-        fit.drag(tuple(start + part * np.array([5.0, 20.0])))
-    fit.drag(tuple(start + (5.0, 20.0)), last=True)
+        fit.drag(tuple(start + part * np.array((5.0, 20.0))))
+    fit.drag(tuple(np.add(start, (5.0, 20.0))), last=True)
     fit.release()
     assert fit.undoable == "moving index tip in camera 1"
     fit.undo()

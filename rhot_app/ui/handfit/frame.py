@@ -26,7 +26,8 @@ from rhot_app.ui.handfit.number_form import NumberForm
 from rhot_app.ui.handfit.picture import FitPicture
 from rhot_app.ui.models.palette import Scheme
 
-_RIGHT_PX, _OTHERS_PX = 340, 150  # of the numbers at the right; of the rows above and below the pictures
+_RIGHT_PX, _OTHERS_PX = 368, 150  # of the numbers at the right; of the rows above and below the pictures
+_UPRIGHT = 0.85  # chosen: a hand is higher than wide, and a view beside another one is higher, which zooming uses
 _FREEDOMS: Final[tuple[tuple[Freedom, str], ...]] = (
     ("pose", "the pose alone"), ("lengths", "pose and lengths"), ("roots", "pose, lengths and finger roots"))
 
@@ -141,12 +142,12 @@ class FitFrame:
         layout.addLayout(below)
 
     def arrange(self, width: int, height: int) -> None:
-        """Pictures beside or above each other, whichever makes them larger in a window of this size px."""
+        """Pictures beside or above each other, whichever makes the hand larger in a window of this size px."""
         count = len(self.views)
         width, height = width - _RIGHT_PX - 48, height - _OTHERS_PX
         beside = min(width / count, 4 / 3 * height)
         stacked = min(float(width), 4 / 3 * height / count)
-        self._wall.setDirection(QBoxLayout.Direction.LeftToRight if beside >= stacked
+        self._wall.setDirection(QBoxLayout.Direction.LeftToRight if beside >= _UPRIGHT * stacked
                                 else QBoxLayout.Direction.TopToBottom)
 
     def show_buttons(self, fit: HandFit, *, fitted: bool, anchored: bool, idle: bool) -> None:

@@ -24,7 +24,9 @@ from rhot_app.handfit.quantities import GROUPS, Number
 STEPS: Final = 2000
 """Of a slider: finer than a pixel of the screen."""
 
+_UNKNOWN = 999.0  # mm, degrees or per cent: as good as nothing is known
 _DECIMALS = {"mm": 1, "°": 1, "%": 1}
+_MOST_MM = {"place": 9999.0, "length": 400.0, "radius": 400.0, "root": 400.0}  # what may be typed; 400 is a hand file's
 
 
 class NumberRow(QWidget):
@@ -38,8 +40,8 @@ class NumberRow(QWidget):
         self._filling = self._moving = False
         name = QLabel(number.name)
         self.box = _Box()
-        self.box.setRange(*((-1e5, 1e5) if number.kind in ("place", "length", "radius", "root") else
-                            (number.low, number.high)))
+        most = _MOST_MM.get(number.kind)
+        self.box.setRange(*((number.low, number.high) if most is None else (-most, most)))
         self.box.setDecimals(_DECIMALS[number.unit])
         self.box.setSingleStep(0.5)
         self.box.setSuffix(f" {number.unit}" if number.unit != "°" else number.unit)
@@ -48,8 +50,8 @@ class NumberRow(QWidget):
         self.slider.setRange(0, STEPS)
         self.spread = QLabel()
         self.spread.setProperty("muted", True)
-        self.spread.setToolTip("Standard deviation, by the anchors and what is known of people's hands; after Fit to "
-                               "contours by the contours, too.")
+        self.spread.setToolTip("Standard deviation in the unit beside, by the anchors and what is known of people's "
+                               "hands; after Fit to contours by the contours, too.")
         for part in (name, self.box, self.slider):
             part.setToolTip(number.meaning)
         self.box.setAccessibleName(f"{number.group}, {number.name}")
@@ -58,7 +60,7 @@ class NumberRow(QWidget):
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setVerticalSpacing(0)
         grid.setColumnStretch(0, 1)
-        self.spread.setFixedWidth(self.fontMetrics().horizontalAdvance("± 888.8 mm "))
+        self.spread.setFixedWidth(self.fontMetrics().horizontalAdvance("± 888.8 "))
         grid.addWidget(name, 0, 0)
         grid.addWidget(self.box, 0, 1)
         grid.addWidget(self.spread, 0, 2)
@@ -75,8 +77,7 @@ class NumberRow(QWidget):
         if not self.slider.isSliderDown():
             low, high = self.number.low, self.number.high
             self.slider.setValue(round(STEPS * (min(max(value, low), high) - low) / (high - low)))
-        unit = self.number.unit
-        self.spread.setText(f"± {sd:.1f}{'' if unit == '°' else ' '}{unit}" if sd < 999.0 else "unknown")
+        self.spread.setText(f"± {sd:.1f}" if sd < _UNKNOWN else "± ?")
         self._filling = False
 
     def _type(self, value: float) -> None:

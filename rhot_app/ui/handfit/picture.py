@@ -217,8 +217,10 @@ class FitPicture(QWidget):
         event.accept()
 
     def _look_at(self, middle: Array) -> None:
-        """Move the picture, never out of the widget."""
-        margin = 0.5 / self._zoom
+        """Move the picture, as far as it still fills the widget; in the middle where it is smaller."""
+        target = self.place().target
+        margin = np.minimum(0.5 * np.array([self.width(), self.height()])
+                            / np.array([target.width(), target.height()]), 0.5)
         self._middle = np.clip(middle, margin, 1.0 - margin)
         self.update()
 

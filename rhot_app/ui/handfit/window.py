@@ -230,7 +230,8 @@ class HandFitWindow(QDialog):
     def fit_to_anchors(self) -> None:
         """The most probable hand by all anchors."""
         if self._edit(self.fit.fit_to_anchors):
-            self.tell(f"Fitted to the anchors. {self.frame.errors.text()}")
+            self.tell("Fitted to the anchors of this instant." if self.fit.freedom == "pose" else
+                      "Fitted to the anchors of all instants.")
 
     def fit_to_contours(self) -> None:
         """The hand by the edges in the pictures, in a worker."""
