@@ -142,6 +142,9 @@ class NumberForm(QWidget):
             row.changed.connect(lambda value, goes_on, number=number: self.changed.emit(number, value, goes_on))
             self.rows[number.key] = row
             column.addWidget(row)
+        wide = max(self.rows[number.key].box.sizeHint().width() for number in numbers)
+        for number in numbers:
+            self.rows[number.key].box.setFixedWidth(wide)
         column.addStretch(1)
         scroll = QScrollArea()
         scroll.setWidgetResizable(True)

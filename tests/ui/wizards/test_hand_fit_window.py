@@ -9,6 +9,7 @@ import cv2
 import msgspec
 import numpy as np
 import pytest
+from fake_engine import FakeClient, FakeEngine
 from fit_scenes import another_hand, begun, drawn, seen
 from patience import PATIENCE_S
 from PySide6.QtCore import QPoint, QPointF, Qt
@@ -16,14 +17,18 @@ from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox
 from screen_pictures import check
+from wizard_rig import FakeRigAsker
 
 from rhot_app.errors import RigError
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import FINGERS, JOINTS
 from rhot_app.handfit.hand_shape import ROOTS
 from rhot_app.handfit.session import HandFit
+from rhot_app.project import load_rig, save_rig
+from rhot_app.rig_history import versions
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.handfit.frame import Kept
+from rhot_app.ui.handfit.live import fit_live
 from rhot_app.ui.handfit.window import HandFitWindow
 from rhot_app.ui.models.palette import DARK, LIGHT
 
@@ -374,7 +379,6 @@ def test_picture(person, tmp_path):
 
 def test_command_refusals_are_sentences_before_a_window_opens(tmp_path, capsys, monkeypatch):
     from rhot_app.__main__ import main
-    from rhot_app.project import save_rig
 
     rig, _, images = drawn()
     save_rig(tmp_path / "rig.json", rig)
@@ -394,3 +398,85 @@ def test_command_refusals_are_sentences_before_a_window_opens(tmp_path, capsys, 
         monkeypatch.delenv(name, raising=False)
     assert main(good) == 2 and "no screen here" in capsys.readouterr().err
     assert sorted(path.name for path in Path(tmp_path).glob("*.json")) == ["bare.json", "rig.json"]
+
+
+# -- on a rig whose cameras run ----------------------------------------------------------------------------------------
+
+class FittedRigAsker(FakeRigAsker):
+    """Gives the drawn pictures of the hand, as the nodes would."""
+
+    def __init__(self, rig):
+        images = {node.node_id: image for node, image in zip(rig.nodes, drawn()[2], strict=True)}
+        super().__init__(rig, lambda node_id, t_s: images[node_id][:, :, ::-1])
+
+
+@pytest.fixture
+def live(themed, tmp_path):
+    """Opens the window on a rig whose cameras run and whose hand is tracked, if the engine is `running`."""
+    opened = []
+
+    def make(*, running, refuse=""):
+        rig, _, _ = drawn()
+        path = tmp_path / "desk.json"
+        save_rig(path, rig)
+        asker, engine = FittedRigAsker(rig), FakeEngine(running=running)
+        asker.refuse = refuse
+        opened.append(fit_live(HandFit(rig), path, asker.connect, lambda: FakeClient(engine), DARK,
+                               Settings(tmp_path / "app.ini"), None))
+        opened[-1].show()
+        opened[-1].activateWindow()
+        assert QTest.qWaitForWindowActive(opened[-1])
+        return opened[-1], path, asker
+
+    yield make
+    for window in opened:
+        window.end().wait(10.0)
+        window.deleteLater()
+
+
+def wait(condition, timeout_s=PATIENCE_S):
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end and not condition():
+        QTest.qWait(20)
+    assert condition()
+
+
+def test_pictures_are_taken_of_live_cameras_and_the_hand_goes_to_the_rig(live):
+    window, path, asker = live(running=True)
+    wait(lambda: window._live is not None and window._live.pose() is not None
+         and len(window._live.feed.together(window.fit.names)) == 2)
+    wait(lambda: all(view._kept is not None for view in window.frame.views))
+    assert window.frame.instant_box.currentText() == "Live pictures"
+    QTest.keyClick(window, Qt.Key.Key_Space)
+    assert window.fit.instant is not None and "where it is tracked" in window.told
+    assert not window.live and set(window.fit.instant.images) == {0, 1}
+    window.frame.form.show_group("Lengths")
+    number = next(one for one in window.fit.numbers if one.kind == "length")
+    window.frame.form.rows[number.key].box.setValue(50.0)
+    QTest.mouseClick(window.frame.use_button, Qt.MouseButton.LeftButton)
+    wait(lambda: "The rig has this hand now" in window.told)
+    assert asker.rig.hand.fingers["thumb"].bones_mm[0] == pytest.approx(50.0, abs=1e-4)
+    assert load_rig(path).hand == asker.rig.hand and versions(path)[0].replaced_by == "hand fitted to pictures"
+    window.frame.instant_box.setCurrentIndex(0)
+    window.frame.instant_box.activated.emit(0)
+    assert window.live and not window.frame.contours_button.isEnabled()
+
+
+def test_cameras_without_pictures_are_said(live):
+    window, _, _ = live(running=False, refuse="Nothing heard from 127.0.0.1 for 2 s.")
+    wait(lambda: all("Nothing heard" in view._problem for view in window.frame.views))
+    QTest.mouseClick(window.frame.take_button, Qt.MouseButton.LeftButton)
+    assert "No camera gave a picture" in window.frame.sentence.text() and window.fit.instant is None
+
+
+def test_the_calibrate_menu_opens_it_and_refuses_without_a_calibration(make_bench):
+    bench = make_bench()
+    bench.track()
+    bench.window.actions_.fit.trigger()
+    bench.until(lambda: bench.window.wizards.fit is not None, 60.0)
+    assert bench.window.wizards.fit.windowTitle() == "Fit the hand to pictures"
+    bench.window.wizards.fit.reject()
+    bench.until(lambda: bench.window.wizards.fit is None)
+    bench.backend.engine.rig = msgspec.structs.replace(bench.backend.engine.rig, calibration=None)
+    bench.window.actions_.fit.trigger()
+    bench.until(lambda: any("No camera of this rig is calibrated" in text for text in bench.window.advice.texts))
