@@ -255,7 +255,8 @@ class HandFit:
         k = self.current
         start = self.state if self.undoable == self._dragging else reference
         state = start.change(k, start.instants[k].with_anchor(Anchor(camera, joint, pixel)))
-        free = free_numbers(state, [k], self.freedom, own_lengths=True)
+        others = [] if self.freedom == "pose" else [j for j, one in enumerate(state.instants) if one.anchors and j != k]
+        free = free_numbers(state, [k, *others], self.freedom, own_lengths=True)
         state = self.solver.solve(state, Evidence(reference, DRAG_SD, PIN_SD_PX), free,
                                   FIT_STEPS if last else DRAG_STEPS)
         self.take(state, self._dragging, goes_on=start is not reference)

@@ -46,8 +46,8 @@ DRAG_SD = START_SD[0], START_SD[1]
 FREE_SD = 1.0, np.pi
 """m and rad: of the palm in a fit to anchors: as good as nothing is known."""
 
-DRAG_STEPS, FIT_STEPS = 12, 60
-"""Most steps of a solution while the pointer moves, and of one that has time."""
+DRAG_STEPS, FIT_STEPS = 6, 60
+"""Most steps of a solution while the pointer moves, 20 ms on a small computer, and of one that has time."""
 
 _LEAST_GAIN = 1e-7  # of a cost in which one standard deviation costs 1
 _AT_LIMIT = 1e-9  # rad and logarithms
@@ -81,9 +81,15 @@ class Solver:
 
     def solve(self, state: FitState, evidence: Evidence, free: NDArray[np.bool_], steps: int = FIT_STEPS) -> FitState:
         """The most probable state from `state` on; only numbers that are `free` (n,) change."""
-        here, _ = minimise(Dense(state, lambda s: self._bounded(s, evidence, free),
-                                 lambda s, step: s.moved(np.where(free, step, 0.0), self.limits), state.size),
-                           steps, _LEAST_GAIN)
+        chosen = np.flatnonzero(free)
+
+        def retract(before: FitState, step: Array) -> FitState:
+            whole = np.zeros(before.size)
+            whole[chosen] = step
+            return before.moved(whole, self.limits)
+
+        here, _ = minimise(Dense(state, lambda s: self._bounded(s, evidence, chosen), retract, len(chosen)), steps,
+                           _LEAST_GAIN)
         return here.state
 
     def covariance(self, state: FitState, evidence: Evidence) -> Array:
@@ -137,9 +143,9 @@ class Solver:
             jacobian[rows, :SIZE], jacobian[rows, state.own(k)] = moves[:, :SIZE], moves[:, SIZE:]
         return Rows(error / sd_px, jacobian / sd_px, UNIT)
 
-    def _bounded(self, state: FitState, evidence: Evidence, free: NDArray[np.bool_]) -> list[Rows]:
-        """The rows without the columns of numbers that are not free, or that are at a limit and pulled beyond it."""
-        rows = self.rows(state, evidence)
+    def _bounded(self, state: FitState, evidence: Evidence, chosen: NDArray[np.int64]) -> list[Rows]:
+        """The rows by the `chosen` numbers; those at a limit and pulled beyond it move nothing."""
+        rows = [Rows(one.error, one.jacobian[:, chosen], one.noise) for one in self.rows(state, evidence)]
         pull = np.sum([one.jacobian.T @ one.error for one in rows], axis=0)
         low, high = np.full(state.size, -np.inf), np.full(state.size, np.inf)
         low[:SIZE], high[:SIZE] = -SHAPE_LIMIT - state.shape, SHAPE_LIMIT - state.shape
@@ -149,7 +155,7 @@ class Solver:
             high[first + 6:first + POSE] = self.limits[:, 1] - one.pose.angles
             low[first + POSE:first + OWN] = -BEND_LIMIT - one.bend
             high[first + POSE:first + OWN] = BEND_LIMIT - one.bend
-        stuck = ((low > -_AT_LIMIT) & (pull < 0.0)) | ((high < _AT_LIMIT) & (pull > 0.0)) | ~free
+        stuck = ((low[chosen] > -_AT_LIMIT) & (pull < 0.0)) | ((high[chosen] < _AT_LIMIT) & (pull > 0.0))
         return [Rows(one.error, np.where(stuck, 0.0, one.jacobian), one.noise) for one in rows]
 
 
