@@ -25,6 +25,7 @@ from rhot_app.engine.pipeline import warm_up as warm_up_tracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import ANGLES
+from rhot_app.handfit.session import warm_up as warm_up_hand_fit
 from rhot_app.outputs.joints import JointConverter
 from rhot_app.project import Rig, TrackerSettings, load_rig
 from rhot_app.simulator.film.shot import make_renderer, make_shot
@@ -87,6 +88,11 @@ def warm_calibrations(rig: Rig) -> None:
     simulate(footage, np.array([OFF]), np.array([OFF]))
 
 
+def warm_hand_fit(rig: Rig) -> None:
+    """Compile what fits a hand to pictures."""
+    warm_up_hand_fit(rig, contours=True)
+
+
 def warm_outputs(rig: Rig) -> None:
     """Compile what turns a hand into the joints of other programs."""
     JointConverter(rig).warm_up()
@@ -95,7 +101,7 @@ def warm_outputs(rig: Rig) -> None:
 STEPS: dict[str, Callable[[Rig], None]] = {"detector": warm_detector, "tracker": warm_tracker,
                                            "estimator": warm_estimator, "twin": warm_twin,
                                            "boards": warm_boards, "calibrations": warm_calibrations,
-                                           "outputs": warm_outputs}
+                                           "hand fit": warm_hand_fit, "outputs": warm_outputs}
 
 
 def warm(name: str) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 from typing import NamedTuple
 
 import msgspec
@@ -20,6 +21,7 @@ from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, JOINTS, HandPose
 from rhot_app.handfit.contour_search import find_hand, fit_to_contours
 from rhot_app.handfit.hand_shape import SIZE, Shapes
+from rhot_app.handfit.history import History
 from rhot_app.handfit.pictures import require_calibrated, require_size
 from rhot_app.handfit.quantities import Number, numbers_of, sd_of, value_of, with_value
 from rhot_app.handfit.solve import (
@@ -35,8 +37,8 @@ from rhot_app.handfit.solve import (
     free_numbers,
 )
 from rhot_app.handfit.state import Anchor, FitState, Image, Instant
-from rhot_app.progress import Progress
-from rhot_app.project import Rig
+from rhot_app.progress import Progress, silent
+from rhot_app.project import CameraCalibration, Rig
 
 Array = NDArray[np.float64]
 
@@ -47,12 +49,7 @@ GAP_M = 0.01
 """m: contour points that are farther apart are not joined: two steps between them, and some."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Step:
-    """A state of the history and the words for what led to it."""
-
-    state: FitState
-    done: str
+_DRAGGING = "moving an anchor"  # until the pointer is released
 
 
 class Outline(NamedTuple):
@@ -79,8 +76,7 @@ class HandFit:
         self.numbers = numbers_of(self.shapes.base)
         self.freedom: Freedom = "pose"
         self.anchor_sd_px = ANCHOR_SD_PX
-        self._steps = [_Step(FitState(np.zeros(SIZE), ()), "")]
-        self._at = 0
+        self._history = History(FitState(np.zeros(SIZE), ()))
         self._current = 0
         self._grabbed: tuple[int, int, FitState] | None = None
         self._spread: tuple[FitState, float, Array] | None = None
@@ -91,7 +87,7 @@ class HandFit:
     @property
     def state(self) -> FitState:
         """The newest state."""
-        return self._steps[self._at].state
+        return self._history.state
 
     @property
     def current(self) -> int:
@@ -175,30 +171,30 @@ class HandFit:
     @property
     def undoable(self) -> str:
         """What undo would take back, "" for nothing."""
-        return self._steps[self._at].done if self._at else ""
+        return self._history.undoable
 
     @property
     def redoable(self) -> str:
         """What redo would bring back, "" for nothing."""
-        return self._steps[self._at + 1].done if self._at + 1 < len(self._steps) else ""
+        return self._history.redoable
 
     def undo(self) -> None:
         """One step back; nothing when there is none."""
-        self._at, self._grabbed = max(self._at - 1, 0), None
+        self._grabbed = None
+        self._history.undo()
 
     def redo(self) -> None:
         """One step forward again; nothing when there is none."""
-        self._at, self._grabbed = min(self._at + 1, len(self._steps) - 1), None
+        self._grabbed = None
+        self._history.redo()
 
     def take(self, state: FitState, done: str, *, goes_on: bool = False) -> None:
-        """A new state, after something was `done`. `goes_on`: in place of the newest step, which was the same thing."""
-        keep = self._at if goes_on and self._at and self.undoable == done else self._at + 1
-        self._steps[keep:] = [_Step(state, done)]
-        self._at = keep
+        """A new state, after something was `done` (`History.take`)."""
+        self._history.take(state, done, goes_on=goes_on)
 
     def begin(self) -> None:
         """Forget how the state came about: what there is now is the beginning."""
-        self._steps, self._at = [_Step(self.state, "")], 0
+        self._history = History(self.state)
 
     # -- pictures --------------------------------------------------------------------------------------------------
 
@@ -253,22 +249,20 @@ class HandFit:
         camera, joint, reference = self._grabbed
         self._require_inside(camera, pixel)
         k = self.current
-        start = self.state if self.undoable == self._dragging else reference
+        start = self.state if self.undoable == _DRAGGING else reference
         state = start.change(k, start.instants[k].with_anchor(Anchor(camera, joint, pixel)))
         others = [] if self.freedom == "pose" else [j for j, one in enumerate(state.instants) if one.anchors and j != k]
         free = free_numbers(state, [k, *others], self.freedom, own_lengths=True)
         state = self.solver.solve(state, Evidence(reference, DRAG_SD, PIN_SD_PX), free,
                                   FIT_STEPS if last else DRAG_STEPS)
-        self.take(state, self._dragging, goes_on=start is not reference)
+        self.take(state, _DRAGGING, goes_on=start is not reference)
 
     def release(self) -> None:
         """The drag ends; the next one is a step of its own."""
-        if self._grabbed is not None and self.undoable == self._dragging:
+        if self._grabbed is not None and self.undoable == _DRAGGING:
             camera, joint, _ = self._grabbed
-            self._steps[self._at] = _Step(self.state, f"moving {self._named(joint)} in {self.names[camera]}")
+            self._history.rename(f"moving {self._named(joint)} in {self.names[camera]}")
         self._grabbed = None
-
-    _dragging = "moving an anchor"
 
     def anchor(self, camera: int, joint: int, pixel: tuple[float, float]) -> None:
         """Drag a joint there at once."""
@@ -292,8 +286,8 @@ class HandFit:
     def reset(self) -> None:
         """The base hand, with the first pose of every instant and no anchors. Undo brings everything back."""
         first: dict[str, Instant] = {}
-        for step in self._steps[:self._at + 1]:
-            for one in step.state.instants:
+        for state in self._history.past:
+            for one in state.instants:
                 first.setdefault(one.name, one)
         instants = tuple(replace(first[one.name], images=one.images) for one in self.state.instants)
         self.take(FitState(np.zeros(SIZE), instants), "resetting the hand")
@@ -360,3 +354,20 @@ class HandFit:
     @staticmethod
     def _named(joint: int) -> str:
         return JOINTS[joint].replace("_", " ")
+
+
+def warm_up(rig: Rig, *, contours: bool = False) -> None:
+    """Compile what a drag calls, so that the first one is as quick as the others; with `contours` also what searches
+    them and the hand."""
+    exact = CameraCalibration("exact")
+    fit = HandFit(msgspec.structs.replace(rig, calibration=exact, depth=type(rig.depth)()))
+    lens = rig.nodes[0].intrinsics
+    fit.add_pictures({0: np.zeros((lens.height, lens.width, 3), np.uint8)})
+    fit.anchor(0, 0, (0.5 * lens.width, 0.5 * lens.height))
+    fit.outline(0)
+    fit.sd(fit.numbers[0])
+    if contours:
+        with suppress(CalibrationError):  # there is nothing to find
+            fit.fitted_to_contours()
+        with suppress(CalibrationError):
+            fit.with_found_hand(silent)

@@ -64,7 +64,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.mouse": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.evaluation"),
     "rhot_app.ui": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.evaluation", "rhot_app.export",
                     "rhot_app.certificate", "rhot_app.mouse", "rhot_app.handfit"),
-    "rhot_app.warm": (*BELOW_ENGINE, "rhot_app.engine"),
+    "rhot_app.warm": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.handfit"),
     "rhot_app": ("rhot_app",),  # __init__
     "rhot_app.__main__": ("rhot_node", "rhot_app", "resources"),
 }

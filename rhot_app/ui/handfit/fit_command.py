@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
     """Open the window, and return when it is closed. Raises CalibrationError and RigError before it opens."""
     from rhot_app.hand.anatomy import load_hand
     from rhot_app.handfit.pictures import pictures_of
-    from rhot_app.handfit.session import HandFit
+    from rhot_app.handfit.session import HandFit, warm_up
     from rhot_app.project import load_rig
     from rhot_node.compiled import announce_compilation
     from rhot_node.files import require_replaceable, why
@@ -51,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
     fit.begin()
     _require_screen()
     announce_compilation()
+    warm_up(rig)
     from PySide6.QtWidgets import QApplication
 
     from rhot_app.rig_history import accept

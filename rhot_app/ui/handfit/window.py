@@ -370,7 +370,7 @@ class HandFitWindow(QDialog):
         fitted = one is not None and not self.live
         errors = fit.errors_px() if fitted else {}
         for camera, view in enumerate(self.frame.views):
-            view.usable = fitted
+            view.usable = fitted and one is not None and camera in one.images
             if fitted and one is not None:
                 view.show_image(one.images.get(camera))
                 view.show_hand(fit.joints(camera), fit.outline(camera),

@@ -151,10 +151,12 @@ class Launcher(QObject):
         self.versions.open()
 
     def _begin_fit(self) -> tuple[RigNow, HandFit]:
-        from rhot_app.handfit.session import HandFit
+        from rhot_app.handfit.session import HandFit, warm_up
 
         now = self._look(None)
-        return now, HandFit(now.rig)
+        fit = HandFit(now.rig)
+        warm_up(now.rig)
+        return now, fit
 
     def _show_fit(self, begun: tuple[RigNow, HandFit]) -> None:
         from rhot_app.ui.handfit.live import fit_live
