@@ -33,12 +33,15 @@ def require_calibrated(rig: Rig) -> str:
 
 
 def pictures_of(rig: Rig, given: Sequence[str]) -> dict[int, Image]:
-    """(H, W, 3) RGB pictures by the camera's number, from files in the order of the rig's cameras, or as NAME=FILE.
+    """(H, W, 3) RGB pictures by the camera's number, of files as `files_by_camera` takes them. Raises CalibrationError
+    for what is no picture of a camera of the rig."""
+    return {camera: read_picture(path, rig.nodes[camera]) for camera, path in files_by_camera(rig, given).items()}
 
-    Raises CalibrationError for what is no picture of a camera of the rig.
-    """
+
+def files_by_camera(rig: Rig, given: Sequence[str]) -> dict[int, Path]:
+    """Files by the camera's number: in the order of the rig's cameras, or as NAME=FILE. Raises CalibrationError."""
     names = [node.name for node in rig.nodes]
-    found: dict[int, Image] = {}
+    found: dict[int, Path] = {}
     for place, text in enumerate(given):
         named = max((name for name in names if text.startswith(f"{name}=")), key=len, default=None)
         if named is None and place >= len(names):
@@ -47,7 +50,7 @@ def pictures_of(rig: Rig, given: Sequence[str]) -> dict[int, Image]:
         camera = place if named is None else names.index(named)
         if camera in found:
             raise CalibrationError(f"{text}: camera {names[camera]} has two pictures; give one for each camera.")
-        found[camera] = read_picture(Path(text if named is None else text[len(named) + 1:]), rig.nodes[camera])
+        found[camera] = Path(text if named is None else text[len(named) + 1:])
     if not found:
         raise CalibrationError("No picture was given. Give one for each camera, in the order of the rig's cameras: "
                                f"{', '.join(names)}.")

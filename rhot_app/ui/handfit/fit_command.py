@@ -18,8 +18,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot fit-hand``."""
     parser.add_argument("--rig", type=Path, required=True, metavar="RIG", help="the calibrated rig")
     parser.add_argument("--pictures", nargs="+", action="append", required=True, metavar="[NAME=]FILE",
-                        help="the pictures of one instant, in the order of the rig's cameras or with their names; give "
-                             "it again for another instant")
+                        help="pictures or videos of one instant, in the order of the rig's cameras or with their "
+                             "names; give it again for another instant")
+    parser.add_argument("--at", type=float, nargs="+", default=[], metavar="S",
+                        help="of videos: the second of each instant, from the first moment that all videos show "
+                             "(default 0)")
     parser.add_argument("--hand", type=Path, metavar="HAND", help="hand file to begin with (default: the rig's hand)")
     parser.add_argument("--save", type=Path, metavar="OUT", help="where Save writes the hand file (default: asked for)")
     parser.add_argument("--settings", type=Path, metavar="FILE",
@@ -29,9 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Open the window, and return when it is closed. Raises CalibrationError and RigError before it opens."""
     from rhot_app.hand.anatomy import load_hand
-    from rhot_app.handfit.pictures import pictures_of
     from rhot_app.handfit.session import HandFit, warm_up
     from rhot_app.project import load_rig
+    from rhot_app.ui.handfit.files import read_instant
     from rhot_node.compiled import announce_compilation
     from rhot_node.files import require_replaceable, why
 
@@ -46,8 +49,11 @@ def run(args: argparse.Namespace) -> int:
         except OSError as exc:
             raise CalibrationError(f"--save {args.save}: cannot be written ({why(exc)}).") from exc
     fit = HandFit(rig, hand)
-    for given in args.pictures:
-        fit.add_pictures(pictures_of(rig, given))
+    if len(args.at) > len(args.pictures):
+        raise CalibrationError(f"--at names {len(args.at)} seconds, and --pictures was given {len(args.pictures)} "
+                               "times; give a second for each.")
+    for k, given in enumerate(args.pictures):
+        fit.add_pictures(read_instant(rig, given, args.at[k] if k < len(args.at) else 0.0))
     fit.begin()
     _require_screen()
     announce_compilation()

@@ -50,8 +50,8 @@ class FitFrame:
         self.form = NumberForm(fit.numbers)
         self.take_button = _button("Take pictures", "The pictures of all cameras now, as one more instant (Space). "
                                    "Hold the hand still.")
-        self.open_button = _button("Open pictures …", "Picture files of one instant, one for each camera; their names "
-                                   "sorted are in the order of the cameras (Ctrl+O).")
+        self.open_button = _button("Open pictures …", "Picture or video files of one instant, one for each camera. "
+                                   "They are told apart by the cameras' names in theirs, or sorted (Ctrl+O).")
         self.find_button = _button("Find the hand", "Look for the hand by the colour of skin, from nothing; up to half "
                                    "a minute. An open hand, fingers spread, is found best.")
         self.instant_box = QComboBox()

@@ -15,21 +15,22 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
     QFileDialog,
+    QInputDialog,
     QLineEdit,
     QMessageBox,
     QWidget,
 )
 
-from rhot_app.errors import CalibrationError
+from rhot_app.errors import CalibrationError, RhotError
 from rhot_app.hand.anatomy import HandAnatomy, save_hand
 from rhot_app.hand.skeleton import JOINTS, HandPose
-from rhot_app.handfit.pictures import pictures_of
 from rhot_app.handfit.quantities import Number
 from rhot_app.handfit.session import HandFit
 from rhot_app.handfit.state import FitState, Image
 from rhot_app.ui.backend.feed import LiveFeed
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.job import Job, Progress
+from rhot_app.ui.handfit.files import VIDEOS, in_order, is_video, read_instant
 from rhot_app.ui.handfit.frame import FitFrame, Kept
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.plan import Memory
@@ -41,7 +42,9 @@ REASON: Final = "hand fitted to pictures"
 TICK_MS: Final = 50
 _SIZE: Final = (1280, 800)
 _FREEDOM_KEY, _FOLDER_KEY, _SD_KEY = "fit/freedom", "fit/folder", "fit/anchor sd px"
-_PICTURES = "Pictures (*.png *.jpg *.jpeg *.bmp *.tif *.tiff);;All files (*)"
+_PICTURES = (f"Pictures and videos (*.png *.jpg *.jpeg *.bmp *.tif *.tiff {' '.join(f'*{end}' for end in VIDEOS)});;"
+             "All files (*)")
+_LONGEST_S = 1e5  # of a video: a day
 _KEEP = "The hand was changed and not saved. Close without it?"
 
 
@@ -72,7 +75,7 @@ class HandFitWindow(QDialog):
         self._job: Job | None = None
         self._guide: GuideViewer | None = None
         self.told = fit.warning
-        self._bad = False
+        self._bad, self._at_s = False, 0.0
         self.frame = FitFrame(fit, scheme, kept, self, live=live is not None)
         self._connect_parts()
         self._remember_back()
@@ -148,14 +151,20 @@ class HandFitWindow(QDialog):
                                                 self._memory.remembered(_FOLDER_KEY) or str(Path.home()), _PICTURES)
         if names:
             self._memory.remember(_FOLDER_KEY, str(Path(names[0]).parent))
-            self.open_pictures(sorted(names))
+            self.open_pictures(in_order(self.fit.rig, names))
 
-    def open_pictures(self, names: list[str]) -> None:
-        """Picture files in the order of the rig's cameras become an instant."""
-        try:
-            self._add(pictures_of(self.fit.rig, names), None)
-        except CalibrationError as exc:
-            self.tell(str(exc), bad=True)
+    def open_pictures(self, given: list[str]) -> None:
+        """Files of pictures or videos, as `files.read_instant` takes them, become an instant."""
+        at_s, wanted = 0.0, True
+        if any(is_video(Path(name)) for name in given):
+            at_s, wanted = QInputDialog.getDouble(self, TITLE, "Which second of the videos?", self._at_s, 0.0,
+                                                  _LONGEST_S, 2)
+        if wanted:
+            self._at_s = at_s
+            try:
+                self._add(read_instant(self.fit.rig, given, at_s), None)
+            except RhotError as exc:
+                self.tell(str(exc), bad=True)
 
     def _add(self, images: dict[int, Image], pose: HandPose | None) -> None:
         if self._edit(lambda: self.fit.add_pictures(images, pose)):

@@ -15,7 +15,7 @@ from patience import PATIENCE_S
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox
+from PySide6.QtWidgets import QApplication, QFileDialog, QInputDialog, QMessageBox
 from screen_pictures import check
 from wizard_rig import FakeRigAsker
 
@@ -303,6 +303,28 @@ def test_pictures_are_opened_from_files_and_mistakes_are_sentences(person, tmp_p
     assert one.frame.instant_box.count() == 1
     one.click(one.frame.undo_button)
     assert one.frame.instant_box.count() == 2
+
+
+def test_pictures_come_from_videos_at_a_second(person, tmp_path, monkeypatch):
+    rig, _, images = drawn()
+    names = {"camera 2": images[1], "camera 1": images[0]}
+    for name, image in names.items():
+        writer = cv2.VideoWriter(str(tmp_path / f"{name}.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (640, 480))
+        for k in range(20):
+            writer.write(image[:, :, ::-1] if k >= 10 else np.zeros_like(image))
+        writer.release()
+    one, chosen = person(HandFit(rig)), [str(tmp_path / f"{name}.avi") for name in names]
+    monkeypatch.setattr(QFileDialog, "getOpenFileNames", lambda *args: (chosen, ""))
+    monkeypatch.setattr(QInputDialog, "getDouble", lambda *args: (1.5, True))
+    one.click(one.frame.open_button)
+    for camera, image in enumerate(images):
+        assert np.mean(np.abs(one.fit.instant.images[camera].astype(float) - image)) < 5.0
+    monkeypatch.setattr(QInputDialog, "getDouble", lambda *args: (9.0, True))
+    one.click(one.frame.open_button)
+    assert "second 9 is beyond" in one.frame.sentence.text() and len(one.fit.state.instants) == 1
+    monkeypatch.setattr(QInputDialog, "getDouble", lambda *args: (0.0, False))
+    one.click(one.frame.open_button)
+    assert len(one.fit.state.instants) == 1, "thought better of it"
 
 
 def test_the_contours_finish_what_was_begun_by_hand(person):
