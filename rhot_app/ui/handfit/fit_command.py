@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -82,6 +83,8 @@ def run(args: argparse.Namespace) -> int:
     apply_theme(app, scheme)
     window = HandFitWindow(fit, scheme, settings, Kept(use, args.save))
     window.finished.connect(app.quit)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: app.quit())  # heard between two turns of the window's timer
     window.show()
     app.exec()
     settings.sync()
