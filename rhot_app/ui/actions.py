@@ -85,6 +85,8 @@ class Actions(QObject):
             self._make("1 ×", "", "Ellipsoids in true size.", checkable=True),
             self._make(f"{LARGER} ×", "", f"Ellipsoids {LARGER} times as large, because a good place is known to a "
                        "millimetre.", checkable=True)]
+        self.layers = self._make("Layers of the hand …", "", "Which link of the tracked hand hides which before a "
+                                 "camera, as masks over its picture.")
         self.alone = self._make("Scene alone", "6", "Hide every panel, to look from afar; again brings them back (6).",
                                 checkable=True)
         self.dark = self._make("Dark", "", "Light text on dark ground.", checkable=True)
@@ -164,7 +166,8 @@ class MainToolBar(QToolBar):
         self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [
             *a.wizards, a.fit, None, a.earlier, None, a.tracker, None, a.files])
         self.view_button, self.view_menu = self._add_menu("View", [
-            *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, None, a.dark, a.light, None, a.reset])
+            *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, a.layers, None,
+            a.dark, a.light, None, a.reset])
         self.controls.addAction(actions.guide)
         self.source_label = QToolButton()
         self.source_label.setFocusPolicy(Qt.FocusPolicy.TabFocus)

@@ -129,6 +129,7 @@ class MainWindow(QMainWindow):
         self._connect_wizards()
         a.files.triggered.connect(lambda: self.open_guide("calibration"))
         a.frame.triggered.connect(self.screen_parts.scene.frame_hand)
+        a.layers.triggered.connect(lambda: self.dialogs.show_layers(c, self.appearance.scheme))
         a.home.triggered.connect(self.screen_parts.scene.reset_view)
         a.alone.toggled.connect(lambda on: self.docks.put_away("scene alone", on))
         a.reset.triggered.connect(self.reset_settings)
@@ -302,7 +303,7 @@ class MainWindow(QMainWindow):
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
         return [*a.wizards, a.earlier, a.fit, a.tracker, a.outputs, a.add_object, a.close_rig,
-                a.properties.menuAction(), a.frame, a.home, a.names, a.clouds, a.now]
+                a.properties.menuAction(), a.frame, a.home, a.names, a.clouds, a.now, a.layers]
 
     def _show_busy(self) -> None:
         if self.controller.opened is None:
