@@ -24,7 +24,7 @@ from rhot_app.handfit.state import Contour, FitState, Instant
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_node.detect.edges import find_edges, noise_of
-from rhot_node.detect.foreground import learn_skin
+from rhot_node.detect.foreground import Foreground, learn_skin
 
 Array = NDArray[np.float64]
 
@@ -43,12 +43,14 @@ def fit_to_contours(solver: Solver, rig: Rig, state: FitState, instants: Sequenc
     evidence = Evidence(reference, START_SD[:2], anchor_sd_px)
     free = free_numbers(state, instants, freedom, surface=True)
     contours: list[Contour | None] = [None] * len(state.instants)
+    known = {k: [(learn_skin(image), noise_of(image)) for _, image in sorted(state.instants[k].images.items())]
+             for k in instants}
     spread = solver.covariance(state, evidence) * np.outer(free, free)
     for number in range(START_PASSES):
         step_m = STEP_M if number == START_PASSES - 1 else 2.0 * STEP_M
         surface = solver.shapes.anatomy(state.shape)
         for k in instants:
-            contours[k] = _search(surface, rig, state, k, 0.25**number * spread, step_m)
+            contours[k] = _search(surface, rig, state, k, 0.25**number * spread, step_m, known[k])
         state = solver.solve(state, replace(evidence, contours=contours), free)
     for k in instants:
         contour = contours[k]
@@ -93,8 +95,10 @@ def _tracker(rig: Rig, hand: HandAnatomy, instant: Instant) -> BareHandTracker:
                            known_size=False)
 
 
-def _search(hand: HandAnatomy, rig: Rig, state: FitState, k: int, spread: Array, step_m: float) -> Contour:
-    """The edges near the contours of the hand at one instant; `spread` (n, n): the state's covariance."""
+def _search(hand: HandAnatomy, rig: Rig, state: FitState, k: int, spread: Array, step_m: float,
+            known: Sequence[tuple[Foreground, float]]) -> Contour:
+    """The edges near the contours of the hand at one instant; `spread` (n, n): the state's covariance; `known`: of each
+    picture, the colours of skin and the noise."""
     instant = state.instants[k]
     tracker = _tracker(rig, hand, instant)
     bare, covariance = np.zeros(BIAS + SHAPE), np.zeros((MOTION + SHAPE, MOTION + SHAPE))
@@ -107,6 +111,6 @@ def _search(hand: HandAnatomy, rig: Rig, state: FitState, k: int, spread: Array,
     frames = []
     for number, (_, image) in enumerate(sorted(instant.images.items())):
         frame = tracker.expected(number, bare, covariance, step_m)
-        frame.observe(find_edges(image, frame.slices, learn_skin(image), noise_of(image)))
+        frame.observe(find_edges(image, frame.slices, *known[number]))
         frames.append(frame)
     return Contour(state.shape, tuple(frames))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import COLUMNS, compressed
-from rhot_app.barehand.contours import project
+from rhot_app.barehand.contours import STEP_M, project
 from rhot_app.barehand.surface import FINGERS, FOREARM_TURN, LENGTH, RADIUS, SHAPE, WHOLE
 from rhot_app.barehand.tracker import FOREARM_SD, START_SD
 from rhot_app.estimation.least_squares import Dense, minimise
@@ -45,6 +45,11 @@ DRAG_SD = START_SD[0], START_SD[1]
 
 FREE_SD = 1.0, np.pi
 """m and rad: of the palm in a fit to anchors: as good as nothing is known."""
+
+TOGETHER = 0.025 / STEP_M
+"""Contour points that count as one observation: where the model's surface is wrong, it is so along a phalanx, 25 mm.
+As independent ones they would give the simulated hand, which has another surface, lengths six standard deviations off.
+"""
 
 DRAG_STEPS, FIT_STEPS = 6, 60
 """Most steps of a solution while the pointer moves, 20 ms on a small computer, and of one that has time."""
@@ -193,7 +198,7 @@ def _contour_rows(contour: Contour, state: FitState, k: int) -> Rows:
     bare[BIAS + FOREARM_TURN:] = one.bend
     information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
     cost = sum(frame.gather(bare, information, pull) for frame in contour.frames)
-    rows = compressed(information, pull, cost, COLUMNS, POSE)
+    rows = compressed(information / TOGETHER, pull / TOGETHER, cost / TOGETHER, COLUMNS, POSE)
     jacobian, own = np.zeros((len(rows.error), state.size)), state.own(k).start
     jacobian[:, :FOREARM_TURN] = rows.jacobian[:, POSE:POSE + FOREARM_TURN]
     jacobian[:, own:own + POSE] = rows.jacobian[:, :POSE]
