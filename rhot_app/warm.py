@@ -25,7 +25,6 @@ from rhot_app.engine.pipeline import warm_up as warm_up_tracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import ANGLES
-from rhot_app.handfit.session import warm_up as warm_up_hand_fit
 from rhot_app.outputs.joints import JointConverter
 from rhot_app.project import Rig, TrackerSettings, load_rig
 from rhot_app.simulator.film.shot import make_renderer, make_shot
@@ -90,7 +89,9 @@ def warm_calibrations(rig: Rig) -> None:
 
 def warm_hand_fit(rig: Rig) -> None:
     """Compile what fits a hand to pictures."""
-    warm_up_hand_fit(rig, contours=True)
+    from rhot_app.handfit.session import warm_up  # not above: nothing of it is compiled, so it decides no cache
+
+    warm_up(rig, contours=True)
 
 
 def warm_outputs(rig: Rig) -> None:
