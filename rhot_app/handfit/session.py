@@ -28,8 +28,8 @@ from rhot_app.handfit.solve import (
     ANCHOR_SD_PX,
     DRAG_SD,
     DRAG_STEPS,
-    FIT_STEPS,
     FREE_SD,
+    LAST_STEPS,
     PIN_SD_PX,
     Evidence,
     Freedom,
@@ -254,7 +254,7 @@ class HandFit:
         others = [] if self.freedom == "pose" else [j for j, one in enumerate(state.instants) if one.anchors and j != k]
         free = free_numbers(state, [k, *others], self.freedom, own_lengths=True)
         state = self.solver.solve(state, Evidence(reference, DRAG_SD, PIN_SD_PX), free,
-                                  FIT_STEPS if last else DRAG_STEPS)
+                                  LAST_STEPS if last else DRAG_STEPS)
         self.take(state, _DRAGGING, goes_on=start is not reference)
 
     def release(self) -> None:

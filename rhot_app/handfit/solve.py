@@ -51,10 +51,11 @@ TOGETHER = 0.025 / STEP_M
 As independent ones they would give the simulated hand, which has another surface, lengths six standard deviations off.
 """
 
-DRAG_STEPS, FIT_STEPS = 6, 60
-"""Most steps of a solution while the pointer moves, 20 ms on a small computer, and of one that has time."""
+DRAG_STEPS, LAST_STEPS, FIT_STEPS = 6, 20, 60
+"""Most steps of a solution while the pointer moves, 20 ms on a small computer, where it stops, and of one that has
+time. A place that can be reached takes six; anchors that contradict each other take more."""
 
-_LEAST_GAIN = 1e-7  # of a cost in which one standard deviation costs 1
+_LEAST_GAIN = 1e-4  # of a cost in which one standard deviation costs 1
 _AT_LIMIT = 1e-9  # rad and logarithms
 
 
@@ -103,14 +104,16 @@ class Solver:
         assert found is not None, "every number has a prior"
         return found
 
-    def rows(self, state: FitState, evidence: Evidence) -> list[Rows]:
-        """The linearised residuals of priors, anchors and contours."""
+    def rows(self, state: FitState, evidence: Evidence, instants: Sequence[int] | None = None) -> list[Rows]:
+        """The linearised residuals of priors, anchors and contours, of all `instants` by default."""
         out = [Rows(-state.shape / SHAPE_SD, np.eye(SIZE, state.size) / SHAPE_SD[:, None], UNIT)]
-        for k, one in enumerate(state.instants):
+        instants = range(len(state.instants)) if instants is None else instants
+        for k in instants:
+            one = state.instants[k]
             out.append(self._prior(one, evidence.reference.instants[k], evidence.palm_sd, state, k))
             if one.anchors:
                 out.append(self._anchors(one, evidence.anchor_sd_px, state, k))
-        for k, contour in enumerate(evidence.contours):
+            contour = evidence.contours[k] if evidence.contours else None
             if contour is not None:
                 out.append(_contour_rows(contour, state, k))
         return out
@@ -150,7 +153,8 @@ class Solver:
 
     def _bounded(self, state: FitState, evidence: Evidence, chosen: NDArray[np.int64]) -> list[Rows]:
         """The rows by the `chosen` numbers; those at a limit and pulled beyond it move nothing."""
-        rows = [Rows(one.error, one.jacobian[:, chosen], one.noise) for one in self.rows(state, evidence)]
+        moving = None if chosen.size and chosen[0] < SIZE else sorted({int(k) for k in (chosen - SIZE) // OWN})
+        rows = [Rows(one.error, one.jacobian[:, chosen], one.noise) for one in self.rows(state, evidence, moving)]
         pull = np.sum([one.jacobian.T @ one.error for one in rows], axis=0)
         low, high = np.full(state.size, -np.inf), np.full(state.size, np.inf)
         low[:SIZE], high[:SIZE] = -SHAPE_LIMIT - state.shape, SHAPE_LIMIT - state.shape

@@ -237,10 +237,10 @@ class HandFitWindow(QDialog):
         self.refresh()
 
     def fit_to_anchors(self) -> None:
-        """The most probable hand by all anchors."""
-        if self._edit(self.fit.fit_to_anchors):
-            self.tell("Fitted to the anchors of this instant." if self.fit.freedom == "pose" else
-                      "Fitted to the anchors of all instants.")
+        """The most probable hand by all anchors, in a worker."""
+        self._work("Fitting to the anchors", lambda progress: self.fit.fitted_to_anchors(), "fitting to anchors",
+                   lambda: "Fitted to the anchors of this instant." if self.fit.freedom == "pose" else
+                   "Fitted to the anchors of all instants.")
 
     def fit_to_contours(self) -> None:
         """The hand by the edges in the pictures, in a worker."""

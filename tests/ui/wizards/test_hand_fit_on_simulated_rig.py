@@ -71,6 +71,7 @@ def test_a_hand_of_the_wrong_size_is_fitted_by_anchors_and_used(window, simulate
             drag(view, JOINTS.index(name), fit.cameras[camera].project(joints)[JOINTS.index(name)])
     frame.freedom_box.setCurrentIndex(1)
     QTest.mouseClick(frame.anchors_button, Qt.MouseButton.LeftButton)
+    Hands.wait(lambda: "Fitted to the anchors" in window.told, 30.0)
     QTest.mouseClick(frame.contours_button, Qt.MouseButton.LeftButton)
     Hands.wait(lambda: "contour was found" in window.told, 120.0)
     print(window.told, frame.errors.text())

@@ -224,7 +224,8 @@ def test_lengths_from_anchors_are_saved_as_a_hand_file(person, tmp_path, monkeyp
             start = one.at(camera, joint)
             one.drag(camera, joint, round(to.x()) - start.x(), round(to.y()) - start.y())
     one.key(Qt.Key.Key_Return, CONTROL)
-    assert "Fitted to the anchors" in one.frame.sentence.text() and "42 anchors" in one.frame.errors.text()
+    one.until(lambda: "Fitted to the anchors" in one.frame.sentence.text())
+    assert "42 anchors" in one.frame.errors.text()
     lengths = [number for number in one.fit.numbers if number.kind == "length"]
     truth = [bone for finger in hand.fingers.values() for bone in finger.bones_mm]
     off = [abs(one.fit.value(number) - bone) / one.fit.sd(number) for number, bone in zip(lengths, truth, strict=True)]
@@ -391,6 +392,7 @@ def test_picture(person, tmp_path):
             to, start = one.frame.views[camera].to_widget(*places[camera][joint]), one.at(camera, joint)
             one.drag(camera, joint, round(to.x()) - start.x(), round(to.y()) - start.y())
     one.click(one.frame.anchors_button)
+    one.until(lambda: "Fitted" in one.frame.sentence.text())
     one.frame.form.show_group("Lengths")
     one.key(Qt.Key.Key_F)
     one.frame.views[0].choose(JOINTS.index("index_tip"))
