@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import COLUMNS, compressed
-from rhot_app.barehand.contours import STEP_M, project
+from rhot_app.barehand.contours import NEAREST_M, STEP_M, project
 from rhot_app.barehand.surface import FINGERS, FOREARM_TURN, LENGTH, RADIUS, SHAPE, WHOLE
 from rhot_app.barehand.tracker import FOREARM_SD, START_SD
 from rhot_app.estimation.least_squares import Dense, minimise
@@ -56,6 +56,7 @@ DRAG_STEPS, LAST_STEPS, FIT_STEPS = 6, 20, 60
 time. A place that can be reached takes six; anchors that contradict each other take more."""
 
 _LEAST_GAIN = 1e-4  # of a cost in which one standard deviation costs 1
+_KEPT = 16  # joints of the newest states, which are asked for twice
 _AT_LIMIT = 1e-9  # rad and logarithms
 
 
@@ -77,6 +78,7 @@ class Solver:
         self.shapes, self.cameras = shapes, cameras
         model = shapes.model(np.zeros(SIZE))
         self.limits = model.limits
+        self._placed: list[tuple[Array, Instant, tuple[Array, Array]]] = []
         self._root = np.linalg.cholesky(model.pose_prior.information).T
 
     def natural(self, state: FitState) -> FitState:
@@ -120,7 +122,12 @@ class Solver:
 
     def places(self, shape: Array, instant: Instant) -> tuple[Array, Array]:
         """(21, 3) m joints, world, and their derivative (21, 3, SIZE + OWN) by the shape and the instant's numbers."""
-        return joint_places(self.shapes.model(shape), self.shapes.surface(shape).bone, shape, instant)
+        for kept_shape, kept, result in self._placed:
+            if kept_shape is shape and kept is instant:
+                return result
+        result = joint_places(self.shapes.model(shape), self.shapes.surface(shape).bone, shape, instant)
+        self._placed = [(shape, instant, result), *self._placed[:_KEPT - 1]]
+        return result
 
     def _prior(self, one: Instant, reference: Instant, palm_sd: tuple[float, float], state: FitState, k: int) -> Rows:
         world, before = one.pose.world_from_palm, reference.pose.world_from_palm
@@ -145,14 +152,28 @@ class Solver:
             pose = np.ascontiguousarray(camera.camera_from_world[:3])
             x, y, z = places[anchor.joint]
             if not project(x, y, z, pose, camera.intrinsics, pixel, slope):
-                continue  # behind the camera it pulls nowhere
+                continue  # behind the camera it says nothing; a solution never leads there (`_bounded`)
             rows, moves = slice(2 * n, 2 * n + 2), slope @ slopes[anchor.joint]
             error[rows] = np.array(anchor.pixel) - pixel
             jacobian[rows, :SIZE], jacobian[rows, state.own(k)] = moves[:, :SIZE], moves[:, SIZE:]
         return Rows(error / sd_px, jacobian / sd_px, UNIT)
 
-    def _bounded(self, state: FitState, evidence: Evidence, chosen: NDArray[np.int64]) -> list[Rows]:
-        """The rows by the `chosen` numbers; those at a limit and pulled beyond it move nothing."""
+    def _visible(self, state: FitState) -> bool:
+        """Whether every joint with an anchor is before its camera."""
+        for one in state.instants:
+            if one.anchors:
+                places, _ = self.places(state.shape, one)
+                for anchor in one.anchors:
+                    ahead = self.cameras[anchor.camera].camera_from_world[2]
+                    if not ahead[:3] @ places[anchor.joint] + ahead[3] > NEAREST_M:
+                        return False
+        return True
+
+    def _bounded(self, state: FitState, evidence: Evidence, chosen: NDArray[np.int64]) -> list[Rows] | None:
+        """The rows by the `chosen` numbers; those at a limit and pulled beyond it move nothing. None where an anchor's
+        joint is behind its camera."""
+        if not self._visible(state):
+            return None
         moving = None if chosen.size and chosen[0] < SIZE else sorted({int(k) for k in (chosen - SIZE) // OWN})
         rows = [Rows(one.error, one.jacobian[:, chosen], one.noise) for one in self.rows(state, evidence, moving)]
         pull = np.sum([one.jacobian.T @ one.error for one in rows], axis=0)
