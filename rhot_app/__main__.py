@@ -42,6 +42,7 @@ SUBCOMMANDS = {
     "check": Subcommand("rhot_app.calibration.commands.check", "check a rig file for what cannot be"),
     "certify": Subcommand("rhot_app.certificate.certify_command", "measure a rig as the thesis does, with intervals"),
     "hand": Subcommand("rhot_app.hand.hand_command", "look at a hand file, or make one of a given length"),
+    "fit-hand": Subcommand("rhot_app.ui.handfit.fit_command", "fit a hand to pictures by dragging, sliders and edges"),
     "layers": Subcommand("rhot_app.export.layers_command", "draw which link of a hand or object hides which"),
     "object": Subcommand("rhot_app.objects.object_command", "check an object file, or find the object in still images"),
     "poses": Subcommand("rhot_app.sources.poses.poses_command", "listen to another tracker's poses and record them"),

@@ -100,6 +100,13 @@ def warm_calibrations(rig: Rig) -> None:
     simulate(footage, np.array([OFF]), np.array([OFF]))
 
 
+def warm_hand_fit(rig: Rig) -> None:
+    """Compile what fits a hand to pictures."""
+    from rhot_app.handfit.session import warm_up  # not above: nothing of it is compiled, so it decides no cache
+
+    warm_up(rig, contours=True)
+
+
 def warm_outputs(rig: Rig) -> None:
     """Compile what turns a hand into the joints of other programs."""
     JointConverter(rig).warm_up()
@@ -108,7 +115,8 @@ def warm_outputs(rig: Rig) -> None:
 STEPS: dict[str, Callable[[Rig], None]] = {"tracker": warm_tracker, "solvers": warm_solvers,
                                            "detector": warm_detector, "estimator": warm_estimator,
                                            "twin": warm_twin, "boards": warm_boards,
-                                           "calibrations": warm_calibrations, "outputs": warm_outputs}
+                                           "calibrations": warm_calibrations, "hand fit": warm_hand_fit,
+                                           "outputs": warm_outputs}
 """In this order two processors share them evenly, and neither compiles what the other one is compiling."""
 
 _COLLECT_EVERY = 100_000

@@ -59,6 +59,8 @@ class Actions(QObject):
         self.close_rig = self._make("Close rig", "Ctrl+W", "End what the app started and go back to the first page.")
         self.quit = self._make("Quit", "Ctrl+Q", "End what the app started and close it.")
         self.wizards = [self._make(f"{wizard.title} …", "", wizard.meaning) for wizard in WIZARDS]
+        self.fit = self._make("Fit the hand to pictures …", "", "Drag joints in the cameras' pictures, move sliders, "
+                              "and let edges finish it: the hand's lengths and pose.")
         self.earlier = self._make("Bring back an earlier calibration …", "", "Every calibration keeps what it "
                                   "replaced; choose one by date and reason.")
         self.tracker = self._make("Tracker …", "", "Which tracker makes a hand of the markers, and what it may assume.")
@@ -83,6 +85,8 @@ class Actions(QObject):
             self._make("1 ×", "", "Ellipsoids in true size.", checkable=True),
             self._make(f"{LARGER} ×", "", f"Ellipsoids {LARGER} times as large, because a good place is known to a "
                        "millimetre.", checkable=True)]
+        self.layers = self._make("Layers of the hand …", "", "Which link of the tracked hand hides which before a "
+                                 "camera, as masks over its picture.")
         self.alone = self._make("Scene alone", "6", "Hide every panel, to look from afar; again brings them back (6).",
                                 checkable=True)
         self.dark = self._make("Dark", "", "Light text on dark ground.", checkable=True)
@@ -160,9 +164,10 @@ class MainToolBar(QToolBar):
             a.outputs, a.mouse, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig,
             a.close_rig, None, a.quit])
         self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [
-            *a.wizards, None, a.earlier, None, a.tracker, None, a.files])
+            *a.wizards, a.fit, None, a.earlier, None, a.tracker, None, a.files])
         self.view_button, self.view_menu = self._add_menu("View", [
-            *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, None, a.dark, a.light, None, a.reset])
+            *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, a.layers, None,
+            a.dark, a.light, None, a.reset])
         self.controls.addAction(actions.guide)
         self.source_label = QToolButton()
         self.source_label.setFocusPolicy(Qt.FocusPolicy.TabFocus)

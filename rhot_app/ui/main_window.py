@@ -129,6 +129,7 @@ class MainWindow(QMainWindow):
         self._connect_wizards()
         a.files.triggered.connect(lambda: self.open_guide("calibration"))
         a.frame.triggered.connect(self.screen_parts.scene.frame_hand)
+        a.layers.triggered.connect(lambda: self.dialogs.show_layers(c, self.appearance.scheme))
         a.home.triggered.connect(self.screen_parts.scene.reset_view)
         a.alone.toggled.connect(lambda on: self.docks.put_away("scene alone", on))
         a.reset.triggered.connect(self.reset_settings)
@@ -155,6 +156,7 @@ class MainWindow(QMainWindow):
         for action, wizard in zip(self.actions_.wizards, WIZARDS, strict=True):
             action.triggered.connect(lambda checked=False, wizard=wizard: self.wizards.open(wizard))
         self.actions_.earlier.triggered.connect(self.wizards.open_versions)
+        self.actions_.fit.triggered.connect(self.wizards.open_fit)
         self.toolbar.calibrate_menu.aboutToShow.connect(self._show_ages)
         self.wizards.rig_used.connect(self.rig_watch.look_soon)
         self.wizards.failed.connect(self._show_failure)
@@ -300,8 +302,8 @@ class MainWindow(QMainWindow):
 
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
-        return [*a.wizards, a.earlier, a.tracker, a.outputs, a.add_object, a.close_rig, a.properties.menuAction(),
-                a.frame, a.home, a.names, a.clouds, a.now]
+        return [*a.wizards, a.earlier, a.fit, a.tracker, a.outputs, a.add_object, a.close_rig,
+                a.properties.menuAction(), a.frame, a.home, a.names, a.clouds, a.now, a.layers]
 
     def _show_busy(self) -> None:
         if self.controller.opened is None:

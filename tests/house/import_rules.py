@@ -50,6 +50,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.state": ("rhot_app.objects.state",),
     "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.state"),
     "rhot_app.articulated": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.barehand"),
+    "rhot_app.handfit": (*APP_BASE, *MODELS, "rhot_app.calibration", "rhot_app.hand", "rhot_app.barehand"),
     "rhot_app.tracking": (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.state", "rhot_app.barehand"),
     "rhot_app.recording": BELOW_ENGINE,
     "rhot_app.sources": BELOW_ENGINE,
@@ -62,8 +63,8 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.api": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.export"),
     "rhot_app.mouse": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.evaluation"),
     "rhot_app.ui": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.evaluation", "rhot_app.export",
-                    "rhot_app.certificate", "rhot_app.mouse"),
-    "rhot_app.warm": (*BELOW_ENGINE, "rhot_app.engine"),
+                    "rhot_app.certificate", "rhot_app.mouse", "rhot_app.handfit"),
+    "rhot_app.warm": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.handfit"),
     "rhot_app": ("rhot_app",),  # __init__
     "rhot_app.__main__": ("rhot_node", "rhot_app", "resources"),
 }

@@ -22,6 +22,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot report": ("LOG", "--out", "--rig", "--directory"),
     "rhot video": ("collect", "LOG", "--rig", "--out", "--keep"),
     "rhot layers": ("FILE", "--angle", "--from", "--out", "--json"),
+    "rhot fit-hand": ("--rig", "--pictures", "--at", "--hand", "--save", "--settings"),
     "rhot recover": ("LOG", "--out", "--rig"),
     "rhot landmarks": ("CSV", "--rig", "--out", "--fps", "--json"),
     "rhot bare-hand": ("--rig", "--video", "--background", "--background-seconds", "--fps", "--offset-s",

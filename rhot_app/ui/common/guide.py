@@ -14,7 +14,8 @@ GUIDE = Path(__file__).resolve().parents[3] / "docs" / "guide"
 PAGES: tuple[tuple[str, str], ...] = (
     ("start", "Getting started"), ("window", "The window"), ("nodes", "Nodes"), ("markers", "Markers"),
     ("cameras", "Cameras"), ("hand", "The hand"), ("scene", "The scene"), ("plots", "The plots"),
-    ("calibration", "Calibration"), ("tracker", "The tracker"), ("outputs", "Streams to other programs"),
+    ("calibration", "Calibration"), ("fitting", "Fitting the hand to pictures"),
+    ("tracker", "The tracker"), ("outputs", "Streams to other programs"),
     ("mouse", "The 3-D mouse"),
     ("recording", "Recording and replay"), ("troubles", "When something is wrong"), ("keys", "Keys"),
 )

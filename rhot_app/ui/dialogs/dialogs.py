@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtCore import Qt
@@ -33,6 +34,9 @@ from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
 from rhot_app.ui.models.palette import Scheme, hex_of
 from rhot_app.ui.mouse.window import MouseWindow
 
+if TYPE_CHECKING:  # it brings numerical code, which waits until it is wanted
+    from rhot_app.ui.dialogs.layers_dialog import LayersDialog
+
 
 class Dialogs:
     """Each asks one thing, or shows one thing, on top of `parent`."""
@@ -43,6 +47,7 @@ class Dialogs:
         self.tracker: TrackerDialog | None = None
         self.outputs: OutputsDialog | None = None
         self.mouse: MouseWindow | None = None
+        self.layers: LayersDialog | None = None
 
     def choose_rig(self, last_rig: str) -> Path | None:
         """A rig file, looked for beside the one opened last; None when the person thought better of it."""
@@ -134,8 +139,26 @@ class Dialogs:
         self.mouse.raise_()
         self.mouse.activateWindow()
 
+    def show_layers(self, controller: Controller, scheme: Scheme) -> None:
+        """Which link of the tracked hand hides which, beside the window."""
+        if self.layers is None:
+            from rhot_app.ui.dialogs.layers_dialog import LayersDialog
+
+            self.layers = LayersDialog(controller, scheme, lambda: self.open_guide("scene"), self._parent)
+            self.layers.finished.connect(self._forget_layers)
+        self.layers.show()
+        self.layers.raise_()
+        self.layers.activateWindow()
+
+    def _forget_layers(self) -> None:
+        if self.layers is not None:
+            self.layers.deleteLater()
+            self.layers = None
+
     def set_scheme(self, scheme: Scheme) -> None:
         """Change the colours of what paints by itself."""
+        if self.layers is not None:
+            self.layers.set_scheme(scheme)
         if self.mouse is not None:
             self.mouse.set_scheme(scheme)
 
@@ -157,7 +180,7 @@ class Dialogs:
 
     def close(self) -> None:
         """Close what stands beside the window."""
-        for window in (self.guide, self.tracker, self.outputs, self.mouse):
+        for window in (self.guide, self.tracker, self.outputs, self.mouse, self.layers):
             if window is not None:
                 window.close()
 

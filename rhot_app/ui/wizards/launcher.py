@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 from PySide6.QtCore import QObject, Qt, Signal
@@ -27,6 +27,10 @@ from rhot_app.ui.models.rows import rig_rows
 from rhot_app.ui.wizards.framework.page import RowTable
 from rhot_app.ui.wizards.framework.plan import WIZARDS, Kit, Memory, Wizard
 from rhot_app.ui.wizards.framework.window import WizardWindow
+
+if TYPE_CHECKING:  # they compile numerical code, which waits until it is wanted
+    from rhot_app.handfit.session import HandFit
+    from rhot_app.ui.handfit.window import HandFitWindow
 
 _END_S = 5.0
 
@@ -59,6 +63,7 @@ class Launcher(QObject):
         """Makes the menu of what the simulated hand does; None on a real rig."""
         self.wizard: WizardWindow | None = None
         self.versions: VersionsDialog | None = None
+        self.fit: HandFitWindow | None = None
 
     def show_ages(self, actions: list[QAction], path: str) -> None:
         """A tick and the age of what is in force, for each wizard's action in the order of `WIZARDS`."""
@@ -82,10 +87,17 @@ class Launcher(QObject):
             self._job = Job(lambda progress: self._look(None), self._show_versions, self._not_opened, None,
                             self).start()
 
+    def open_fit(self) -> None:
+        """Show the window in which the hand is fitted to pictures."""
+        if self._job is None and self.fit is None:
+            self._job = Job(lambda progress: self._begin_fit(), self._show_fit, self._not_opened, None, self).start()
+
     def close(self) -> None:
         """The app is closing: no question, nothing left running."""
         if self.wizard is not None:
             self.wizard.end().wait(_END_S)
+        if self.fit is not None:
+            self.fit.end().wait(_END_S)
 
     def _look(self, wizard: Wizard | None) -> RigNow:
         if wizard is not None:
@@ -137,6 +149,29 @@ class Launcher(QObject):
         self.versions.rig_used.connect(lambda rig: self.rig_used.emit())
         self.versions.finished.connect(self.versions.deleteLater)
         self.versions.open()
+
+    def _begin_fit(self) -> tuple[RigNow, HandFit]:
+        from rhot_app.handfit.session import HandFit, warm_up
+
+        now = self._look(None)
+        fit = HandFit(now.rig)
+        warm_up(now.rig)
+        return now, fit
+
+    def _show_fit(self, begun: tuple[RigNow, HandFit]) -> None:
+        from rhot_app.ui.handfit.live import fit_live
+
+        self._job = None
+        now, fit = begun
+        self.fit = fit_live(fit, now.path, self._connect, self._listen, self._scheme(), self._memory, self._window)
+        self.fit.used.connect(self.rig_used)
+        self.fit.finished.connect(self._forget_fit)
+        self.fit.open()
+
+    def _forget_fit(self) -> None:
+        if self.fit is not None:
+            self.fit.deleteLater()
+            self.fit = None
 
     def _not_opened(self, sentence: str) -> None:
         self._job = None

@@ -1,0 +1,116 @@
+"""Searches pictures of an instant for the hand's contours, and for the hand itself, as the bare hand's tracker does.
+
+Images of one instant are weighed once. Each pass halves how far from the contour an edge may be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.barehand.contours import STEP_M
+from rhot_app.barehand.surface import FOREARM_TURN, SHAPE
+from rhot_app.barehand.tracker import START_PASSES, START_SD, BareHandTracker
+from rhot_app.errors import CalibrationError
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
+from rhot_app.hand.skeleton import HandPose
+from rhot_app.handfit.solve import Evidence, Freedom, Solver, free_numbers
+from rhot_app.handfit.state import Contour, FitState, Instant
+from rhot_app.progress import Progress
+from rhot_app.project import Rig
+from rhot_node.detect.edges import find_edges, noise_of
+from rhot_node.detect.foreground import Foreground, learn_skin
+
+Array = NDArray[np.float64]
+
+SEARCHES = 8
+"""Random searches at most; one in three finds an open hand in drawn pictures without a background (chosen: 30 s)."""
+
+FOUND = 0.9
+"""Part of the contour of a hand that is where it is believed to be: what `contour_residual.MISSED` leaves."""
+
+
+def fit_to_contours(solver: Solver, rig: Rig, state: FitState, instants: Sequence[int], freedom: Freedom,
+                    anchor_sd_px: float) -> FitState:
+    """The state after the contours of some instants were searched and fitted, from where the hand is now; anchors and
+    priors count, too. Raises CalibrationError when an instant has no picture, or when no edge of the hand is found."""
+    reference = state
+    evidence = Evidence(reference, START_SD[:2], anchor_sd_px)
+    free = free_numbers(state, instants, freedom, surface=True)
+    contours: list[Contour | None] = [None] * len(state.instants)
+    known = {k: [(learn_skin(image), noise_of(image)) for _, image in sorted(state.instants[k].images.items())]
+             for k in instants}
+    spread = solver.covariance(state, evidence) * np.outer(free, free)
+    for number in range(START_PASSES):
+        step_m = STEP_M if number == START_PASSES - 1 else 2.0 * STEP_M
+        surface = solver.shapes.anatomy(state.shape)
+        for k in instants:
+            contours[k] = _search(surface, rig, state, k, 0.25**number * spread, step_m, known[k])
+        state = solver.solve(state, replace(evidence, contours=contours), free)
+    for k in instants:
+        contour = contours[k]
+        if contour is None or contour.found == 0.0:
+            raise CalibrationError(f"No edge of the hand was found in {state.instants[k].name}. Bring the outline near "
+                                   "the hand first: drag the wrist, the knuckles and the fingertips there.")
+        state = state.change(k, replace(state.instants[k], contour=contour))
+    return state
+
+
+def find_hand(rig: Rig, hand: HandAnatomy, instant: Instant, progress: Progress) -> HandPose:
+    """The pose of a hand of which nothing is known: of some random searches by the colours of skin, the one whose
+    contour is found best. Raises CalibrationError when there is nothing of a hand's size and colour."""
+    tracker = _tracker(rig, hand, instant)
+    images = [image for _, image in sorted(instant.images.items())]
+    tracker.foreground = [learn_skin(image) for image in images]
+    best: tuple[float, Array] | None = None
+    for number in range(SEARCHES):
+        progress("looking for the hand", number / SEARCHES)
+        if not tracker.find(images, 0):
+            continue
+        state = tracker.see(dict(enumerate(images)), 0).state
+        seen = tracker.fit.seen.sum(axis=(0, 1))
+        found = float(seen[0] / max(seen[1], 1.0))
+        best = (found, state) if best is None or found > best[0] else best
+        if found > FOUND:
+            break
+    if best is None:
+        raise CalibrationError(f"No hand was found by the colour of skin in {instant.name}. Drag the wrist, the "
+                               "knuckles and the fingertips to their places instead.")
+    world = np.eye(4)
+    world[:3] = best[1][:ANGLES].reshape(3, 4)
+    return HandPose(world, np.clip(best[1][ANGLES:VELOCITY], tracker.model.limits[:, 0], tracker.model.limits[:, 1]))
+
+
+def _tracker(rig: Rig, hand: HandAnatomy, instant: Instant) -> BareHandTracker:
+    """A tracker of the cameras that have a picture, in the rig's order. Raises CalibrationError when none has."""
+    if not instant.images:
+        raise CalibrationError(f"{instant.name} has no picture yet. Take pictures, or open picture files.")
+    nodes = tuple(rig.nodes[camera] for camera in sorted(instant.images))
+    return BareHandTracker(msgspec.structs.replace(rig, nodes=nodes, hand=hand, depth=type(rig.depth)()),
+                           known_size=False)
+
+
+def _search(hand: HandAnatomy, rig: Rig, state: FitState, k: int, spread: Array, step_m: float,
+            known: Sequence[tuple[Foreground, float]]) -> Contour:
+    """The edges near the contours of the hand at one instant; `spread` (n, n): the state's covariance; `known`: of each
+    picture, the colours of skin and the noise."""
+    instant = state.instants[k]
+    tracker = _tracker(rig, hand, instant)
+    bare, covariance = np.zeros(BIAS + SHAPE), np.zeros((MOTION + SHAPE, MOTION + SHAPE))
+    bare[:ANGLES], bare[ANGLES:VELOCITY] = instant.pose.world_from_palm[:3].ravel(), instant.pose.angles
+    bare[BIAS + FOREARM_TURN:] = instant.bend
+    first = state.own(k).start
+    ours = np.concatenate([np.arange(first, first + POSE), np.arange(FOREARM_TURN), first + POSE + np.arange(2)])
+    theirs = np.concatenate([np.arange(POSE), MOTION + np.arange(SHAPE)])
+    covariance[np.ix_(theirs, theirs)] = spread[np.ix_(ours, ours)]
+    frames = []
+    for number, (_, image) in enumerate(sorted(instant.images.items())):
+        frame = tracker.expected(number, bare, covariance, step_m)
+        frame.observe(find_edges(image, frame.slices, *known[number]))
+        frames.append(frame)
+    return Contour(state.shape, tuple(frames))

@@ -1,0 +1,1 @@
+"""The window in which a hand is fitted to pictures."""

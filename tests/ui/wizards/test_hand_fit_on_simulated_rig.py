@@ -1,0 +1,90 @@
+"""The hand fitted to pictures of the simulated rig: by clicks, real nodes and a real engine, to a saved rig."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+from screen_pictures import check
+from wizard_hands import Hands
+from wizard_rig import FakeMemory
+
+from rhot_app.hand.anthropometry import scaled_hand
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.model import build_model
+from rhot_app.hand.skeleton import JOINTS
+from rhot_app.rig_history import versions
+from rhot_app.simulator.scene.motion import load_motion
+from rhot_app.simulator.scene.scene import twin_defaults
+from rhot_app.simulator.scene.scene_description import HandShow
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards.launcher import Launcher
+
+
+@pytest.fixture
+def window(themed, simulated_rig):
+    """The window on the simulated rig, whose rig file has a hand a tenth too small."""
+    truth = simulated_rig.truth
+    simulated_rig.use(msgspec.structs.replace(truth, hand=scaled_hand(truth.hand, 0.9)))
+    simulated_rig.stage.show(HandShow("still"))
+    parent = QWidget()
+    session = simulated_rig.session
+    launcher = Launcher(session.asker, session.client, lambda: DARK, FakeMemory(), parent)
+    failures: list[str] = []
+    launcher.failed.connect(failures.append)
+    launcher.open_fit()
+    Hands.wait(lambda: launcher.fit is not None or failures, 60.0)
+    assert launcher.fit is not None, failures
+    launcher.fit.resize(1280, 800)
+    yield launcher.fit
+    launcher.close()
+    simulated_rig.use(truth)
+    parent.deleteLater()
+
+
+def drag(view, joint, to):
+    """With the mouse, from where a joint is drawn to px `to` of the picture."""
+    ends = [view.to_widget(*place) for place in (view.joints[joint], to)]
+    start, end = (QPoint(round(point.x()), round(point.y())) for point in ends)
+    QTest.mousePress(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, start)
+    QTest.mouseMove(view, (start + end) / 2)
+    QTest.mouseRelease(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, end)
+
+
+def test_a_hand_of_the_wrong_size_is_fitted_by_anchors_and_used(window, simulated_rig):
+    fit, frame = window.fit, window.frame
+    Hands.wait(lambda: all(view._kept is not None for view in frame.views), 30.0)
+    assert window.live and not frame.contours_button.isEnabled()
+    QTest.mouseClick(frame.take_button, Qt.MouseButton.LeftButton)
+    Hands.wait(lambda: fit.instant is not None, 10.0)
+    assert set(fit.instant.images) == {0, 1}
+    truth, twin = simulated_rig.truth, twin_defaults()
+    model = build_model(truth.hand)
+    standing = load_motion("still", model, np.array([0.5e-3 * twin.baseline_mm, 0.0, twin.distance_m]), 1).pose(0.0)
+    joints = forward(model, standing).joints
+    for camera, view in enumerate(frame.views):
+        for name in ("wrist", "index_mcp", "little_mcp", "thumb_tip", "index_tip", "middle_tip", "ring_tip",
+                     "little_tip"):
+            drag(view, JOINTS.index(name), fit.cameras[camera].project(joints)[JOINTS.index(name)])
+    frame.freedom_box.setCurrentIndex(1)
+    QTest.mouseClick(frame.anchors_button, Qt.MouseButton.LeftButton)
+    Hands.wait(lambda: "Fitted to the anchors" in window.told, 30.0)
+    QTest.mouseClick(frame.contours_button, Qt.MouseButton.LeftButton)
+    Hands.wait(lambda: "contour was found" in window.told, 120.0)
+    print(window.told, frame.errors.text())
+    frame.form.show_group("Lengths")
+    window.frame_hand()
+    for view in frame.views:
+        view.choose(-1)
+    check("hand-fit-live", window.grab().toImage(), 60)
+    QTest.mouseClick(frame.use_button, Qt.MouseButton.LeftButton)
+    Hands.wait(lambda: "The rig has this hand now" in window.told, 60.0)
+    saved = simulated_rig.saved.hand
+    for finger in saved.fingers:
+        ratio = sum(saved.fingers[finger].bones_mm) / sum(truth.hand.fingers[finger].bones_mm)
+        print(f"{finger}: {100.0 * (ratio - 1.0):+.1f} % of its length")
+        assert ratio == pytest.approx(1.0, abs=0.05)
+    assert versions(simulated_rig.path)[0].replaced_by == "hand fitted to pictures"
