@@ -5,27 +5,44 @@ The state of a bare hand has its size behind the motion; the lasting errors of t
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.surface import SHAPE
+from rhot_app.barehand.joints import add_lengths
+from rhot_app.barehand.surface import FINGERS, LENGTH, RADIUS, SHAPE, WHOLE, sized_table
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.estimation.filter import IteratedFilter
 from rhot_app.estimation.residual import Rows
+from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.landmarks import LASTING_M, LASTING_S
-from rhot_app.hand.motion.hand_process import BIAS, BIAS_S, FASTEST, MOTION, PALM_SPREAD, HandProcess
+from rhot_app.hand.motion.hand_process import (
+    ANGLES,
+    BIAS,
+    BIAS_S,
+    FASTEST,
+    MOTION,
+    PALM_SPREAD,
+    VELOCITY,
+    HandProcess,
+)
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.association import MarkerAssociation
 from rhot_app.tracking.markers.acquisition import Starter
-from rhot_app.tracking.markers.marker_model import LASTING_PX, compile_markers
+from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+LENGTHS = np.concatenate([[WHOLE, FINGERS], np.arange(LENGTH, RADIUS)])
+"""Of a shape: what moves joints and markers."""
 
 
 class MarkersOfHand:
@@ -57,7 +74,7 @@ class MarkersOfHand:
 
     def begin(self, hand: BareHandTracker) -> None:
         """The tracker has started: the markers' lasting errors are those at its pose."""
-        self._note(hand.filter.newest.state)
+        self._note(hand, hand.filter.newest.state)
         knot = hand.filter.newest
         own = slice(MOTION + SHAPE, None)
         knot.covariance[own, own] = self._process.stationary[own, own]
@@ -71,13 +88,14 @@ class MarkersOfHand:
             return False
         hand.take((), t_s)
         prediction = hand.filter.predict(t_s)
+        markers.markers = sized(self._markers, hand.surface.bone, prediction[0])
         markers.add_landmark_noise(without_size(prediction[0]))
-        self._note(prediction[0])
-        hand.filter.add(t_s, [BesideContours(markers), hand.limits], prediction)
+        self._note(hand, prediction[0])
+        hand.filter.add(t_s, [BesideContours(markers, self._markers, hand.surface.bone), hand.limits], prediction)
         return True
 
-    def _note(self, state: Array) -> None:
-        m = self._markers
+    def _note(self, hand: BareHandTracker, state: Array) -> None:
+        m = sized(self._markers, hand.surface.bone, state)
         bias = np.empty((len(m.finger), 3, 3))
         triangulation_covariance(without_size(state), m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX,
                                  np.where(m.landmark, LASTING_M, 0.0), m.paint_variance, bias)
@@ -85,17 +103,38 @@ class MarkersOfHand:
 
 
 class BesideContours:
-    """Implements `Residual`: a `MarkerFrame` on a state that has the hand's size before the markers' errors. The size
-    is taken as it is: the markers do not change it."""
+    """Implements `Residual`: a `MarkerFrame` on a state that has the hand's shape before the markers' errors. The
+    lengths of the shape move the markers; `bone` (R,): the phalanx of each row of the table, as in `Surface`."""
 
-    def __init__(self, markers: MarkerFrame) -> None:
-        self._markers = markers
+    def __init__(self, frame: MarkerFrame, markers: MarkerModel, bone: Indices) -> None:
+        self._frame, self._markers, self._bone = copy.copy(frame), markers, bone
 
     def linearise(self, state: Array) -> Rows:
         """See `Residual`."""
-        rows = self._markers.linearise(without_size(state))
+        self._frame.markers = sized(self._markers, self._bone, state)
+        rows = self._frame.linearise(without_size(state))
+        by_place = rows.jacobian[:, MOTION:]  # a lasting error moves its marker
         jacobian = np.insert(rows.jacobian, [MOTION] * SHAPE, 0.0, axis=1)
+        jacobian[:, MOTION + LENGTHS] = by_place @ lengths_jacobian(self._frame.markers.dh, self._bone, state)
         return replace(rows, jacobian=jacobian)
+
+
+def sized(markers: MarkerModel, bone: Indices, state: Array) -> MarkerModel:
+    """The markers on a hand of the lengths that `state` has."""
+    dh, shape = markers.dh, np.ascontiguousarray(state[BIAS:BIAS + SHAPE])
+    a, d = np.empty(len(dh.a)), np.empty(len(dh.d))
+    sized_table(dh, bone, shape, a, d)
+    return replace(markers, dh=dh._replace(a=a, d=d, point_offset=np.exp(shape[WHOLE]) * dh.point_offset))
+
+
+def lengths_jacobian(dh: DhArrays, bone: Indices, state: Array) -> Array:
+    """(3 P, 17): how the points of a sized table follow the LENGTHS of a shape."""
+    world, frames, points = np.eye(4), empty_frames(dh), np.empty((len(dh.point_row), 3))
+    world[:3] = state[:ANGLES].reshape(3, 4)
+    forward_arrays(dh, world, state[ANGLES:VELOCITY], frames, points)
+    out = np.zeros((len(points), 3, len(LENGTHS)))
+    add_lengths(dh, bone, world, frames, points, out)
+    return out.reshape(-1, len(LENGTHS))
 
 
 def without_size(state: Array) -> Array:

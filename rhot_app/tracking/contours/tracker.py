@@ -215,7 +215,6 @@ class ContourEstimator:
         contour = self._contour(frame)
         if contour is None:
             return False
-        contour.observe(frame.edges)
         self._cameras[frame.camera].answered_ns = frame.t_row0_master_ns
         self._waiting[frame.camera] = frame, contour
         answering = [number for number, camera in enumerate(self._cameras)
@@ -404,10 +403,15 @@ class ContourEstimator:
         self._requests.append(SliceRequest(number, contour.slices[:SLICES_MAX], STEP, contour))
 
     def _contour(self, frame: EdgeFrame) -> ContourFrame | None:
-        """The contour on the slices that were searched: as it was expected, or in a log as it is now."""
+        """The contour on the slices that were searched, with their edges: as it was expected, or in a log as it is
+        now."""
         expected = frame.request.expected
         if isinstance(expected, ContourFrame) and expected.surface is self._hand.surface:
-            return copy.copy(expected) if len(expected.slices) == len(frame.request.slices) else None  # for this frame
+            if len(expected.slices) != len(frame.request.slices):
+                return None
+            contour = copy.copy(expected)  # for this frame
+            contour.observe(frame.edges)
+            return contour
         middle_ns = round(0.5e9 * self._hand.row_s[frame.camera] * self._hand.cameras[frame.camera].height)
         state, covariance = self._hand.filter.predict(self._seconds(frame.t_row0_master_ns + middle_ns))
         return matched(self._hand, frame, state, covariance)
