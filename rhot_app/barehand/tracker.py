@@ -235,11 +235,15 @@ class BareHandTracker:
         return knot
 
     def take(self, cameras: Iterable[int], t_s: float) -> None:
-        """Note that images of `cameras` of the time `t_s`, s since the start, are weighed next."""
+        """Note that images of `cameras` of the time `t_s`, s since the start, are weighed next. Without cameras it is
+        something else, which the phalanges' lengths and radii explain, too, but do not follow."""
+        cameras = list(cameras)
+        last_s = max(self._taken_s) if np.isfinite(self._taken_s).any() else self.filter.newest.t_s
         for camera in cameras:
             self._repeated[camera] = max(1.0 / (FASTEST * max(t_s - self._taken_s[camera], SAME_TIME_S)), 1.0)
             self._taken_s[camera] = t_s
-        self.filter.partial = Partial(PHALANGES, min(max(t_s - self.filter.newest.t_s, 0.0) / SAME_POSE_S, 1.0))
+        share = min(max(t_s - last_s, 0.0) / SAME_POSE_S, 1.0) if cameras else 0.0
+        self.filter.partial = Partial(PHALANGES, share)
 
     def _anew(self, images: dict[int, Image], t_s: float, start: Array, extra: Sequence[Residual]) -> Knot:
         """Begin again at rest in the state `start`."""

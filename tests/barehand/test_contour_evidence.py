@@ -86,7 +86,8 @@ def test_markers_lie_on_a_hand_as_large_as_the_contours_say(markers: str) -> Non
     state[:BIAS + SHAPE] = state_of(pose)
     state[BIAS + WHOLE] = np.log(factor)
     model = compile_markers(rig)
-    residual = BesideContours(MarkerFrame(model, observations(pixels_of(rig, pose, factor))), model, hand.surface.bone)
+    residual = BesideContours(MarkerFrame(model, observations(pixels_of(rig, pose, factor))), model, hand.surface.bone,
+                              (state, hand.process.stationary), 0)
     assert np.abs(residual.linearise(state).error).max() < 1.0, "mm of paint and of creases beside"
     state[BIAS:BIAS + SHAPE] += np.random.default_rng(0).normal(0.0, 0.02, SHAPE)
     rows, size = residual.linearise(state), hand.process.size

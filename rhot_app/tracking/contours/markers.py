@@ -5,7 +5,7 @@ The state of a bare hand has its size behind the motion; the lasting errors of t
 
 from __future__ import annotations
 
-import copy
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rhot_app.barehand.joints import add_lengths
 from rhot_app.barehand.surface import FINGERS, LENGTH, RADIUS, SHAPE, WHOLE, sized_table
 from rhot_app.barehand.tracker import BareHandTracker
-from rhot_app.estimation.filter import IteratedFilter
+from rhot_app.estimation.filter import IteratedFilter, Knot
 from rhot_app.estimation.residual import Rows
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
@@ -33,6 +33,8 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.association import MarkerAssociation
 from rhot_app.tracking.markers.acquisition import Starter
+from rhot_app.tracking.markers.estimator import Rejections, associate, distances_of
+from rhot_app.tracking.markers.estimator_state import RecentObservations
 from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
@@ -59,11 +61,15 @@ class MarkersOfHand:
             PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.concatenate([self._shape, np.zeros((count, 3, 3))]),
             np.concatenate([hand.shape_s, lasting]))
         hand.process, hand.filter = self._process, IteratedFilter(self._process)
+        self._bone, self._observations = hand.surface.bone, RecentObservations(arrays, self._markers)
+        self._rejections = Rejections(len(rig.nodes), self._markers)
 
     def reset(self) -> None:
         """Forget the frames."""
         self._starter.reset()
         self._association.reset()
+        self._observations.reset()
+        self._rejections = Rejections(len(self._observations.newest), self._markers)
 
     def locate(self, frame: CameraObservations) -> tuple[HandPose, int] | None:
         """The pose of a hand that the markers of the last frames show alone, and its time, master ns."""
@@ -81,18 +87,39 @@ class MarkersOfHand:
         self.reset()
 
     def weigh(self, frame: CameraObservations, hand: BareHandTracker, epoch_ns: int) -> bool:
-        """Weigh the markers of one frame; False when it shows none. Raises LinAlgError when they contradict all."""
-        markers = MarkerFrame(self._markers, frame)
-        t_s = 1e-9 * (markers.t_ns - epoch_ns)
-        if not markers.seen.any() or t_s < hand.filter.knots[0].t_s:
+        """Weigh the markers of one frame alone; False when it shows none. Raises LinAlgError when they contradict
+        all."""
+        t_s = 1e-9 * (MarkerFrame(self._markers, frame).t_ns - epoch_ns)
+        if t_s < hand.filter.knots[0].t_s:
             return False
         hand.take((), t_s)
         prediction = hand.filter.predict(t_s)
-        markers.markers = sized(self._markers, hand.surface.bone, prediction[0])
-        markers.add_landmark_noise(without_size(prediction[0]))
+        found = self.residuals([frame], hand, prediction, epoch_ns + round(1e9 * t_s))
+        if found:
+            self.judge(found, hand.filter.add(t_s, [*found, hand.limits], prediction), hand)
+        return bool(found)
+
+    def residuals(self, frames: Sequence[CameraObservations], hand: BareHandTracker, prediction: tuple[Array, Array],
+                  t_ns: int) -> list[BesideContours]:
+        """What the markers of some cameras' frames say of a hand that is predicted for master time `t_ns`, as far as
+        they may be its markers; none of a frame that shows none."""
         self._note(hand, prediction[0])
-        hand.filter.add(t_s, [BesideContours(markers, self._markers, hand.surface.bone), hand.limits], prediction)
-        return True
+        return [BesideContours(markers, self._markers, hand.surface.bone, prediction, t_ns) for markers in
+                (MarkerFrame(self._markers, frame) for frame in frames) if markers.seen.any()]
+
+    def judge(self, found: list[BesideContours], knot: Knot, hand: BareHandTracker) -> None:
+        """A knot has weighed `found`, its first residuals. What a camera rejects time and again makes its finger or the
+        palm uncertain."""
+        first = 0
+        for one in found:
+            frame, state = one.frame, without_size(knot.state)
+            frame.markers = sized(self._markers, self._bone, knot.state)
+            self._observations.enter(frame)
+            inliers = self._observations.accept(frame, state, knot.weights[first:])
+            first += int(np.count_nonzero(frame.seen & np.isfinite(frame.expected(state)[:, 0])))
+            if self._rejections.inflate(frame, inliers, one.distances, self._process, knot.covariance,
+                                        self._observations.periods_s[frame.camera]):
+                hand.filter.start(knot.t_s, knot.state, knot.covariance)
 
     def _note(self, hand: BareHandTracker, state: Array) -> None:
         m = sized(self._markers, hand.surface.bone, state)
@@ -106,16 +133,26 @@ class BesideContours:
     """Implements `Residual`: a `MarkerFrame` on a state that has the hand's shape before the markers' errors. The
     lengths of the shape move the markers; `bone` (R,): the phalanx of each row of the table, as in `Surface`."""
 
-    def __init__(self, frame: MarkerFrame, markers: MarkerModel, bone: Indices) -> None:
-        self._frame, self._markers, self._bone = copy.copy(frame), markers, bone
+    def __init__(self, frame: MarkerFrame, markers: MarkerModel, bone: Indices, prediction: tuple[Array, Array],
+                 t_ns: int) -> None:
+        """Associates the frame with the hand as it is predicted for `t_ns`. `distances` (M,): squared Mahalanobis
+        distances of its markers from there."""
+        self._markers, self._bone = markers, bone
+        state, frame.markers = without_size(prediction[0]), sized(markers, bone, prediction[0])
+        frame.add_landmark_noise(state)
+        frame.late_s, frame.t_ns = np.where(frame.seen, frame.late_s + 1e-9 * (frame.t_ns - t_ns), 0.0), t_ns
+        covariance = without_size_covariance(prediction[1], lengths_jacobian(frame.markers.dh, bone, prediction[0]))
+        pixels, covariances = frame.predict_pixels(state, covariance)
+        self.distances = distances_of(frame, pixels, covariances)
+        self.frame = associate(frame, pixels, covariances, self.distances)
 
     def linearise(self, state: Array) -> Rows:
         """See `Residual`."""
-        self._frame.markers = sized(self._markers, self._bone, state)
-        rows = self._frame.linearise(without_size(state))
+        self.frame.markers = sized(self._markers, self._bone, state)
+        rows = self.frame.linearise(without_size(state))
         by_place = rows.jacobian[:, MOTION:]  # a lasting error moves its marker
         jacobian = np.insert(rows.jacobian, [MOTION] * SHAPE, 0.0, axis=1)
-        jacobian[:, MOTION + LENGTHS] = by_place @ lengths_jacobian(self._frame.markers.dh, self._bone, state)
+        jacobian[:, MOTION + LENGTHS] = by_place @ lengths_jacobian(self.frame.markers.dh, self._bone, state)
         return replace(rows, jacobian=jacobian)
 
 
@@ -135,6 +172,16 @@ def lengths_jacobian(dh: DhArrays, bone: Indices, state: Array) -> Array:
     out = np.zeros((len(points), 3, len(LENGTHS)))
     add_lengths(dh, bone, world, frames, points, out)
     return out.reshape(-1, len(LENGTHS))
+
+
+def without_size_covariance(covariance: Array, lengths: Array) -> Array:
+    """The covariance of a state as `marker_residual` knows it: what the `lengths` (3 M, 17) move its markers by counts
+    as their lasting errors."""
+    size = len(covariance)
+    to = np.zeros((size - SHAPE, size))
+    to[:MOTION, :MOTION], to[MOTION:, MOTION + SHAPE:] = np.eye(MOTION), np.eye(size - SHAPE - MOTION)
+    to[MOTION:, MOTION + LENGTHS] = lengths
+    return np.asarray(to @ covariance @ to.T)
 
 
 def without_size(state: Array) -> Array:

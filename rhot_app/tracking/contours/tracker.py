@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,6 +106,7 @@ class ContourEstimator:
         self._maps: list[ForegroundFrame | None] = [None] * len(self._names)
         self._requests: list[SliceRequest] = []
         self._waiting: dict[int, tuple[EdgeFrame, ContourFrame]] = {}
+        self._marked: list[CameraObservations] = []
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._epoch_ns = self._seen_ns = 0
         self._judged_ns = _NEVER
@@ -197,7 +199,7 @@ class ContourEstimator:
             self._give_up()
         if self._tracking and self._lost(t_ns):
             self._give_up()
-        marked = self._markers is not None and self._weigh_markers(frame)
+        marked = self._markers is not None and self._take_markers(frame)
         if not self._tracking:
             self._look(frame)
         elif t_ns - camera.target_ns > 1.5 * camera.period_ns:  # its last answer is missing
@@ -337,7 +339,7 @@ class ContourEstimator:
         self._hand.tracking = False
         self._hand.frames = [None] * len(self._names)
         self._finder.reset()
-        self._waiting = {}
+        self._waiting, self._marked = {}, []
         for camera in self._cameras:
             camera.asked_ns = camera.answered_ns = _NEVER
 
@@ -355,24 +357,34 @@ class ContourEstimator:
         contours = [contour for _, contour in waiting.values()]
         for contour, t_ns in zip(contours, times_ns, strict=True):
             contour.late_s = contour.late_s + (self._seconds(t_ns) - t_s)
+        marked = self._marked_with(waiting)
         hand.take(waiting, t_s)
         prediction, spreads = hand.filter.predict(t_s), [contour.expected_sd for contour in contours]
-        residuals: list[Residual] = [Contours(contours), hand.limits]
+        found = [] if self._markers is None else self._markers.residuals(
+            marked, hand, prediction, self._epoch_ns + round(1e9 * t_s))
+        residuals: list[Residual] = [*found, Contours(contours), hand.limits]
         initial = prediction[0]
+        if found:  # contours are found where the markers show the hand
+            initial = update(hand.process, t_s, prediction, [*found, hand.limits], initial, hand.filter.partial).state
         for number in range(PASSES):
             for contour, spread in zip(contours, spreads, strict=True):
                 contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)
             if number < PASSES - 1:
                 initial = update(hand.process, t_s, prediction, residuals, initial, hand.filter.partial).state
-        hand.filter.add(t_s, residuals, prediction, initial)
+        knot = hand.filter.add(t_s, residuals, prediction, initial)
+        if self._markers is not None:
+            self._markers.judge(found, knot, hand)
 
-    def _weigh_markers(self, frame: CameraObservations) -> bool:
-        """Weigh one frame's markers, or begin with them. Whether they showed anything."""
+    def _take_markers(self, frame: CameraObservations) -> bool:
+        """Begin with one frame's markers, or keep them until the edges of the same frame come, so that both are weighed
+        at once; weigh those alone whose edges do not come. Whether these showed anything."""
         assert self._markers is not None
         if self._tracking:
+            frames = [*self._marked, frame]
+            self._marked = [one for one in frames if self._comes(one)]
             try:
-                return self._markers.weigh(frame, self._hand, self._epoch_ns)
-            except np.linalg.LinAlgError:
+                return self._weigh_alone([one for one in frames if not self._comes(one)])
+            except np.linalg.LinAlgError:  # the estimate contradicts itself
                 self._give_up()
                 return False
         found = self._markers.locate(frame)
@@ -380,6 +392,27 @@ class ContourEstimator:
             return False
         self._start(*found)
         return True
+
+    def _comes(self, frame: CameraObservations) -> bool:
+        """Whether the edges of a frame may still come."""
+        camera = self._cameras[frame.camera]
+        assert camera.newest is not None
+        return (camera.newest.t_row0_master_ns - frame.t_row0_master_ns < 1.5 * camera.period_ns
+                and frame.t_row0_master_ns - camera.answered_ns < WRONG_AFTER_PERIODS * camera.period_ns)
+
+    def _marked_with(self, waiting: dict[int, tuple[EdgeFrame, ContourFrame]]) -> list[CameraObservations]:
+        """The markers of the frames whose edges are `waiting`. Those of earlier frames are weighed alone."""
+        edges_ns = {number: frame.t_row0_master_ns for number, (frame, _) in waiting.items()}
+        marked = self._marked
+        self._marked = [one for one in marked if one.t_row0_master_ns > edges_ns.get(one.camera, _NEVER)]
+        self._weigh_alone([one for one in marked if one.t_row0_master_ns < edges_ns.get(one.camera, _NEVER)])
+        return [one for one in marked if one.t_row0_master_ns == edges_ns.get(one.camera, _NEVER)]
+
+    def _weigh_alone(self, frames: Sequence[CameraObservations]) -> bool:
+        """Weigh the markers of some frames. Whether they showed anything. Raises LinAlgError."""
+        assert self._markers is not None or not frames
+        return self._markers is not None and bool(
+            sum(self._markers.weigh(one, self._hand, self._epoch_ns) for one in frames))
 
     # -- requests ------------------------------------------------------------------------------------------------------
 
