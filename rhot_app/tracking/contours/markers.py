@@ -113,11 +113,11 @@ class MarkersOfHand:
         first = 0
         for one in found:
             frame, state = one.frame, without_size(knot.state)
-            frame.markers = sized(self._markers, self._bone, knot.state)
+            distances = one.distances(knot.state, knot.covariance)
             self._observations.enter(frame)
             inliers = self._observations.accept(frame, state, knot.weights[first:])
             first += int(np.count_nonzero(frame.seen & np.isfinite(frame.expected(state)[:, 0])))
-            if self._rejections.inflate(frame, inliers, one.distances, self._process, knot.covariance,
+            if self._rejections.inflate(frame, inliers, distances, self._process, knot.covariance,
                                         self._observations.periods_s[frame.camera]):
                 hand.filter.start(knot.t_s, knot.state, knot.covariance)
 
@@ -135,16 +135,24 @@ class BesideContours:
 
     def __init__(self, frame: MarkerFrame, markers: MarkerModel, bone: Indices, prediction: tuple[Array, Array],
                  t_ns: int) -> None:
-        """Associates the frame with the hand as it is predicted for `t_ns`. `distances` (M,): squared Mahalanobis
-        distances of its markers from there."""
-        self._markers, self._bone = markers, bone
-        state, frame.markers = without_size(prediction[0]), sized(markers, bone, prediction[0])
-        frame.add_landmark_noise(state)
+        """Associates the frame with the hand as it is predicted for `t_ns`, master ns."""
+        self._markers, self._bone, self.frame = markers, bone, frame
+        frame.markers = sized(markers, bone, prediction[0])
+        frame.add_landmark_noise(without_size(prediction[0]))
         frame.late_s, frame.t_ns = np.where(frame.seen, frame.late_s + 1e-9 * (frame.t_ns - t_ns), 0.0), t_ns
-        covariance = without_size_covariance(prediction[1], lengths_jacobian(frame.markers.dh, bone, prediction[0]))
-        pixels, covariances = frame.predict_pixels(state, covariance)
-        self.distances = distances_of(frame, pixels, covariances)
-        self.frame = associate(frame, pixels, covariances, self.distances)
+        pixels, covariances = self._expected(*prediction)
+        self._reported = frame
+        self.frame = associate(frame, pixels, covariances, distances_of(frame, pixels, covariances))
+
+    def _expected(self, state: Array, covariance: Array) -> tuple[Array, Array]:
+        """See `MarkerFrame.predict_pixels`."""
+        self.frame.markers = sized(self._markers, self._bone, state)
+        lengths = lengths_jacobian(self.frame.markers.dh, self._bone, state)
+        return self.frame.predict_pixels(without_size(state), without_size_covariance(covariance, lengths))
+
+    def distances(self, state: Array, covariance: Array) -> Array:
+        """(M,) squared Mahalanobis distances of the markers that were reported from a hand in `state`."""
+        return distances_of(self._reported, *self._expected(state, covariance))
 
     def linearise(self, state: Array) -> Rows:
         """See `Residual`."""

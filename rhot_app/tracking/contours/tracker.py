@@ -36,7 +36,7 @@ from rhot_app.hand.motion.hand_process import BIAS
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, SeenContour, no_hand
-from rhot_app.tracking.contours.evidence import asked, matched, on_foreground, same_hand, seen_contour
+from rhot_app.tracking.contours.evidence import asked, cost_of, matched, on_foreground, same_hand, seen_contour
 from rhot_app.tracking.contours.finder import Finder, Maps
 from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.contours.states import published
@@ -364,8 +364,9 @@ class ContourEstimator:
             marked, hand, prediction, self._epoch_ns + round(1e9 * t_s))
         residuals: list[Residual] = [*found, Contours(contours), hand.limits]
         initial = prediction[0]
-        if found:  # contours are found where the markers show the hand
-            initial = update(hand.process, t_s, prediction, [*found, hand.limits], initial, hand.filter.partial).state
+        if found:  # the contours may be where the markers show the hand
+            marked_state = update(hand.process, t_s, prediction, [*found, hand.limits], None, hand.filter.partial).state
+            initial = min(initial, marked_state, key=lambda state: cost_of(hand.process, prediction, residuals, state))
         for number in range(PASSES):
             for contour, spread in zip(contours, spreads, strict=True):
                 contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)
