@@ -9,8 +9,8 @@ bare otherwise, and `landmarks`, what a detector reports of 21 joints with the m
 bones are off by 5 % and its radii by 8 %, before clutter, and the size is estimated.
 
 All start from the true pose of the hand at rest; with `--found`, from what they find themselves. Errors and consistency
-are of the moving hand: `in 3 sigma` is the part of the joints' errors within their stated 3 sigma. Searches beside the
-frames end before the next frame.
+are of the moving hand: `in 3 sigma` is the part of the joints' errors within their stated 3 sigma. `start s` is the time
+until the hand at rest is tracked. Searches beside the frames end before the next frame, so their time is not in it.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ def give_start(tracker: Tracker, pose: HandPose) -> None:
 
 
 def track(shown: Film, observe: str, case: str, start: HandPose | None) -> list[HandState | None]:
-    """The last state after every step of the moving hand."""
+    """The last state after every step, None while the hand is not tracked."""
     rig = msgspec.structs.replace(shown.rig, tracker=TrackerSettings(
         "estimator", observe=observe, float_scale=not case.endswith("-file")))
     tracker, states = make_tracker(rig), []
@@ -167,8 +167,7 @@ def track(shown: Film, observe: str, case: str, start: HandPose | None) -> list[
             for one in seen:
                 tracker.ingest(replace(one, t_row0_master_ns=t_ns, t_receive_ns=t_ns))
                 newest = tracker.solve() or newest
-        if number >= STILL:
-            states.append(newest if newest is not None and newest.tracked else None)
+        states.append(newest if newest is not None and newest.tracked else None)
     return states
 
 
@@ -178,9 +177,11 @@ def foreground_of(shown: Film) -> list[Foreground]:
 
 
 def figures(shown: Film, states: list[HandState | None]) -> dict[str, float]:
-    """Errors of the joints and angles of the tracked states."""
+    """Errors of the joints and angles of the tracked states of the moving hand, and when it was first tracked."""
     joints, angles, nees = [], [], []
-    for state in states:
+    begun = next((number for number, state in enumerate(states) if state is not None), np.nan)
+    moving = states[STILL:]
+    for state in moving:
         if state is None:
             continue
         pose = shown.poses[round((state.t_master_ns - FIRST_NS) / PERIOD_NS)]
@@ -189,12 +190,13 @@ def figures(shown: Film, states: list[HandState | None]) -> dict[str, float]:
         angles.append(float(np.mean(np.degrees(np.abs(state.angles - pose.angles)))))
         nees += [float(e @ np.linalg.solve(c + 1e-12 * np.eye(3), e))
                  for e, c in zip(error, state.joint_covariances, strict=True)]
-    tracked = len(joints) / len(states)
+    start_s = float(begun + 1) / FPS
     if not joints:
-        return {"joint mm": np.nan, "p95 mm": np.nan, "angle deg": np.nan, "in 3 sigma": np.nan, "tracked": 0.0}
+        return dict.fromkeys(("joint mm", "p95 mm", "angle deg", "in 3 sigma"), np.nan) | {
+            "tracked": 0.0, "start s": start_s}
     return {"joint mm": float(np.mean(joints)), "p95 mm": float(np.percentile(joints, 95)),
             "angle deg": float(np.mean(angles)), "in 3 sigma": float(np.mean(np.array(nees) < CHI2_3)),
-            "tracked": tracked}
+            "tracked": len(joints) / len(moving), "start s": start_s}
 
 
 def main() -> int:

@@ -351,11 +351,11 @@ class BareHandTracker:
         """How well the last images show the hand."""
         return Fit(np.array([np.zeros((GROUPS, 2)) if frame is None else frame.seen for frame in self.frames]))
 
-    def state(self, begun: float | None = None) -> HandState:
-        """The hand at the newest instant."""
+    def state(self, begun: float | None = None, covariance: Array | None = None) -> HandState:
+        """The hand at the newest instant; `covariance`: if it is less certain than the images say."""
         begun = time.perf_counter() if begun is None else begun
         knot = self.filter.newest
-        state, covariance = knot.state, knot.covariance
+        state, covariance = knot.state, knot.covariance if covariance is None else covariance
         points, covariances, motion = np.empty((26, 3)), np.empty((26, 3, 3)), np.empty((2, 21))
         place_joints(state, covariance, self.model.dh, self.surface.bone, points, covariances, motion)
         deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))

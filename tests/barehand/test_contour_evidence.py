@@ -12,7 +12,7 @@ from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.observations import EdgeFrame, SliceRequest
 from rhot_app.barehand.start import Found
 from rhot_app.barehand.surface import SHAPE, WHOLE
-from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.barehand.tracker import SAME_POSE_S, BareHandTracker
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.motion.hand_process import BIAS, MOTION
 from rhot_app.hand.skeleton import HandPose
@@ -55,6 +55,15 @@ def test_recorded_slices_that_the_hand_does_not_cross_say_nothing(hand: BareHand
     edges = find_edges(images[0], beside, skin_foreground(), 2.0)
     assert matched(hand, EdgeFrame(0, 0, 0, 0, 0.0, 0.0, SliceRequest(0, beside), edges), state_of(pose),
                    covariance) is None
+
+
+def test_phalanges_follow_the_contours_at_the_same_pace_beside_markers(hand: BareHandTracker) -> None:
+    hand.start(poses("grasp", (0.5,))[0], 0)
+    hand.take([0, 1], 0.0)
+    hand.take((), 0.1)
+    assert hand.filter.partial.share == 0.0, "their markers explain them, but do not move them"
+    hand.take([0, 1], 0.1)
+    assert hand.filter.partial.share == pytest.approx(0.1 / SAME_POSE_S)
 
 
 def test_a_search_that_ends_while_its_track_is_given_up_gives_no_pose(hand: BareHandTracker,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,9 +10,8 @@ from rhot_app.barehand.contours import SILHOUETTE, STEP_M, ContourPoints
 from rhot_app.barehand.joints import place_joints
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.barehand.tracker import BareHandTracker
-from rhot_app.estimation.residual import Residual, stack
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.motion.hand_process import MOTION, POSE, HandProcess
+from rhot_app.hand.motion.hand_process import MOTION
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.state import SeenContour
 from rhot_node.detect.edges import Edges
@@ -98,14 +95,6 @@ def same_hand(hand: BareHandTracker, state: Array, pose: HandPose) -> bool:
     ours_centre, theirs_centre = ours.mean(axis=0), theirs.mean(axis=0)
     shape = np.linalg.norm((ours - ours_centre) - (theirs - theirs_centre), axis=1)
     return bool(np.mean(shape) < CONFUSED_M and np.linalg.norm(ours_centre - theirs_centre) < APART_M)
-
-
-def cost_of(process: HandProcess, prediction: tuple[Array, Array], residuals: Sequence[Residual],
-            state: Array) -> float:
-    """-2 log of how probable a hand in `state` is by its pose's prediction and by the residuals, but for a constant."""
-    away = process.difference(state, prediction[0])[:POSE]
-    cost = stack([residual.linearise(state) for residual in residuals], process.size, weigh=True)[3]
-    return cost + float(away @ np.linalg.solve(prediction[1][:POSE, :POSE], away))
 
 
 def joints_of(hand: BareHandTracker, state: Array) -> Array:

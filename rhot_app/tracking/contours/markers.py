@@ -31,12 +31,12 @@ from rhot_app.hand.motion.hand_process import (
 )
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
-from rhot_app.tracking.association import MarkerAssociation
+from rhot_app.tracking.association import GATE, MarkerAssociation
 from rhot_app.tracking.markers.acquisition import Starter
 from rhot_app.tracking.markers.estimator import Rejections, associate, distances_of
 from rhot_app.tracking.markers.estimator_state import RecentObservations
 from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
-from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
+from rhot_app.tracking.markers.marker_residual import CENTROID_KERNEL, MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.tracker import CameraObservations
 
@@ -62,14 +62,16 @@ class MarkersOfHand:
             np.concatenate([hand.shape_s, lasting]))
         hand.process, hand.filter = self._process, IteratedFilter(self._process)
         self._bone, self._observations = hand.surface.bone, RecentObservations(arrays, self._markers)
-        self._rejections = Rejections(len(rig.nodes), self._markers)
+        self.reset()
 
     def reset(self) -> None:
         """Forget the frames."""
         self._starter.reset()
         self._association.reset()
         self._observations.reset()
-        self._rejections = Rejections(len(self._observations.newest), self._markers)
+        cameras = len(self._observations.newest)
+        self._rejections = Rejections(cameras, self._markers)
+        self._wrong: list[list[tuple[slice, float]]] = [[] for _ in range(cameras)]  # of each camera's last frame
 
     def locate(self, frame: CameraObservations) -> tuple[HandPose, int] | None:
         """The pose of a hand that the markers of the last frames show alone, and its time, master ns."""
@@ -96,7 +98,7 @@ class MarkersOfHand:
         prediction = hand.filter.predict(t_s)
         found = self.residuals([frame], hand, prediction, epoch_ns + round(1e9 * t_s))
         if found:
-            self.judge(found, hand.filter.add(t_s, [*found, hand.limits], prediction), hand)
+            self.judge(found, hand.filter.add(t_s, [*found, hand.limits], prediction))
         return bool(found)
 
     def residuals(self, frames: Sequence[CameraObservations], hand: BareHandTracker, prediction: tuple[Array, Array],
@@ -107,9 +109,8 @@ class MarkersOfHand:
         return [BesideContours(markers, self._markers, hand.surface.bone, prediction, t_ns) for markers in
                 (MarkerFrame(self._markers, frame) for frame in frames) if markers.seen.any()]
 
-    def judge(self, found: list[BesideContours], knot: Knot, hand: BareHandTracker) -> None:
-        """A knot has weighed `found`, its first residuals. What a camera rejects time and again makes its finger or the
-        palm uncertain."""
+    def judge(self, found: list[BesideContours], knot: Knot) -> None:
+        """A knot has weighed `found`, its first residuals."""
         first = 0
         for one in found:
             frame, state = one.frame, without_size(knot.state)
@@ -117,9 +118,18 @@ class MarkersOfHand:
             self._observations.enter(frame)
             inliers = self._observations.accept(frame, state, knot.weights[first:])
             first += int(np.count_nonzero(frame.seen & np.isfinite(frame.expected(state)[:, 0])))
-            if self._rejections.inflate(frame, inliers, distances, self._process, knot.covariance,
-                                        self._observations.periods_s[frame.camera]):
-                hand.filter.start(knot.t_s, knot.state, knot.covariance)
+            self._wrong[frame.camera] = self._rejections.wrong(frame, inliers, distances,
+                                                               self._observations.periods_s[frame.camera])
+
+    def widened(self, covariance: Array) -> Array | None:
+        """The covariance of a hand whose markers may be right where they contradict it; None while none does."""
+        wrong = [one for each in self._wrong for one in each]
+        if not wrong:
+            return None
+        covariance = covariance.copy()
+        for part, factor in wrong:
+            self._process.inflate(covariance, part, factor)
+        return covariance
 
     def _note(self, hand: BareHandTracker, state: Array) -> None:
         m = sized(self._markers, hand.surface.bone, state)
@@ -153,6 +163,16 @@ class BesideContours:
     def distances(self, state: Array, covariance: Array) -> Array:
         """(M,) squared Mahalanobis distances of the markers that were reported from a hand in `state`."""
         return distances_of(self._reported, *self._expected(state, covariance))
+
+    def cost(self, state: Array) -> float:
+        """-2 log of how probable a hand in `state` makes the markers that were reported; one that is none of its costs
+        GATE, as in `association.assign`."""
+        rows = self.linearise(state)
+        assert rows.first is not None
+        squared = np.add.reduceat(rows.error**2, rows.first) if len(rows.error) else np.empty(0)
+        degrees = CENTROID_KERNEL.parameter
+        own = np.minimum((degrees + 2.0) * np.log1p(squared / degrees), GATE)
+        return float(own.sum()) + GATE * (np.count_nonzero(self._reported.seen) - len(own))
 
     def linearise(self, state: Array) -> Rows:
         """See `Residual`."""

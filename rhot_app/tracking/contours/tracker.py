@@ -32,19 +32,20 @@ from rhot_app.barehand.tracker import (
 )
 from rhot_app.estimation.filter import update
 from rhot_app.estimation.residual import Residual
-from rhot_app.hand.motion.hand_process import BIAS
+from rhot_app.hand.motion.hand_process import BIAS, POSE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, SeenContour, no_hand
-from rhot_app.tracking.contours.evidence import asked, cost_of, matched, on_foreground, same_hand, seen_contour
+from rhot_app.tracking.contours.evidence import asked, matched, on_foreground, same_hand, seen_contour
 from rhot_app.tracking.contours.finder import Finder, Maps
-from rhot_app.tracking.contours.markers import MarkersOfHand
+from rhot_app.tracking.contours.markers import BesideContours, MarkersOfHand
 from rhot_app.tracking.contours.states import published
 from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.slices import SLICES_MAX
 
 Array = NDArray[np.float64]
+Estimate = tuple[Array, Array]
 
 MOST = 0.5
 """Part above which more speaks for a hand than against it: of the contour that is found, of joints on foreground."""
@@ -109,7 +110,7 @@ class ContourEstimator:
         self._marked: list[CameraObservations] = []
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._epoch_ns = self._seen_ns = 0
-        self._judged_ns = _NEVER
+        self._judged_ns = self._agreed_ns = _NEVER
         self._tracking = self._confirmed = self._ever = False
         self._latest: CameraObservations | EdgeFrame | None = None
 
@@ -264,7 +265,11 @@ class ContourEstimator:
         self._cover(maps)
 
     def _confirm(self, maps: Maps) -> None:
-        """Have the hand looked for once more: two random searches agree on a wrong hand less often than one errs."""
+        """Have the hand looked for once more: two random searches agree on a wrong hand less often than one errs.
+        Markers that show the same hand are as good."""
+        if maps.t_ns - self._agreed_ns < _SAME_NS:
+            self._confirmed = self._ever = True
+            return
         found = self._finder.found()
         if found is None:
             self._finder.look(maps)
@@ -326,7 +331,7 @@ class ContourEstimator:
         self._finder.reset()
         if self._markers is not None:
             self._markers.begin(self._hand)
-        self._epoch_ns, self._seen_ns = t_ns, t_ns
+        self._epoch_ns, self._seen_ns, self._agreed_ns, self._marked = t_ns, t_ns, _NEVER, []
         self._tracking, self._confirmed = True, False
         for number, camera in enumerate(self._cameras):
             camera.shows = camera.supported = False
@@ -360,13 +365,11 @@ class ContourEstimator:
         marked = self._marked_with(waiting)
         hand.take(waiting, t_s)
         prediction, spreads = hand.filter.predict(t_s), [contour.expected_sd for contour in contours]
-        found = [] if self._markers is None else self._markers.residuals(
-            marked, hand, prediction, self._epoch_ns + round(1e9 * t_s))
-        residuals: list[Residual] = [*found, Contours(contours), hand.limits]
+        found: list[BesideContours] = []
         initial = prediction[0]
-        if found:  # the contours may be where the markers show the hand
-            marked_state = update(hand.process, t_s, prediction, [*found, hand.limits], None, hand.filter.partial).state
-            initial = min(initial, marked_state, key=lambda state: cost_of(hand.process, prediction, residuals, state))
+        if self._markers is not None:
+            prediction, found, initial = self._choose(self._markers, marked, Contours(contours), prediction, t_s)
+        residuals: list[Residual] = [*found, Contours(contours), hand.limits]
         for number in range(PASSES):
             for contour, spread in zip(contours, spreads, strict=True):
                 contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)
@@ -374,25 +377,60 @@ class ContourEstimator:
                 initial = update(hand.process, t_s, prediction, residuals, initial, hand.filter.partial).state
         knot = hand.filter.add(t_s, residuals, prediction, initial)
         if self._markers is not None:
-            self._markers.judge(found, knot, hand)
+            self._markers.judge(found, knot)
+
+    def _choose(self, markers: MarkersOfHand, marked: list[CameraObservations], contours: Contours, predicted: Estimate,
+                t_s: float) -> tuple[Estimate, list[BesideContours], Array]:
+        """Where the contours of a hand that is `predicted` are looked for, and what its markers say: where the
+        prediction has it, where the markers show it, or where they would if it were less certain, whichever explains
+        contours and markers best."""
+        hand, t_ns = self._hand, self._epoch_ns + round(1e9 * t_s)
+        found = markers.residuals(marked, hand, predicted, t_ns)
+        if not found:
+            return predicted, found, predicted[0]
+        choices = [(0.0, predicted, found, predicted[0]), (0.0, predicted, found, None)]
+        wide = markers.widened(predicted[1])
+        if wide is not None:
+            less = predicted[0], wide
+            choices.append((2.0 * RELOCATION_LOG_ODDS, less, markers.residuals(marked, hand, less, t_ns), None))
+        best, chosen = np.inf, (predicted, found, predicted[0])
+        for cost, prior, own, state in choices:
+            if state is None:
+                state = update(hand.process, t_s, prior, [*own, hand.limits], None, hand.filter.partial).state
+            away = hand.process.difference(state, prior[0])[:POSE]
+            cost += float(away @ np.linalg.solve(prior[1][:POSE, :POSE], away)) + sum(one.cost(state) for one in own)
+            cost += float(np.sum(contours.linearise(state).error ** 2))
+            if cost < best:
+                best, chosen = cost, (prior, own, state)
+        return chosen
 
     def _take_markers(self, frame: CameraObservations) -> bool:
         """Begin with one frame's markers, or keep them until the edges of the same frame come, so that both are weighed
         at once; weigh those alone whose edges do not come. Whether these showed anything."""
         assert self._markers is not None
-        if self._tracking:
-            frames = [*self._marked, frame]
-            self._marked = [one for one in frames if self._comes(one)]
-            try:
-                return self._weigh_alone([one for one in frames if not self._comes(one)])
-            except np.linalg.LinAlgError:  # the estimate contradicts itself
-                self._give_up()
-                return False
+        if not (self._tracking and self._confirmed):
+            self._locate(frame)
+        if not self._tracking:
+            return False
+        frames = [*self._marked, frame]
+        self._marked = [one for one in frames if self._comes(one)]
+        try:
+            return self._weigh_alone([one for one in frames if not self._comes(one)])
+        except np.linalg.LinAlgError:  # the estimate contradicts itself
+            self._give_up()
+            return False
+
+    def _locate(self, frame: CameraObservations) -> None:
+        """Begin where the markers show a hand, or see whether they show the one that is followed."""
+        assert self._markers is not None
         found = self._markers.locate(frame)
         if found is None:
-            return False
-        self._start(*found)
-        return True
+            return
+        pose, t_ns = found
+        if self._tracking and same_hand(self._hand, self._hand.filter.newest.state, pose):
+            self._agreed_ns = t_ns
+        else:
+            self._start(pose, t_ns)
 
     def _comes(self, frame: CameraObservations) -> bool:
         """Whether the edges of a frame may still come."""
@@ -459,7 +497,9 @@ class ContourEstimator:
         return self._epoch_ns + round(1e9 * self._hand.filter.newest.t_s)
 
     def _state(self, frame: CameraObservations | EdgeFrame, begun: float) -> HandState:
-        hand = self._hand.state(begun) if self._tracking and self._confirmed else no_hand(
+        wide = None if self._markers is None or not self._tracking else self._markers.widened(
+            self._hand.filter.newest.covariance)
+        hand = self._hand.state(begun, wide) if self._tracking and self._confirmed else no_hand(
             frame.t_row0_master_ns, Condition.LOST if self._ever else Condition.SEARCHING)
         return published(hand, self._sequence - 1, frame, self.newest_frames(), self._rig.markers.ids, self._names,
                          time.perf_counter() - begun)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rhot_app.estimation.filter import IteratedFilter
 from rhot_app.hand.landmarks import LASTING_M, LASTING_S
-from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY, HandProcess
+from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState
@@ -185,8 +185,10 @@ class Estimator:
             return
         inliers = self._observations.accept(frame, knot.state, knot.weights)
         self._weighed(frame)
-        if self._rejections.inflate(frame, inliers, distances, self._process, knot.covariance,
-                                    self._observations.periods_s[frame.camera]):
+        wrong = self._rejections.wrong(frame, inliers, distances, self._observations.periods_s[frame.camera])
+        for part, factor in wrong:
+            self._process.inflate(knot.covariance, part, factor)
+        if wrong:
             self._filter.start(knot.t_s, knot.state, knot.covariance)  # so that no late frame undoes it
         accepted = np.count_nonzero(inliers)
         if accepted:
@@ -210,24 +212,23 @@ class Rejections:
     def __init__(self, cameras: int, markers: MarkerModel) -> None:
         self._markers, self._counts = markers, np.zeros((cameras, len(markers.finger)), np.int64)
 
-    def inflate(self, frame: MarkerFrame, accepted: Mask, distances: Array, process: HandProcess, covariance: Array,
-                period_s: float) -> bool:
-        """Inflate the covariance of a finger, or of the palm, whose marker one camera rejects REJECTIONS times in
-        a row: outliers do not last. All rejections of a landmark within the correlation time of its error count as one.
-        `distances` (M,): squared Mahalanobis distances, 2 on average. `period_s`: between the camera's frames. Returns
-        whether anything was inflated."""
+    def wrong(self, frame: MarkerFrame, accepted: Mask, distances: Array, period_s: float) -> list[tuple[slice, float]]:
+        """The fingers, and the palm, whose marker one camera has rejected REJECTIONS times in a row: outliers do not
+        last. All rejections of a landmark within the correlation time of its error count as one. `distances` (M,):
+        squared Mahalanobis distances, 2 on average. `period_s`: between the camera's frames. Returns where they are in
+        a pose, and the factors by which their covariance is too small."""
         rejected, observations = self._counts[frame.camera], frame.observations
         reported = ((observations.flags & int(MarkerFlag.LOST)) == 0) & np.isfinite(observations.pixels[:, 0])
         rejected[accepted] = 0
         rejected[reported & ~accepted] += 1
         enough = REJECTIONS * np.where(self._markers.landmark, max(LASTING_S / period_s, 1.0), 1.0)
-        wrong = np.flatnonzero((rejected >= enough) & (distances > GATE))
-        for m in wrong:
+        found = []
+        for m in np.flatnonzero((rejected >= enough) & (distances > GATE)):
             finger = self._markers.finger[m]
             angles = ANGLE_SLICES[finger]
-            chosen = slice(6 + angles.start, 6 + angles.stop) if finger >= 0 else slice(0, 6)
-            process.inflate(covariance, chosen, 0.5 * distances[m])
-        return len(wrong) > 0
+            found.append((slice(6 + angles.start, 6 + angles.stop) if finger >= 0 else slice(0, 6),
+                          0.5 * float(distances[m])))
+        return found
 
 
 def associate(frame: MarkerFrame, pixels: Array, covariances: Array, distances: Array) -> MarkerFrame:
