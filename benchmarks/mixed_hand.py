@@ -9,8 +9,9 @@ bare otherwise, and `landmarks`, what a detector reports of 21 joints with the m
 bones are off by 5 % and its radii by 8 %, before clutter, and the size is estimated.
 
 All start from the true pose of the hand at rest; with `--found`, from what they find themselves. Errors and consistency
-are of the moving hand: `in 3 sigma` is the part of the joints' errors within their stated 3 sigma. `start s` is the time
-until the hand at rest is tracked. Searches beside the frames end before the next frame, so their time is not in it.
+are of the moving hand: `in 3 sigma` is the part of the joints' errors within their stated 3 sigma. `start s` is the
+time until the hand at rest is tracked. Searches beside the frames end before the next frame, so their time is not in
+it.
 """
 
 from __future__ import annotations

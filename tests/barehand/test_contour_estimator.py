@@ -131,7 +131,7 @@ def until_tracked(nodes: SearchedNodes, film: list[tuple[list, list, list]], num
 
 def test_landmarks_begin_and_contours_go_on_and_landmarks_find_it_again(film, monkeypatch) -> None:
     monkeypatch.setattr(Finder, "found", lambda _: None)  # no search is as quick
-    rig = bare_rig(film[0][0], "both", "landmarks21")
+    rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
     nodes = SearchedNodes(make_tracker(rig), known(film), 21)
     number = until_tracked(nodes, film, 0, 0)
     for _, images, _ in film:
@@ -179,6 +179,8 @@ def test_a_fingertip_that_contradicts_the_contours_makes_its_finger_uncertain(fi
     (lambda rig: with_tracker(rig, "classic"), ""),
     (lambda rig: msgspec.structs.replace(rig, depth=msgspec.structs.replace(rig.depth, mode="disparity")),
      "needs calibrated cameras"),
+    (lambda rig: msgspec.structs.replace(rig, tracker=TrackerSettings("estimator", observe="landmarks_and_contours")),
+     "RHOT six.*has none. Give the rig a set with landmarks"),
 ])
 def test_what_cannot_be_is_a_sentence(film, change: Callable[[Rig], Rig], sentence: str) -> None:
     rig = change(bare_rig(film[0][0]))

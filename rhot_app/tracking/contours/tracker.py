@@ -91,7 +91,7 @@ class ContourEstimator:
         """Raises RigError when markers are observed and one has no place on the hand."""
         self._rig = rig
         self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale)
-        self._markers = MarkersOfHand(rig, self._hand) if rig.tracker.observe == "both" else None
+        self._markers = MarkersOfHand(rig, self._hand) if rig.tracker.observe != "contours" else None
         self._finder = Finder(self._hand)
         self._names = tuple(node.name for node in rig.nodes)
         self._sequence = 0
