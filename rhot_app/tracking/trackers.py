@@ -111,8 +111,7 @@ def make_tracker(rig: Rig) -> Tracker:
 
 
 def require_estimator(rig: Rig) -> None:
-    """Raises RigError when the estimator cannot work with the rig's cameras or nodes, or its markers are others than are
-    to be observed."""
+    """Raises RigError when the estimator cannot work with the rig's cameras or nodes, or lacks landmarks."""
     obstacle = estimator_obstacle(rig) or observation_obstacle(rig)
     if obstacle is not None:
         raise RigError(f"rig {rig.name!r}: {obstacle.why} {obstacle.remedy}")

@@ -8,13 +8,13 @@ import msgspec
 import numpy as np
 import pytest
 from bare_scenes import model_and_surface, poses, rig_of, right_hand, scene
-from searched_nodes import PERIOD_NS, SearchedNodes
+from searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
 
 from rhot_app.errors import RigError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
-from rhot_app.hand.skeleton import JOINTS, HandPose
+from rhot_app.hand.skeleton import FLEXIONS, JOINTS, HandPose
 from rhot_app.project import Rig, TrackerSettings, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.contours.finder import Finder
@@ -143,6 +143,27 @@ def test_landmarks_begin_and_contours_go_on_and_landmarks_find_it_again(film, mo
         number += 1
     assert nodes.states[-1].condition is Condition.LOST
     until_tracked(nodes, film, number, 5)
+
+
+def test_landmarks_mend_a_finger_that_is_taken_for_its_neighbour(film, monkeypatch) -> None:
+    pose = poses("grasp", TIMES)[0]
+    curled = pose.angles.copy()
+    curled[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
+    rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
+    nodes, number = SearchedNodes(make_tracker(rig), known(film), 21), 0
+    with monkeypatch.context() as patched:
+        patched.setattr(Finder, "found", lambda _: (HandPose(pose.world_from_palm, curled), FIRST_NS))
+        while not nodes.states or not nodes.states[-1].tracked:
+            assert number < 20
+            nodes.step(number, film[0][1])
+            number += 1
+    tip = forward(model_and_surface()[0], pose).joints[INDEX_TIP]
+    assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) > 0.02, "it is wrong"
+    for _ in range(30):
+        nodes.step(number, film[0][1], landmarks(film, pose))
+        number += 1
+        assert nodes.states[-1].tracked
+    assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.003
 
 
 def test_a_fingertip_that_contradicts_the_contours_makes_its_finger_uncertain(film) -> None:

@@ -36,7 +36,7 @@ from rhot_app.tracking.markers.acquisition import Starter
 from rhot_app.tracking.markers.estimator import Rejections, associate, distances_of
 from rhot_app.tracking.markers.estimator_state import RecentObservations
 from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
-from rhot_app.tracking.markers.marker_residual import CENTROID_KERNEL, MarkerFrame, triangulation_covariance
+from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.tracker import CameraObservations
 
@@ -114,22 +114,24 @@ class MarkersOfHand:
         first = 0
         for one in found:
             frame, state = one.frame, without_size(knot.state)
-            distances = one.distances(knot.state, knot.covariance)
+            distances = one.distances(knot.state, with_errors_of(self._process.stationary, knot.covariance))
             self._observations.enter(frame)
             inliers = self._observations.accept(frame, state, knot.weights[first:])
+            inliers &= distances < GATE  # what lasting errors explain may be no such error
             first += int(np.count_nonzero(frame.seen & np.isfinite(frame.expected(state)[:, 0])))
             self._wrong[frame.camera] = self._rejections.wrong(frame, inliers, distances,
                                                                self._observations.periods_s[frame.camera])
 
-    def widened(self, covariance: Array) -> Array | None:
-        """The covariance of a hand whose markers may be right where they contradict it; None while none does."""
+    def widened(self, state: Array, covariance: Array) -> tuple[Array, Array] | None:
+        """The hand, less certain where its markers contradict it and with lasting errors that are not known, as the
+        markers may be right; None while none does."""
         wrong = [one for each in self._wrong for one in each]
         if not wrong:
             return None
-        covariance = covariance.copy()
+        covariance = with_errors_of(self._process.stationary, covariance)
         for part, factor in wrong:
             self._process.inflate(covariance, part, factor)
-        return covariance
+        return without_errors(state), covariance
 
     def _note(self, hand: BareHandTracker, state: Array) -> None:
         m = sized(self._markers, hand.surface.bone, state)
@@ -161,18 +163,16 @@ class BesideContours:
         return self.frame.predict_pixels(without_size(state), without_size_covariance(covariance, lengths))
 
     def distances(self, state: Array, covariance: Array) -> Array:
-        """(M,) squared Mahalanobis distances of the markers that were reported from a hand in `state`."""
-        return distances_of(self._reported, *self._expected(state, covariance))
+        """(M,) squared Mahalanobis distances of the markers that were reported from a hand in `state`, whose lasting
+        errors are not known."""
+        return distances_of(self._reported, *self._expected(without_errors(state), covariance))
 
-    def cost(self, state: Array) -> float:
+    def cost(self, state: Array, stationary: Array) -> float:
         """-2 log of how probable a hand in `state` makes the markers that were reported; one that is none of its costs
-        GATE, as in `association.assign`."""
-        rows = self.linearise(state)
-        assert rows.first is not None
-        squared = np.add.reduceat(rows.error**2, rows.first) if len(rows.error) else np.empty(0)
-        degrees = CENTROID_KERNEL.parameter
-        own = np.minimum((degrees + 2.0) * np.log1p(squared / degrees), GATE)
-        return float(own.sum()) + GATE * (np.count_nonzero(self._reported.seen) - len(own))
+        GATE, as in `association.assign`. `stationary`: the process's covariance, of which that of the lasting errors
+        counts."""
+        distances = self.distances(state, with_errors_of(stationary, np.zeros_like(stationary)))
+        return float(np.minimum(distances[self._reported.seen], GATE).sum())
 
     def linearise(self, state: Array) -> Rows:
         """See `Residual`."""
@@ -210,6 +210,19 @@ def without_size_covariance(covariance: Array, lengths: Array) -> Array:
     to[:MOTION, :MOTION], to[MOTION:, MOTION + SHAPE:] = np.eye(MOTION), np.eye(size - SHAPE - MOTION)
     to[MOTION:, MOTION + LENGTHS] = lengths
     return np.asarray(to @ covariance @ to.T)
+
+
+def without_errors(state: Array) -> Array:
+    """The state with lasting errors of 0."""
+    return np.concatenate([state[:BIAS + SHAPE], np.zeros(len(state) - BIAS - SHAPE)])
+
+
+def with_errors_of(stationary: Array, covariance: Array) -> Array:
+    """The covariance with lasting errors as the `stationary` process has them."""
+    out, own = covariance.copy(), slice(MOTION + SHAPE, None)
+    out[own], out[:, own] = 0.0, 0.0
+    out[own, own] = stationary[own, own]
+    return out
 
 
 def without_size(state: Array) -> Array:

@@ -381,28 +381,22 @@ class ContourEstimator:
 
     def _choose(self, markers: MarkersOfHand, marked: list[CameraObservations], contours: Contours, predicted: Estimate,
                 t_s: float) -> tuple[Estimate, list[BesideContours], Array]:
-        """Where the contours of a hand that is `predicted` are looked for, and what its markers say: where the
-        prediction has it, where the markers show it, or where they would if it were less certain, whichever explains
-        contours and markers best."""
+        """The prediction, what the markers say of it, and where the contours are looked for: where it has the hand, or,
+        after markers have contradicted it, where these would show a less certain hand, whichever explains both best."""
         hand, t_ns = self._hand, self._epoch_ns + round(1e9 * t_s)
-        found = markers.residuals(marked, hand, predicted, t_ns)
-        if not found:
+        found, wide = markers.residuals(marked, hand, predicted, t_ns), markers.widened(*predicted)
+        if not found or wide is None:
             return predicted, found, predicted[0]
-        choices = [(0.0, predicted, found, predicted[0]), (0.0, predicted, found, None)]
-        wide = markers.widened(predicted[1])
-        if wide is not None:
-            less = predicted[0], wide
-            choices.append((2.0 * RELOCATION_LOG_ODDS, less, markers.residuals(marked, hand, less, t_ns), None))
-        best, chosen = np.inf, (predicted, found, predicted[0])
-        for cost, prior, own, state in choices:
-            if state is None:
-                state = update(hand.process, t_s, prior, [*own, hand.limits], None, hand.filter.partial).state
-            away = hand.process.difference(state, prior[0])[:POSE]
-            cost += float(away @ np.linalg.solve(prior[1][:POSE, :POSE], away)) + sum(one.cost(state) for one in own)
-            cost += float(np.sum(contours.linearise(state).error ** 2))
-            if cost < best:
-                best, chosen = cost, (prior, own, state)
-        return chosen
+        again, stationary = markers.residuals(marked, hand, wide, t_ns), hand.process.stationary
+        residuals: list[Residual] = [*again, hand.limits]
+        state = update(hand.process, t_s, wide, residuals, None, hand.filter.partial).state
+        state = update(hand.process, t_s, wide, [*residuals, contours], state, hand.filter.partial).state
+        away = hand.process.difference(state, predicted[0])[:POSE]
+        cost = (2.0 * RELOCATION_LOG_ODDS + float(away @ np.linalg.solve(wide[1][:POSE, :POSE], away))
+                + _cost(again, contours, state, stationary))
+        if cost < _cost(found, contours, predicted[0], stationary):
+            return wide, again, state
+        return predicted, found, predicted[0]
 
     def _take_markers(self, frame: CameraObservations) -> bool:
         """Begin with one frame's markers, or keep them until the edges of the same frame come, so that both are weighed
@@ -497,12 +491,18 @@ class ContourEstimator:
         return self._epoch_ns + round(1e9 * self._hand.filter.newest.t_s)
 
     def _state(self, frame: CameraObservations | EdgeFrame, begun: float) -> HandState:
-        wide = None if self._markers is None or not self._tracking else self._markers.widened(
-            self._hand.filter.newest.covariance)
-        hand = self._hand.state(begun, wide) if self._tracking and self._confirmed else no_hand(
+        newest = self._hand.filter.newest if self._tracking else None
+        wide = self._markers.widened(newest.state, newest.covariance) if self._markers and newest else None
+        hand = self._hand.state(begun, wide and wide[1]) if self._tracking and self._confirmed else no_hand(
             frame.t_row0_master_ns, Condition.LOST if self._ever else Condition.SEARCHING)
         return published(hand, self._sequence - 1, frame, self.newest_frames(), self._rig.markers.ids, self._names,
                          time.perf_counter() - begun)
+
+
+def _cost(markers: list[BesideContours], contours: Contours, state: Array, stationary: Array) -> float:
+    """-2 log of how probable a hand in `state` makes its markers and contours, but for a constant."""
+    cost = float(np.sum(contours.linearise(state).error ** 2))
+    return cost + sum(one.cost(state, stationary) for one in markers)
 
 
 def _middle_ns(frame: EdgeFrame) -> int:

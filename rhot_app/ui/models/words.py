@@ -223,8 +223,8 @@ LIMITS: Final = {
 }
 OBSERVED: Final = {
     "markers": ("Paint", "The painted markers of the rig's marker set."),
-    "landmarks": ("Landmarks", "The joints that a detector finds on a bare hand, in the nodes or in another program. The "
-                  "rig's marker set is landmarks21 or another one with landmarks."),
+    "landmarks": ("Landmarks", "The joints that a detector finds on a bare hand, in the nodes or in another program. "
+                  "The rig's marker set is landmarks21 or another one with landmarks."),
     "contours": ("Contours", "No markers: the nodes search their pictures for the bare hand's edges. Calibrate, "
                  "Background and skin comes first; then hold the hand still, fingers spread, until it is found."),
     "both": ("Paint and contours", "The hand's edges beside its painted markers, such as two fingertips. Calibrate, "
