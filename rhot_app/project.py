@@ -363,8 +363,8 @@ def estimator_obstacle(rig: Rig) -> Obstacle | None:
 
 
 def observation_obstacle(rig: Rig) -> Obstacle | None:
-    """Why the rig's marker set does not fit what its tracker is to observe, None when it does. Painted markers may be
-    landmarks, as in old files."""
+    """Why the rig's marker set does not fit what its tracker is to observe, None when it does. Where paint is to be
+    observed, landmarks of the set are, too, as in old files."""
     if rig.tracker.landmarks and not any(marker.shape == "landmark" for marker in rig.markers.markers):
         return Obstacle(f"Landmarks are to be tracked, and the rig's marker set ({rig.markers.name or 'no name'}) has "
                         "none.", "Give the rig a set with landmarks, such as resources/markers/landmarks21.json, or "
