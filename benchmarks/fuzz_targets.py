@@ -8,37 +8,52 @@ from typing import Protocol
 import msgspec
 import numpy as np
 
+from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.node_link import PENDING_MAX, NodeLink
 from rhot_app.sources.validation import OLDEST_FRAME_NS
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings
+from rhot_node.detect.edges import MOST, find_edges
+from rhot_node.detect.foreground import no_foreground
 from rhot_node.errors import WireError
+from rhot_node.foreground_store import ForegroundStore
 from rhot_node.network.link import UdpLink
 from rhot_node.network.presence import Presence
 from rhot_node.network.session import Link, LinkKeys, Sessions
+from rhot_node.slice_search import SliceSearch
 from rhot_node.wire.codec import Seal, encode
+from rhot_node.wire.edges import pack_edges
+from rhot_node.wire.foreground_map import pack_map
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
     Find,
+    ForegroundPart,
     MarkerFlag,
     MarkerObservation,
     Message,
     NodeState,
     Observations,
+    SliceEdges,
+    Slices,
     Start,
     StartEntry,
     Stop,
     TrustState,
 )
+from rhot_node.wire.slices import SLICES_MAX, pack_slices
 
 NOW_NS = 5 * 10**12
 SLACK_NS = 5_000_000
 SESSION = 1 << 40
 KEY = bytes(range(32))
 RIG = synthetic_rig()
+MAP_STEP = 8
+SLICES = np.array([[x, 240.0, 0.0, 1.0, 9.0] for x in np.linspace(20.0, 600.0, 40)])
+SEARCHED = 64
+"""So many requests are taken for one that is searched, which takes as long as all of these."""
 
 
 class WronglyTakenError(Exception):
@@ -114,8 +129,10 @@ class Door:
     def feed(self, data: bytes) -> bool:
         """Through the door and into arrays, as in the receiver."""
         frame = self._link.door.admit(data, NOW_NS)
-        if frame is not None:
+        if isinstance(frame, CameraObservations):
             check_frame(frame)
+        elif frame is not None:
+            check_search(frame)
         return frame is not None
 
     def refused(self) -> dict[str, int]:
@@ -137,6 +154,45 @@ def check_frame(frame: CameraObservations) -> None:
              and NOW_NS - OLDEST_FRAME_NS <= frame.t_row0_master_ns <= NOW_NS + SLACK_NS)
     if not sound:
         raise WronglyTakenError(f"an implausible frame was taken: {frame}")
+
+
+class Searches(Door):
+    """A master's data port, for the edges and foreground maps that a node was asked for."""
+
+    name = "searches"
+
+    def renew(self) -> None:
+        """Another session, and a request in it."""
+        super().renew()
+        request, = self._link.door.searches.ask(SliceRequest(0, SLICES, MAP_STEP), 1, self._session, (640, 480))
+        self._request, self._frame = request.request, 0
+
+    def genuine(self) -> list[bytes]:
+        """The edges and the map of the node's next frame."""
+        self._sequence += 1
+        self._frame += 1
+        head = (1, self._session, self._sequence, NOW_NS - 9_000_000, NOW_NS - 200_000, 10**6, 10**6, 10**4, 640, 480,
+                self._frame, self._request)
+        edges = pack_edges(np.arange(len(SLICES)), np.tile([1.5, 0.2, -9.0, 0.9, 0.1], (len(SLICES), 1)))
+        shown = pack_map(np.linspace(0.0, 1.0, 4800, dtype=np.float32).reshape(60, 80))
+        return [encode(SliceEdges(*head, len(SLICES), 0, 1, edges), self.seal),
+                encode(ForegroundPart(*head, MAP_STEP, 0, 1, shown), self.seal)]
+
+
+def check_search(frame: EdgeFrame | ForegroundFrame) -> None:
+    """The oracle: a camera of 640 x 480 px could have answered so."""
+    sound = NOW_NS - OLDEST_FRAME_NS <= frame.t_row0_master_ns <= NOW_NS + SLACK_NS
+    if isinstance(frame, ForegroundFrame):
+        shown = frame.probability
+        sound &= (shown.shape == (480 // frame.step, 640 // frame.step) and bool(np.isfinite(shown).all())
+                  and bool(((shown >= 0.0) & (shown <= 1.0)).all()))
+    else:
+        edges, valid = frame.edges, np.arange(MOST) < frame.edges.number[:, None]
+        sound &= (len(edges.number) == len(SLICES) and bool((edges.number <= MOST).all())
+                  and all(bool(np.isfinite(one).all()) for one in edges[1:]) and bool((edges.sd[valid] > 0.0).all())
+                  and all(bool(((one >= 0.0) & (one <= 1.0)).all()) for one in (edges.inside, edges.outside)))
+    if not sound:
+        raise WronglyTakenError(f"an implausible answer was taken: {frame}")
 
 
 class Replies:
@@ -208,6 +264,9 @@ class NodeSide:
         self._keys, self._sessions = CountedKeys(), Sessions()
         self._udp = UdpLink(settings, NodeClock(), self._sessions, 7, lambda: NodeState.READY, self._keys)
         self._udp.introduce = lambda: Presence(1, 7, "left", 1, 2, 3, 4, TrustState.PAIRED)
+        self._search = SliceSearch(1, NodeClock(), ForegroundStore(None))
+        self._udp.take_slices = self._search.take
+        self._image, self._searched = np.zeros((480, 640, 3), np.uint8), 0
         self._session = SESSION
         self.renew()
 
@@ -223,6 +282,8 @@ class NodeSide:
         messages: list[Message] = [
             ClockRequest(1, self._session, self._sequence, NOW_NS),
             Start(self._session, self._sequence, (StartEntry(1, 50_001, 0), StartEntry(2, 50_002, 0))),
+            Slices(1, self._session, self._sequence, self._sequence, 640, 480, len(SLICES), 0, 1, MAP_STEP,
+                   pack_slices(SLICES)),
             Stop(self._session, self._sequence)]
         return [encode(message, self.seal) for message in messages]
 
@@ -237,7 +298,17 @@ class NodeSide:
         stream = self._sessions.current
         if stream is not None and (stream.address[0] != self._sender[0] or not 1 <= stream.address[1] <= 65535):
             raise WronglyTakenError(f"the node streams to {stream}")
+        if self._search.requests >= self._searched + SEARCHED:
+            self._search_image()
         return self._keys.taken > before
+
+    def _search_image(self) -> None:
+        """As the search's thread does it with the request that was taken last."""
+        self._searched, order = self._search.requests, self._search._order
+        assert order is not None
+        edges = find_edges(self._image, order.slices, no_foreground(), 1.0)
+        if len(order.slices) > SLICES_MAX or edges.number.any():
+            raise WronglyTakenError(f"edges in a black picture, or too many slices: {len(order.slices)}")
 
     def refused(self) -> dict[str, int]:
         """The link's own count."""

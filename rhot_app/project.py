@@ -141,8 +141,10 @@ IkMethod = Literal["fabrik", "transpose", "pseudo_inverse", "svd", "dls", "newto
 towards the pose prior that allows for the noise of the target. The others meet the target exactly."""
 
 
-Observe = Literal["markers", "contours", "both"]
-"""What the estimator observes of the hand: markers (landmarks are markers, too), the bare hand's contours, or both."""
+Observe = Literal["markers", "landmarks", "contours", "both", "landmarks_and_contours"]
+"""What the estimator observes of the hand: painted markers, landmarks, the bare hand's contours, or two of these;
+`both` is paint and contours. Files from before there was a word for landmarks have `markers` and `both` for them, too.
+"""
 
 
 class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -151,8 +153,8 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `kind`: `classic` is the thesis's (pair, triangulate, 1-euro, palm fit, inverse kinematics by `ik`); `estimator`
     estimates one hand from every image position. The other fields are the estimator's.
     `variant`: `full` (27 degrees of freedom) or `coupled` (DIP = 2/3 PIP and no abduction of the middle finger, RHOT
-    2.2 to 2.4). `float_scale`: estimate the hand's size as it moves. `observe`: markers or landmarks, the contours of
-    the bare hand, or both at once.
+    2.2 to 2.4). `float_scale`: estimate the hand's size as it moves. `observe`: paint, landmarks, the contours of the
+    bare hand, or two at once.
     """
 
     kind: TrackerKind = "classic"
@@ -165,7 +167,17 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def smooths(self) -> bool:
         """Whether what is tracked can be smoothed afterwards."""
-        return self.kind == "estimator" and self.observe == "markers"
+        return self.kind == "estimator" and not self.contours
+
+    @property
+    def contours(self) -> bool:
+        """Whether the nodes search their pictures for the hand's contours."""
+        return self.observe in ("contours", "both", "landmarks_and_contours")
+
+    @property
+    def landmarks(self) -> bool:
+        """Whether the rig's marker set is to have landmarks."""
+        return self.observe in ("landmarks", "landmarks_and_contours")
 
     def __post_init__(self) -> None:
         if self.kind == "model":
@@ -339,7 +351,7 @@ def estimator_obstacle(rig: Rig) -> Obstacle | None:
         return Obstacle("The estimator needs calibrated cameras; this rig takes distance from disparity alone "
                         "(depth.mode).",
                         "Use Calibrate, Put the cameras together, or the classic tracker (tracker.kind).")
-    if rig.tracker.observe != "markers" and rig.other_hand is not None:
+    if rig.tracker.contours and rig.other_hand is not None:
         return Obstacle("The contours of one bare hand can be tracked, and this rig has two hands.",
                         "Take other_hand out of the rig file, or track markers (tracker.observe).")
     text = next((node.name for node in rig.nodes if node.text_datagrams), None)
@@ -347,6 +359,16 @@ def estimator_obstacle(rig: Rig) -> Obstacle | None:
         return Obstacle(f"The estimator needs the time of every picture; node {text} sends text datagrams, which "
                         "carry none.", "Run rhot-node there and take text_datagrams out of the rig file, or use the "
                         "classic tracker (tracker.kind).")
+    return None
+
+
+def observation_obstacle(rig: Rig) -> Obstacle | None:
+    """Why the rig's marker set does not fit what its tracker is to observe, None when it does. Where paint is to be
+    observed, landmarks of the set are, too, as in old files."""
+    if rig.tracker.landmarks and not any(marker.shape == "landmark" for marker in rig.markers.markers):
+        return Obstacle(f"Landmarks are to be tracked, and the rig's marker set ({rig.markers.name or 'no name'}) has "
+                        "none.", "Give the rig a set with landmarks, such as resources/markers/landmarks21.json, or "
+                        "track something else (tracker.observe).")
     return None
 
 

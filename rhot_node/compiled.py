@@ -84,11 +84,12 @@ def is_cold() -> bool:
     return VARIABLE not in os.environ or not (is_complete() or any(Path(os.environ[VARIABLE]).rglob("*.nbi")))
 
 
-def announce_compilation() -> None:
+def announce_compilation(part: str = "tracking", takes: str = "some minutes") -> None:
     """Say on standard error why the first run of all takes long; later ones say nothing. A command that tracks nothing,
-    such as ``rhot simulate``, compiles only what it needs and leaves the tracker for later."""
-    if is_cold() or not (is_complete() or any(Path(os.environ[VARIABLE]).glob("tracking_*/*.nbi"))):
-        print("rhot: the numerical code is being compiled, once for these sources; that takes some minutes.",
+    such as ``rhot simulate``, compiles only what it needs and leaves the tracker for later. `part`: the package that a
+    command needs last; `takes`: how long it takes."""
+    if is_cold() or not (is_complete() or any(Path(os.environ[VARIABLE]).glob(f"{part}_*/*.nbi"))):
+        print(f"rhot: the numerical code is being compiled, once for these sources; that takes {takes}.",
               file=sys.stderr, flush=True)
 
 

@@ -131,12 +131,18 @@ class ForegroundStore:
         self._use(self.current, save=True)
 
     def revert(self, *, earlier: bool = False) -> None:
-        """Use what is in the file again; `earlier`: what was there before the last `save`. Raises NodeError."""
+        """Use what is in the file again; `earlier`: what was there before the last `save`, and once more, what that had
+        saved. Raises NodeError."""
         if self.learning:
             raise NodeError("the background is being learnt; wait for its end.")
         if earlier and self.path is not None:
-            kept = self._before()
+            kept, saved = self._before(), self.path.read_bytes() if self.path.exists() else None
             self._use(load_foreground(kept) if kept.exists() else _FLAT, save=True)
+            try:
+                if saved is not None:
+                    write_atomically(kept, saved)
+            except OSError as exc:
+                raise NodeError(f"{kept}: cannot be written ({exc.strerror}).") from exc
             return
         known = self.path is not None and self.path.exists()
         self.current, self._failure = load_foreground(self.path) if known and self.path is not None else _FLAT, ""

@@ -21,6 +21,21 @@ def knowledge_of(sd: float, observed: bool, measured: float, inferred: float) ->
 
 
 @njit(cache=True)
+def add_lengths(table, bone, world, frames, points, out):
+    """Add to `out` (P, 3, 17) how the points of a sized table follow WHOLE, FINGERS and the 15 of LENGTH."""
+    for p in range(points.shape[0]):
+        for i in range(3):
+            out[p, i, 0] += points[p, i] - world[i, 3]
+        row = table.point_row[p]
+        while row >= 0:
+            if bone[row] >= 0:
+                for i in range(3):
+                    out[p, i, 2 + bone[row]] += table.a[row] * frames[row, i, 0]
+                    out[p, i, 1] += table.a[row] * frames[row, i, 0]
+            row = table.parent[row]
+
+
+@njit(cache=True)
 def place_joints(state, covariance, dh, bone, points, covariances, motion):
     """Fill `points` (26, 3) m, their covariances (26, 3, 3), and `motion` (2, 21), roots of the traces of the joints'
     velocities' and accelerations' covariances."""
@@ -35,14 +50,7 @@ def place_joints(state, covariance, dh, bone, points, covariances, motion):
     lengths = RADIUS - LENGTH
     jacobian = np.zeros((points.shape[0], 3, POSE + 2 + lengths))
     jacobian_arrays(table, world, frames, points, jacobian)
-    for p in range(points.shape[0]):
-        jacobian[p, :, POSE] = points[p] - world[:3, 3]
-        row = dh.point_row[p]
-        while row >= 0:
-            if bone[row] >= 0:
-                jacobian[p, :, POSE + 2 + bone[row]] = a[row] * frames[row, :, 0]
-                jacobian[p, :, POSE + 1] += a[row] * frames[row, :, 0]
-            row = dh.parent[row]
+    add_lengths(table, bone, world, frames, points, jacobian[:, :, POSE:])
     own = np.empty(POSE + 2 + lengths, np.int64)
     own[POSE], own[POSE + 1] = MOTION + WHOLE, MOTION + FINGERS
     own[POSE + 2:] = MOTION + LENGTH + np.arange(lengths)

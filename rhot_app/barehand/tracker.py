@@ -244,11 +244,15 @@ class BareHandTracker:
         return bool(wide > CONFUSED_PX or unfound or self.covered(seen, state) < self.cover - COVER_DROP)
 
     def take(self, cameras: Iterable[int], t_s: float) -> None:
-        """Note that images of `cameras` of the time `t_s`, s since the start, are weighed next."""
+        """Note that images of `cameras` of the time `t_s`, s since the start, are weighed next. Without cameras it is
+        something else, which the phalanges' lengths and radii explain, too, but do not follow."""
+        cameras = list(cameras)
+        last_s = max(self._taken_s) if np.isfinite(self._taken_s).any() else self.filter.newest.t_s
         for camera in cameras:
             self._repeated[camera] = max(1.0 / (FASTEST * max(t_s - self._taken_s[camera], SAME_TIME_S)), 1.0)
             self._taken_s[camera] = t_s
-        self.filter.partial = Partial(PHALANGES, min(max(t_s - self.filter.newest.t_s, 0.0) / SAME_POSE_S, 1.0))
+        share = min(max(t_s - last_s, 0.0) / SAME_POSE_S, 1.0) if cameras else 0.0
+        self.filter.partial = Partial(PHALANGES, share)
 
     def restart(self, t_s: float, start: Array) -> tuple[Array, Array]:
         """Begin at rest in the state `start`; what is known of the size stays. Returns state and covariance."""
@@ -345,11 +349,11 @@ class BareHandTracker:
         """How well the last images show the hand."""
         return Fit(np.array([np.zeros((GROUPS, 2)) if frame is None else frame.seen for frame in self.frames]))
 
-    def state(self, begun: float | None = None) -> HandState:
-        """The hand at the newest instant."""
+    def state(self, begun: float | None = None, covariance: Array | None = None) -> HandState:
+        """The hand at the newest instant; `covariance`: if it is less certain than the images say."""
         begun = time.perf_counter() if begun is None else begun
         knot = self.filter.newest
-        state, covariance = knot.state, knot.covariance
+        state, covariance = knot.state, knot.covariance if covariance is None else covariance
         points, covariances, motion = np.empty((26, 3)), np.empty((26, 3, 3)), np.empty((2, 21))
         place_joints(state, covariance, self.model.dh, self.surface.bone, points, covariances, motion)
         deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -136,7 +136,7 @@ class NodeControl:
                     peer.message = printable(str(state.get("message", "")))
                     peer.health, peer.black = health_advice(peer.node.name, state), sees_black(state)
                     self._want_tags(peer, state.get("tags"))
-                    bare = self._rig is not None and self._rig.tracker.observe != "markers"
+                    bare = self._rig is not None and self._rig.tracker.contours
                     peer.foreground_advice = foreground_advice(peer.node.name, state) if bare else ()
                 else:
                     done.append((asked.client, (answer, attachment)))

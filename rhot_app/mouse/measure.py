@@ -51,6 +51,7 @@ HELD_M: Final = 0.029
 ORDINARY_SWAY: Final = Sway(position_mm=0.5, rotation_deg=0.3, angle_deg=0.3, tremor_mm=0.05)
 """Of a hand that rests on a table: a quarter of one held in the air (resources/motions/tap.json), with its tremor."""
 
+_AXES: Final = "x_mm", "y_mm", "height_mm"
 _KEY_S: Final = 0.01  # for ways of a tenth of a second
 _CARRY_M: Final = 0.025  # radius of the ball that is picked and placed
 
@@ -132,28 +133,34 @@ def _cursors(mouse: list[MouseState]) -> Array:
     return np.array([np.full(3, np.nan) if one.cursor is None else one.cursor for one in mouse])
 
 
+def _rms(errors_m: Array) -> Figures | None:
+    """Of errors (N, 3) m along the cursor's axes, in mm; None without any."""
+    return _axes(np.sqrt(np.square(errors_m).mean(axis=0))) if len(errors_m) else None
+
+
 def _axes(lengths_m: Array) -> Figures:
     """Lengths (3,) m along the cursor's axes, in mm."""
-    x, y, z = (1e3 * float(value) for value in lengths_m)
-    return {"x_mm": x, "y_mm": y, "height_mm": z}
+    return {name: 1e3 * float(value) for name, value in zip(_AXES, lengths_m, strict=True)}
 
 
 # -- resolution, coupling, speed, latency (4.3.5) ----------------------------------------------------------------------
 
 def resolution(turn_deg: float, seed: int, **how: Any) -> Figures:
-    """Jitter of the cursor of a motionless hand that is turned on the table: standard deviation per axis, mm."""
+    """Jitter of the cursor of a motionless hand that is turned on the table: standard deviation per axis, mm; None
+    where it was not tracked."""
     script = Script(turn_deg=turn_deg)
     script.move((0.0, 0.0, 0.12), 0.5)
     begin_s = script.end_s + 0.5
     script.wait(3.5)
     run = play(script, seed, **how)
     still = run.during(begin_s, script.end_s)
-    return {"turn_deg": turn_deg, "states": int(still.sum()), **_axes(run.cursor[still].std(axis=0))}
+    return {"turn_deg": turn_deg, "states": int(still.sum()), **(
+        _axes(run.cursor[still].std(axis=0)) if still.any() else dict.fromkeys(_AXES))}
 
 
 def coupling(seed: int, **how: Any) -> list[Figures]:
     """How far the cursor errs from the true hand's while one degree of freedom alone is moved: `rms` and `peak` per
-    axis, mm."""
+    axis, mm; None in a phase in which the hand was not tracked."""
     script = Script()
     script.move((0.0, 0.0, 0.08), 0.5)
     phases = []
@@ -174,9 +181,9 @@ def coupling(seed: int, **how: Any) -> list[Figures]:
     figures = []
     for name, begin_s, end_s in phases:
         inside = run.during(begin_s, end_s)
-        errors = off[inside] - off[inside][0]
-        figures.append({"moved": name, "rms": _axes(np.sqrt(np.square(errors).mean(axis=0))),
-                        "peak": _axes(np.abs(errors).max(axis=0))})
+        errors = off[inside] - off[inside][:1]
+        figures.append({"moved": name, "rms": _rms(errors),
+                        "peak": _axes(np.abs(errors).max(axis=0)) if len(errors) else None})
     return figures
 
 
@@ -196,10 +203,12 @@ def speed(metres_per_s: float, seed: int, **how: Any) -> Figures:
     return {"speed_m_per_s": metres_per_s, "held": float(held[moving].mean())}
 
 
-def latency(run: MouseRun) -> Figures:
+def latency(run: MouseRun) -> Figures | None:
     """From the hand to the cursor: until the state is ready, and how far the cursor lags behind the hand at the state's
-    own time, by the shift that fits best; ms."""
+    own time, by the shift that fits best; ms. None when the hand was not tracked."""
     inside = run.during(LEAD_S, run.script.end_s)
+    if not inside.any():
+        return None
     times, cursor, true = run.times_s[inside], run.cursor[inside], run.true_cursor[inside]
     shifts = np.arange(0.0, 0.1, 0.001)
     misfits = [sum(np.square(np.interp(times - shift, times, true[:, k]) - cursor[:, k]).mean() for k in range(2))
@@ -211,7 +220,7 @@ def latency(run: MouseRun) -> Figures:
 
 def one_camera(seed: int, **how: Any) -> Figures:
     """Error of the cursor once the second camera is covered, rms per axis, mm: with the palm anywhere, and with it on
-    the table as in Rehg's experiment with one camera."""
+    the table as in Rehg's experiment with one camera; None where it was not tracked."""
     script = Script()
     for place in ((0.15, 0.1, 0.1), (-0.15, -0.1, 0.0), (0.0, 0.12, 0.1)):
         script.move(place, 1.0)
@@ -220,7 +229,7 @@ def one_camera(seed: int, **how: Any) -> Figures:
     for name, on_table in (("free", False), ("on_table", True)):
         run = play(script, seed, settings=MouseSettings(on_table=on_table), covered_s=LEAD_S, **how)
         inside = run.during(LEAD_S, script.end_s)
-        figures[name] = _axes(np.sqrt(np.square(run.cursor[inside] - run.true_cursor[inside]).mean(axis=0)))
+        figures[name] = _rms(run.cursor[inside] - run.true_cursor[inside])
     return figures
 
 

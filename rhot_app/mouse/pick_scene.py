@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.mouse.pointer import GROUND_M, POLE_M, MouseState
+from rhot_app.mouse.pointer import BUTTONS, GROUND_M, POLE_M, MouseState
 
 Array = NDArray[np.float64]
 
@@ -67,6 +67,13 @@ class PickScene:
                 self._let_go()
         if "little" in changed & mouse.pressed and self.held is None and self.selected is not None:
             self._put(self.selected, self.balls[self.selected].on_ground)
+
+    def interrupt(self) -> None:
+        """The mouse does something else for a while: a held ball is let go where it is. A thumb that is spread when it
+        comes back picks nothing."""
+        if self.held is not None:
+            self._let_go()
+        self.selected, self._pressed = None, frozenset(BUTTONS)
 
     def undo(self) -> str:
         """Take the last move back; a sentence on what was done, or why nothing was."""

@@ -21,10 +21,7 @@ def report(figures: Figures) -> str:
              *(f"  {one['moved']:<12}{_three(one['rms'])}    {_three(one['peak'])}" for one in figures["coupling"]),
              "", "Palm turned on the table   jitter, standard deviation [mm]: right  forward  height",
              *(f"  {one['turn_deg']:+5.0f} deg{_three(one):>71}" for one in figures["resolution"]),
-             "", f"Latency: a state is ready {late['ready_p50_ms']:.1f} ms (p50), {late['ready_p99_ms']:.1f} ms (p99) "
-                 "after the hand was there.",
-             f"The cursor lags {late['lag_ms']:.0f} ms behind the hand at the state's own time.",
-             "", *(_throughput(name, found[name]) for name in ("true", "tracked"))]
+             "", *_latency(late), "", *(_throughput(name, found[name]) for name in ("true", "tracked"))]
     single = figures["one_camera"]
     lines += ["", "One camera covered     error of the cursor, rms [mm]: right  forward  height",
               *(f"  {name:<21}{_three(single[key]):>50}" for name, key in (("palm anywhere", "free"),
@@ -36,7 +33,17 @@ def report(figures: Figures) -> str:
     return "\n".join(lines)
 
 
-def _three(one: Figures) -> str:
+def _latency(one: Figures | None) -> list[str]:
+    if one is None:
+        return ["Latency: the hand was not tracked."]
+    return [f"Latency: a state is ready {one['ready_p50_ms']:.1f} ms (p50), {one['ready_p99_ms']:.1f} ms (p99) after "
+            "the hand was there.",
+            f"The cursor lags {one['lag_ms']:.0f} ms behind the hand at the state's own time."]
+
+
+def _three(one: Figures | None) -> str:
+    if one is None or one["x_mm"] is None:
+        return f"{'not tracked':>24}"
     return f"{one['x_mm']:8.2f} {one['y_mm']:8.2f} {one['height_mm']:7.2f}"
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import RigError
-from rhot_app.project import Rig, estimator_obstacle
+from rhot_app.project import Rig, estimator_obstacle, observation_obstacle
 from rhot_app.state import HandState
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.contours.tracker import ContourEstimator
@@ -103,7 +103,7 @@ def make_tracker(rig: Rig) -> Tracker:
     else:
         require_estimator(rig)
         hand, own = without_objects(rig)
-        if rig.tracker.observe != "markers":
+        if rig.tracker.contours:
             tracker = ContourEstimator(hand)
         else:
             tracker = Estimator(hand) if rig.other_hand is None else TwoHands(hand)
@@ -111,7 +111,7 @@ def make_tracker(rig: Rig) -> Tracker:
 
 
 def require_estimator(rig: Rig) -> None:
-    """Raises RigError when the estimator cannot work with the rig's cameras or nodes."""
-    obstacle = estimator_obstacle(rig)
+    """Raises RigError when the estimator cannot work with the rig's cameras or nodes, or lacks landmarks."""
+    obstacle = estimator_obstacle(rig) or observation_obstacle(rig)
     if obstacle is not None:
         raise RigError(f"rig {rig.name!r}: {obstacle.why} {obstacle.remedy}")

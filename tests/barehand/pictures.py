@@ -14,6 +14,7 @@ from rhot_app.geometry.transforms import inverse, rigid
 
 Array = NDArray[np.float64]
 LIGHT = np.array([-0.4, -0.7, -0.59])
+SKIN = np.array([205.0, 150.0, 125.0])
 
 
 def look_at(place: Array, target: Array, focal: float = 600.0, width: int = 640, height: int = 480) -> CameraModel:
@@ -51,25 +52,28 @@ def wall(camera: CameraModel, seed: int, clutter: bool) -> Array:
 
 
 def picture(surface: Surface, world: Array, angles: Array, camera: CameraModel, background: Array, seed: int,
-            forearm_m: float = 0.4, blur_px: float = 0.8, noise: float = 2.0) -> NDArray[np.uint8]:
-    """(H, W, 3) RGB of a hand."""
+            forearm_m: float = 0.4, blur_px: float = 0.8, noise: float = 2.0,
+            paint: dict[int, tuple[float, float, float]] | None = None) -> NDArray[np.uint8]:
+    """(H, W, 3) RGB of a hand; `paint`: colours of fingertips by finger."""
     centres, radii = capsules_of(surface, world, angles)
     for k in np.flatnonzero(surface.group == FOREARM):
         line = centres[k, 1] - centres[k, 0]
         centres[k, 1] = centres[k, 0] + line * forearm_m / np.linalg.norm(line)
-    out = background.copy()
+    out, colours = background.copy(), np.tile(SKIN, (len(radii), 1))
+    for finger, colour in (paint or {}).items():
+        colours[np.flatnonzero(surface.group == finger)[-1]] = colour
     pose = camera.camera_from_world[:3]
     o = np.empty(3)
     camera_centre(pose, o)
     _draw(centres, radii, o, camera.camera_from_world[:3, :3].copy(), camera.intrinsics, LIGHT / np.linalg.norm(LIGHT),
-          out)
+          colours, out)
     out = cv2.GaussianBlur(out, (0, 0), blur_px) if blur_px else out
     out += np.random.default_rng([seed, 7]).normal(0.0, noise, out.shape)
     return np.clip(out + 0.5, 0.0, 255.0).astype(np.uint8)
 
 
 @njit(cache=True)
-def _draw(centres, radii, o, rotation, intrinsics, light, out):
+def _draw(centres, radii, o, rotation, intrinsics, light, colours, out):
     boxes = np.empty((len(centres), 4))
     for k in range(len(centres)):
         boxes[k] = np.array([1e9, 1e9, -1e9, -1e9])
@@ -80,7 +84,6 @@ def _draw(centres, radii, o, rotation, intrinsics, light, out):
             r = 1.1 * intrinsics[0] * radii[k, e] / max(z - radii[k, e], 0.02) + 2.0
             boxes[k, 0], boxes[k, 1] = min(boxes[k, 0], u - r), min(boxes[k, 1], v - r)
             boxes[k, 2], boxes[k, 3] = max(boxes[k, 2], u + r), max(boxes[k, 3], v + r)
-    skin = np.array([205.0, 150.0, 125.0])
     for y in range(out.shape[0]):
         for x in range(out.shape[1]):
             near = False
@@ -107,7 +110,7 @@ def _draw(centres, radii, o, rotation, intrinsics, light, out):
                     n = p - centres[which, 0] - h * ba
                     n = n / np.sqrt(np.sum(n * n))
                     shade = 0.55 + 0.45 * max(-np.sum(n * light), 0.0) - 0.15 * (1.0 + np.sum(n * d))
-                    colour += skin * shade
+                    colour += colours[which] * shade
                     hits += 1
             if hits:
                 out[y, x] = colour / 4.0 + out[y, x] * (4 - hits) / 4.0

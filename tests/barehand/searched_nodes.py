@@ -27,19 +27,20 @@ class SearchedNodes:
         self.asked: list[SliceRequest | None] = [None] * len(foreground)
         self.states: list[HandState] = []
 
-    def step(self, number: int, images: list[np.ndarray | None], pixels: list[np.ndarray] | None = None) -> None:
-        """One frame of each camera, None of one that gives none; `pixels` (M, 2) of its markers."""
+    def step(self, number: int, images: list[np.ndarray | None], pixels: list[np.ndarray] | None = None,
+             seen: list[CameraObservations] | None = None) -> None:
+        """One frame of each camera, None of one that gives none; `pixels` (M, 2) of its markers, or all that is `seen`
+        of them at another time."""
         t_ns = FIRST_NS + number * PERIOD_NS
         for camera, image in enumerate(images):
             if image is None:
                 continue
             request, known = self.asked[camera], self.foreground[camera]
-            seen = np.full((self.markers, 2), np.nan) if pixels is None else pixels[camera]
-            lost = np.isnan(seen[:, 0])
-            self.give(CameraObservations(
-                camera, t_ns, 0, 1e-4, t_ns + 9_000_000, 0.004, 0.001, seen,
-                np.tile(0.01 * np.eye(2), (len(seen), 1, 1)),
-                np.full(len(seen), 12.0), np.ones(len(seen)), lost.astype(np.uint16)))
+            if seen is not None:
+                self.give(replace(seen[camera], t_row0_master_ns=t_ns, t_receive_ns=t_ns + 9_000_000))
+            else:
+                self.give(seen_at(camera, t_ns, np.full((self.markers, 2), np.nan) if pixels is None
+                                  else pixels[camera]))
             if request is None:
                 continue
             if len(request.slices):
@@ -57,3 +58,11 @@ class SearchedNodes:
             self.states.append(state)
         for request in self.tracker.requests():
             self.asked[request.camera] = request
+
+
+def seen_at(camera: int, t_ns: int, pixels: np.ndarray) -> CameraObservations:
+    """Markers at `pixels` (M, 2), NaN for lost."""
+    count = len(pixels)
+    return CameraObservations(
+        camera, t_ns, 0, 1e-4, t_ns + 9_000_000, 0.004, 0.001, pixels, np.tile(0.01 * np.eye(2), (count, 1, 1)),
+        np.full(count, 12.0), np.ones(count), np.isnan(pixels[:, 0]).astype(np.uint16))

@@ -8,14 +8,16 @@ import msgspec
 import numpy as np
 import pytest
 from bare_scenes import model_and_surface, poses, rig_of, right_hand, scene
-from searched_nodes import SearchedNodes
+from searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
 
 from rhot_app.errors import RigError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.skeleton import HandPose
+from rhot_app.hand.model import build_model
+from rhot_app.hand.skeleton import FLEXIONS, JOINTS, HandPose
 from rhot_app.project import Rig, TrackerSettings, with_tracker
-from rhot_app.state import Condition, HandState
+from rhot_app.state import Condition, HandState, Knowledge
+from rhot_app.tracking.contours.finder import Finder
 from rhot_app.tracking.tracker import ShowsContours
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
@@ -23,6 +25,7 @@ from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 
 TIMES = tuple(k / 30.0 for k in range(14))
+INDEX_TIP = JOINTS.index("index_tip")
 STILL = 4  # pictures of the hand before it moves
 
 
@@ -110,27 +113,95 @@ def test_one_camera_goes_on_alone(film) -> None:
     assert len(nodes.states) > before + 3 and nodes.states[-1].tracked
 
 
-def test_landmarks_begin_and_contours_go_on(film) -> None:
-    rig = bare_rig(film[0][0], "both", "landmarks21")
-    nodes = SearchedNodes(make_tracker(rig), known(film), 21)
-    model = model_and_surface()[0]
+def landmarks(film: list[tuple[list, list, list]], pose: HandPose) -> list[np.ndarray]:
+    joints = forward(model_and_surface()[0], pose).joints
+    return [camera.project(joints) for camera in film[0][0]]
 
-    def pixels(pose: HandPose) -> list[np.ndarray]:
-        joints = forward(model, pose).joints
-        return [camera.project(joints) for camera in film[0][0]]
-    moving = poses("grasp", TIMES)
-    for number in range(12):
-        nodes.step(number, film[0][1], pixels(moving[0]))
-    assert nodes.states[-1].tracked and error_mm(nodes.states[-1], moving[0]) < 5.0
-    for number, (_, images, _) in enumerate(film, 12):
+
+def until_tracked(nodes: SearchedNodes, film: list[tuple[list, list, list]], number: int, which: int) -> int:
+    """A hand at rest whose landmarks are reported; returns the next frame's number."""
+    first, pose = number, poses("grasp", TIMES)[which]
+    while not nodes.states or not nodes.states[-1].tracked:
+        assert (number - first) * PERIOD_NS < 0.5e9, "landmarks show at once where the hand is"
+        nodes.step(number, film[which][1], landmarks(film, pose))
+        number += 1
+    assert error_mm(nodes.states[-1], pose) < 5.0
+    return number
+
+
+def test_landmarks_begin_and_contours_go_on_and_landmarks_find_it_again(film, monkeypatch) -> None:
+    monkeypatch.setattr(Finder, "found", lambda _: None)  # no search is as quick
+    rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
+    nodes = SearchedNodes(make_tracker(rig), known(film), 21)
+    number = until_tracked(nodes, film, 0, 0)
+    for _, images, _ in film:
         nodes.step(number, images)  # its detector has lost it
-    assert nodes.states[-1].tracked and error_mm(nodes.states[-1], moving[-1]) < 6.0
+        number += 1
+    assert nodes.states[-1].tracked and error_mm(nodes.states[-1], poses("grasp", TIMES)[-1]) < 6.0
+    for _ in range(20):
+        nodes.step(number, film[0][2])
+        number += 1
+    assert nodes.states[-1].condition is Condition.LOST
+    until_tracked(nodes, film, number, 5)
+
+
+def test_landmarks_mend_a_finger_that_is_taken_for_its_neighbour(film, monkeypatch) -> None:
+    pose = poses("grasp", TIMES)[0]
+    curled = pose.angles.copy()
+    curled[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
+    rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
+    nodes, number = SearchedNodes(make_tracker(rig), known(film), 21), 0
+    with monkeypatch.context() as patched:
+        patched.setattr(Finder, "found", lambda _: (HandPose(pose.world_from_palm, curled), FIRST_NS))
+        while not nodes.states or not nodes.states[-1].tracked:
+            assert number < 20
+            nodes.step(number, film[0][1])
+            number += 1
+    tip = forward(model_and_surface()[0], pose).joints[INDEX_TIP]
+    assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) > 0.02, "it is wrong"
+    for _ in range(30):
+        nodes.step(number, film[0][1], landmarks(film, pose))
+        number += 1
+        assert nodes.states[-1].tracked
+    assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.003
+
+
+def test_a_fingertip_that_contradicts_the_contours_makes_its_finger_uncertain(film) -> None:
+    """Something of the index finger's colour lies 6 cm beside it. The rest of the hand is bare."""
+    markers = load_markers(resource_path("markers", "rhot6.json"))
+    two = msgspec.structs.replace(markers, markers=tuple(one for one in markers.markers
+                                                         if one.role in ("thumb_tip", "index_tip")))
+    rig = msgspec.structs.replace(bare_rig(film[0][0], "both"), markers=two)
+    nodes, pose = SearchedNodes(make_tracker(rig), known(film), 2), poses("grasp", TIMES)[0]
+    tips = np.argsort([one.role != "thumb_tip" for one in two.markers])
+    marked = forward(build_model(right_hand()), pose).marker_centres[:2][tips]
+    number = 0
+    for _ in range(3):
+        nodes.step(number, film[0][2])
+        number += 1
+    while len(nodes.states) < 60:
+        nodes.step(number, film[0][1], [camera.project(marked) for camera in film[0][0]])
+        number += 1
+    assert nodes.states[-1].tracked and error_mm(nodes.states[-1], pose) < 3.0
+    true, wrong = marked.copy(), marked.copy()
+    wrong[int(np.flatnonzero(tips == 1)[0])] += [0.06, 0.0, 0.0]
+    for places, knowledge in ((wrong, Knowledge.GUESSED), (true, Knowledge.MEASURED)):
+        for _ in range(20):
+            nodes.step(number, film[0][1], [camera.project(places) for camera in film[0][0]])
+            number += 1
+            assert nodes.states[-1].tracked
+        assert nodes.states[-1].joint_knowledge[INDEX_TIP] == knowledge
+        assert error_mm(nodes.states[-1], pose) < 3.0
+        others = np.delete(nodes.states[-1].joint_knowledge, range(5, 9))
+        assert np.mean(others == Knowledge.MEASURED) > 0.9, "the rest is as certain as before"
 
 
 @pytest.mark.parametrize(("change", "sentence"), [
     (lambda rig: with_tracker(rig, "classic"), ""),
     (lambda rig: msgspec.structs.replace(rig, depth=msgspec.structs.replace(rig.depth, mode="disparity")),
      "needs calibrated cameras"),
+    (lambda rig: msgspec.structs.replace(rig, tracker=TrackerSettings("estimator", observe="landmarks_and_contours")),
+     "RHOT six.*has none. Give the rig a set with landmarks"),
 ])
 def test_what_cannot_be_is_a_sentence(film, change: Callable[[Rig], Rig], sentence: str) -> None:
     rig = change(bare_rig(film[0][0]))

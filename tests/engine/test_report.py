@@ -109,3 +109,15 @@ def test_a_report_without_an_engine_says_what_is_not_in_it(tmp_path: Path, capsy
     assert list(entries(tmp_path / "bug.zip")) == ["versions.json"]
     assert main([*arguments[:1], str(tmp_path / "gone.log"), *arguments[1:-1], str(tmp_path / "other.zip")]) == 2
     assert not (tmp_path / "other.zip").exists()
+
+
+def test_a_report_is_written_over_only_when_that_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rhot_app.engine.offline.report.EngineClient", FakeClient)
+    out = tmp_path / "bug.zip"
+    out.write_bytes(b"another one")
+    arguments = ["report", "--directory", str(tmp_path / "none"), "--out", str(out)]
+    assert main(arguments) == 2
+    assert "exists already" in capsys.readouterr().err and out.read_bytes() == b"another one"
+    assert main([*arguments, "--again"]) == 0
+    assert "versions.json" in entries(out)

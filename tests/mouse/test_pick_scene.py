@@ -115,3 +115,17 @@ def test_clicks_beside_the_target_are_missed() -> None:
             test.feed(mouse((*(test.targets[wanted] + 0.03), 0.0), *pressed, t_s=t_s))
     found = test.result()
     assert found is not None and found.missed == found.clicks
+
+
+def test_a_held_ball_stays_where_it_was_let_go_when_the_mouse_does_something_else() -> None:
+    scene = PickScene((BALL,))
+    scene.feed(mouse((0.1, 0.0, 0.05)))
+    scene.feed(mouse((0.1, 0.0, 0.05), "thumb"))
+    scene.feed(mouse((0.0, 0.0, 0.1), "thumb"))
+    scene.interrupt()
+    left = scene.balls[0]
+    assert scene.held is None and left.centre == pytest.approx((0.0, 0.0, 0.08))
+    scene.feed(mouse((0.01, 0.0, 0.08), "thumb"))  # spread all the while
+    scene.feed(mouse((-0.1, 0.1, 0.2), "thumb"))
+    assert scene.balls[0] == left
+    assert "back" in scene.undo() and scene.balls[0] == BALL

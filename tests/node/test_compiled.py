@@ -100,6 +100,8 @@ def test_a_cache_is_cold_until_anything_was_compiled(tmp_path: Path, monkeypatch
     (tmp_path / "tracking_2" / "tracker.py311.nbi").touch()
     announce_compilation()
     assert capsys.readouterr().err == ""
+    announce_compilation("objects", "some seconds")
+    assert "takes some seconds" in capsys.readouterr().err, "this command needs something else"
     monkeypatch.delenv(VARIABLE)
     assert is_cold()
 

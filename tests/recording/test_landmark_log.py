@@ -10,10 +10,10 @@ import pytest
 
 from rhot_app.__main__ import main
 from rhot_app.errors import RecordingError
-from rhot_app.project import load_rig, save_rig
+from rhot_app.project import CameraPose, load_rig, save_rig
 from rhot_app.recording.landmark_log import read_landmark_table, write_landmark_log
 from rhot_app.recording.raw_log import LogReader
-from rhot_app.simulator.nodes.landmark_detector import landmark_rig
+from rhot_app.simulator.nodes.landmark_detector import detected_landmarks, landmark_rig, moving_hand
 from rhot_app.sources.replay import LogValidator
 from rhot_node.files import resource_path
 
@@ -59,6 +59,29 @@ def test_what_is_no_table_is_refused(tmp_path: Path, frames: list[int], change: 
                                      fps: float | None, says: str) -> None:
     with pytest.raises(RecordingError, match=says):
         read_landmark_table(table(tmp_path / "a.csv", frames, change, head), fps)
+
+
+@pytest.mark.parametrize(("unit", "large"), [(1.0, False), (1.3, True)])
+def test_the_command_judges_the_reprojection_error(tmp_path: Path, capsys: pytest.CaptureFixture[str], unit: float,
+                                                   large: bool) -> None:
+    """Camera poses in another unit than metres."""
+    rig, rig_path, tables = landmark_rig(), tmp_path / "rig.json", []
+    hand = moving_hand(rig, "grasp", 1.0, FPS, 1)
+    frames = detected_landmarks(rig, hand, 1)
+    for camera in range(2):
+        lines = [",".join(["frame", *PLACES])]
+        lines += [",".join([str(number), *map(str, one.pixels.ravel())])
+                  for number, one in enumerate(one for one in frames if one.camera == camera)]
+        tables.append(tmp_path / f"{camera}.csv")
+        tables[-1].write_text("\n".join(lines))
+    nodes = tuple(msgspec.structs.replace(node, pose=CameraPose(node.pose.rotation_wxyz, tuple(
+        unit * value for value in node.pose.translation_m))) for node in rig.nodes)
+    save_rig(rig_path, msgspec.structs.replace(rig, nodes=nodes))
+    assert main(["landmarks", *map(str, tables), "--rig", str(rig_path), "--out", str(tmp_path / "a.log"), "--fps",
+                 str(FPS)]) == 0
+    said = capsys.readouterr().out
+    assert ("reprojection error is large" in said) == large, said
+    assert ("unit of length" in said) == large
 
 
 def test_the_command_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

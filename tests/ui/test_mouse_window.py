@@ -136,6 +136,22 @@ def test_the_target_test_is_begun_clicked_through_and_ended(window, hand):
     assert window.test is None and window.pick.balls == balls
 
 
+def test_a_ball_that_is_held_stays_while_the_target_test_is_done(window, hand):
+    hand.be(*to(window, 1))
+    window.step()
+    hand.be(*to(window, 1), **SPREAD["thumb"])
+    window.step()
+    assert window.pick.held == 1
+    QTest.keyClick(window, Qt.Key.Key_T)
+    balls = list(window.pick.balls)
+    hand.be(0.0, 0.05, 0.0, **SPREAD["thumb"])
+    window.step()
+    QTest.keyClick(window, Qt.Key.Key_T)
+    hand.be(0.0, 0.05, 0.0, states=2, **SPREAD["thumb"])
+    window.step()
+    assert window.pick.held is None and window.pick.balls == balls
+
+
 def test_the_palm_can_set_the_height(window, hand):
     window.height_box.setFocus()
     QTest.keyClick(window.height_box, Qt.Key.Key_Down)

@@ -18,7 +18,9 @@ from rhot_app.project import DepthSettings, TrackerSettings, load_rig, save_rig
 from rhot_app.rig_history import versions
 from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
 from rhot_app.ui.models.rows import rig_rows
-from rhot_app.ui.models.words import scale_text, size_text
+from rhot_app.ui.models.words import scale_text, settings_text, size_text
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
 
 MODEL = TrackerSettings(kind="estimator")
 FLOATING = TrackerSettings(kind="estimator", float_scale=True)
@@ -215,11 +217,33 @@ def test_earlier_versions_tell_of_the_tracker():
 def test_the_bare_hand_is_chosen_in_plain_words(opened):
     desk = opened(with_tracker(MODEL))
     dialog = desk.dialog
-    assert dialog.observe_box.currentText() == "markers or landmarks"
-    QTest.keyClick(dialog.observe_box, Qt.Key.Key_Down)
+    assert dialog.observe_box.currentText() == "Paint"
+    dialog.observe_box.setFocus()
+    QTest.keyClicks(dialog.observe_box, "Con")
     desk.until(lambda: load_rig(desk.path).tracker.observe == "contours" and dialog.close_button.isEnabled())
-    assert "Background and skin" in dialog.observe_words.text() and dialog.observe_box.currentText() == "bare hand"
+    assert "Background and skin" in dialog.observe_words.text() and dialog.observe_box.currentText() == "Contours"
     click_on_word(dialog.kinds["classic"])
     desk.until(lambda: load_rig(desk.path).tracker == TrackerSettings() and dialog.close_button.isEnabled())
     QTest.mouseClick(dialog.undo_button, Qt.MouseButton.LeftButton)
     desk.until(lambda: load_rig(desk.path).tracker.observe == "contours")
+
+
+def test_landmarks_are_a_choice_of_their_own_that_needs_a_set_with_landmarks(opened):
+    desk = opened(with_tracker(MODEL))
+    dialog = desk.dialog
+    dialog.observe_box.setFocus()
+    QTest.keyClicks(dialog.observe_box, "Landm")
+    desk.until(lambda: "has none. Give the rig a set with landmarks" in dialog.sentence.text())
+    assert dialog.observe_box.currentText() == "Paint" and load_rig(desk.path).tracker.observe == "markers"
+
+
+def test_an_old_rig_with_landmarks_says_what_it_tracks(opened):
+    landmarks = load_markers(resource_path("markers", "landmarks21.json"))
+    desk = opened(msgspec.structs.replace(with_tracker(MODEL), markers=landmarks))
+    dialog = desk.dialog
+    assert "has landmarks, no paint" in dialog.observe_words.text()
+    dialog.observe_box.setFocus()
+    QTest.keyClicks(dialog.observe_box, "Landm")
+    desk.until(lambda: load_rig(desk.path).tracker.observe == "landmarks" and dialog.close_button.isEnabled())
+    assert "detector" in dialog.observe_words.text()
+    assert settings_text(desk.dialog.chosen) == "estimator, landmarks, full, anatomical limits"

@@ -17,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", type=Path, nargs="?", metavar="LOG",
                         help="a raw log that shows the fault, for its last minute (default: what is being recorded)")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.zip", help="zip file to write")
+    parser.add_argument("--again", action="store_true", help="write over a file that exists")
     parser.add_argument("--rig", type=Path, metavar="FILE",
                         help="the rig file (default: the running engine's, or the log's)")
     parser.add_argument("--directory", type=Path, metavar="DIR",
@@ -30,6 +31,8 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.project import load_rig
     from rhot_node.files import require_replaceable, write_atomically
 
+    if args.out.exists() and not args.again:
+        raise EngineError(f"{args.out} exists already; choose another --out, or write over it with --again.")
     try:
         require_replaceable(args.out)
         report = Report()

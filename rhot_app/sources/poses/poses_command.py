@@ -34,6 +34,7 @@ def run(args: argparse.Namespace) -> int:
     """Listen, print, write. Raises SourceError, or ObjectError for a file; nothing is written then."""
     from rhot_app.objects.pose import Validity
     from rhot_app.sources.poses.open_source import open_source
+    from rhot_node.compiled import announce_compilation
     from rhot_node.files import require_replaceable
 
     if not 0.0 < args.seconds <= SECONDS_MAX:
@@ -54,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     tracked = [pose for pose in poses if pose.validity is Validity.TRACKED]
     if len(tracked) < 2:
         raise SourceError(notice or f"{name}: there was no pose within {args.seconds:g} s.")
+    announce_compilation("objects", "some seconds")
     if args.out is not None:
         write_poses(args.out, tracked)
     fields = {"source": name, **figures(poses), "notice": notice,

@@ -14,6 +14,7 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.motion.hand_process import MOTION
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.state import SeenContour
+from rhot_node.detect.edges import Edges
 from rhot_node.wire.slices import pack_slices, unpack_slices
 
 Array = NDArray[np.float64]
@@ -31,6 +32,10 @@ NEAR_SD = 3.0
 ALIKE = 0.9
 """Cosine of the largest angle between a recorded slice and the normal of the contour on it, 26 degrees."""
 
+BESIDE_PX = 2.0
+"""px: a recorded slice crosses the contour if one of its points is no farther beyond the slice's end: the points are
+2 mm apart, which is about as many pixels."""
+
 
 def asked(hand: BareHandTracker, camera: int, state: Array, covariance: Array, step_m: float) -> ContourFrame:
     """The slices across the contours of a hand in `state`, whose centres lie in the image, rounded as they are sent."""
@@ -41,8 +46,8 @@ def asked(hand: BareHandTracker, camera: int, state: Array, covariance: Array, s
 
 
 def matched(hand: BareHandTracker, frame: EdgeFrame, state: Array, covariance: Array) -> ContourFrame | None:
-    """The contour of a hand in `state` on the slices of a recorded request. A slice that crosses none expects an edge
-    of the nearest contour, which is far: it tells nothing. None without contour or slices."""
+    """The contour of a hand in `state` on the slices of a recorded request that cross it, with their edges; the frame
+    stays as it is. None without any."""
     expected, slices = hand.expected(frame.camera, state, covariance, 0.5 * STEP_M), frame.request.slices
     if not len(expected.slices) or not len(slices):
         return None
@@ -52,12 +57,12 @@ def matched(hand: BareHandTracker, frame: EdgeFrame, state: Array, covariance: A
     nearest = np.argmin(distance, axis=1)
     order = np.argsort(expected.points.capsule[nearest], kind="stable")
     reach = distance[np.arange(len(slices)), nearest]
-    edges = frame.edges
-    found = np.where(reach < slices[:, 4] + 2.0, edges.number, 0)
-    frame.edges.number[:] = found  # a slice that crosses no contour has no edge of one
-    for column in edges:
-        column[:] = column[order]
-    return _on(hand, frame.camera, expected, nearest[order], slices[order])
+    order = order[(reach < slices[:, 4] + BESIDE_PX)[order]]
+    if not len(order):
+        return None
+    contour = _on(hand, frame.camera, expected, nearest[order], slices[order])
+    contour.observe(Edges(*(column[order] for column in frame.edges)))
+    return contour
 
 
 def _on(hand: BareHandTracker, camera: int, frame: ContourFrame, chosen: NDArray[np.int64],
@@ -82,8 +87,6 @@ def on_foreground(hand: BareHandTracker, frame: ForegroundFrame, state: Array) -
     x, y = (places[inside] // frame.step).astype(int).T
     shown = frame.probability[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)] > 0.5
     return float(np.mean(inside)), float(np.mean(shown))
-
-
 
 
 def same_hand(hand: BareHandTracker, state: Array, pose: HandPose) -> bool:

@@ -50,8 +50,8 @@ class Finder:
         self._rng = np.random.default_rng(0)
         self._thread: threading.Thread | None = None
         self._newest: Maps | None = None
-        self._found: tuple[HandPose, int] | None = None
-        self._moved: Array | None = None
+        self._found: tuple[int, HandPose, int] | None = None  # of which run
+        self._moved: tuple[int, Array | None] | None = None
         self._run = 0
 
     def reset(self) -> None:
@@ -71,12 +71,12 @@ class Finder:
     def found(self) -> tuple[HandPose, int] | None:
         """A pose and its time, master ns, if one was found since it was asked for last."""
         found, self._found = self._found, None
-        return found
+        return None if found is None or found[0] != self._run else found[1:]
 
     def moved(self) -> Array | None:
         """The state where the hand may be, if it was found since it was asked for last."""
         moved, self._moved = self._moved, None
-        return moved
+        return None if moved is None or moved[0] != self._run else moved[1]
 
     def wait(self) -> None:
         """Until the search is over."""
@@ -96,13 +96,10 @@ class Finder:
         pose, newest = found[0].pose, self._newest
         if newest is not None and newest is not maps:
             pose, maps = self._followed(pose, newest), newest
-        if run == self._run:
-            self._found = pose, maps.t_ns
+        self._found = run, pose, maps.t_ns
 
     def _relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float, run: int) -> None:
-        moved = self._hand.relocate(maps.silhouettes(self._hand), (state, covariance), dt_s)
-        if run == self._run:
-            self._moved = moved
+        self._moved = run, self._hand.relocate(maps.silhouettes(self._hand), (state, covariance), dt_s)
 
     def _followed(self, pose: HandPose, maps: Maps) -> HandPose:
         """The pose in later maps, near to where it was."""

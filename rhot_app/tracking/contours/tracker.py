@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,19 +32,20 @@ from rhot_app.barehand.tracker import (
 )
 from rhot_app.estimation.filter import update
 from rhot_app.estimation.residual import Residual
-from rhot_app.hand.motion.hand_process import BIAS
+from rhot_app.hand.motion.hand_process import BIAS, POSE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, SeenContour, no_hand
 from rhot_app.tracking.contours.evidence import asked, matched, on_foreground, same_hand, seen_contour
 from rhot_app.tracking.contours.finder import Finder, Maps
-from rhot_app.tracking.contours.markers import MarkersOfHand
+from rhot_app.tracking.contours.markers import BesideContours, MarkersOfHand
 from rhot_app.tracking.contours.states import published
 from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.slices import SLICES_MAX
 
 Array = NDArray[np.float64]
+Estimate = tuple[Array, Array]
 
 MOST = 0.5
 """Part above which more speaks for a hand than against it: of the contour that is found, of joints on foreground."""
@@ -89,7 +91,7 @@ class ContourEstimator:
         """Raises RigError when markers are observed and one has no place on the hand."""
         self._rig = rig
         self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale)
-        self._markers = MarkersOfHand(rig, self._hand) if rig.tracker.observe == "both" else None
+        self._markers = MarkersOfHand(rig, self._hand) if rig.tracker.observe != "contours" else None
         self._finder = Finder(self._hand)
         self._names = tuple(node.name for node in rig.nodes)
         self._sequence = 0
@@ -105,9 +107,10 @@ class ContourEstimator:
         self._maps: list[ForegroundFrame | None] = [None] * len(self._names)
         self._requests: list[SliceRequest] = []
         self._waiting: dict[int, tuple[EdgeFrame, ContourFrame]] = {}
+        self._marked: list[CameraObservations] = []
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._epoch_ns = self._seen_ns = 0
-        self._judged_ns = _NEVER
+        self._judged_ns = self._agreed_ns = _NEVER
         self._tracking = self._confirmed = self._ever = False
         self._latest: CameraObservations | EdgeFrame | None = None
 
@@ -197,7 +200,7 @@ class ContourEstimator:
             self._give_up()
         if self._tracking and self._lost(t_ns):
             self._give_up()
-        marked = self._markers is not None and self._weigh_markers(frame)
+        marked = self._markers is not None and self._take_markers(frame)
         if not self._tracking:
             self._look(frame)
         elif t_ns - camera.target_ns > 1.5 * camera.period_ns:  # its last answer is missing
@@ -215,7 +218,6 @@ class ContourEstimator:
         contour = self._contour(frame)
         if contour is None:
             return False
-        contour.observe(frame.edges)
         self._cameras[frame.camera].answered_ns = frame.t_row0_master_ns
         self._waiting[frame.camera] = frame, contour
         answering = [number for number, camera in enumerate(self._cameras)
@@ -263,7 +265,11 @@ class ContourEstimator:
         self._cover(maps)
 
     def _confirm(self, maps: Maps) -> None:
-        """Have the hand looked for once more: two random searches agree on a wrong hand less often than one errs."""
+        """Have the hand looked for once more: two random searches agree on a wrong hand less often than one errs.
+        Markers that show the same hand are as good."""
+        if maps.t_ns - self._agreed_ns < _SAME_NS:
+            self._confirmed = self._ever = True
+            return
         found = self._finder.found()
         if found is None:
             self._finder.look(maps)
@@ -325,7 +331,7 @@ class ContourEstimator:
         self._finder.reset()
         if self._markers is not None:
             self._markers.begin(self._hand)
-        self._epoch_ns, self._seen_ns = t_ns, t_ns
+        self._epoch_ns, self._seen_ns, self._agreed_ns, self._marked = t_ns, t_ns, _NEVER, []
         self._tracking, self._confirmed = True, False
         for number, camera in enumerate(self._cameras):
             camera.shows = camera.supported = False
@@ -338,7 +344,7 @@ class ContourEstimator:
         self._hand.tracking = False
         self._hand.frames = [None] * len(self._names)
         self._finder.reset()
-        self._waiting = {}
+        self._waiting, self._marked = {}, []
         for camera in self._cameras:
             camera.asked_ns = camera.answered_ns = _NEVER
 
@@ -356,31 +362,90 @@ class ContourEstimator:
         contours = [contour for _, contour in waiting.values()]
         for contour, t_ns in zip(contours, times_ns, strict=True):
             contour.late_s = contour.late_s + (self._seconds(t_ns) - t_s)
+        marked = self._marked_with(waiting)
         hand.take(waiting, t_s)
         prediction, spreads = hand.filter.predict(t_s), [contour.expected_sd for contour in contours]
-        residuals: list[Residual] = [Contours(contours), hand.limits]
+        found: list[BesideContours] = []
         initial = prediction[0]
+        if self._markers is not None:
+            prediction, found, initial = self._choose(self._markers, marked, Contours(contours), prediction, t_s)
+        residuals: list[Residual] = [*found, Contours(contours), hand.limits]
         for number in range(PASSES):
             for contour, spread in zip(contours, spreads, strict=True):
                 contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)
             if number < PASSES - 1:
                 initial = update(hand.process, t_s, prediction, residuals, initial, hand.filter.partial).state
-        hand.filter.add(t_s, residuals, prediction, initial)
+        knot = hand.filter.add(t_s, residuals, prediction, initial)
+        if self._markers is not None:
+            self._markers.judge(found, knot)
 
-    def _weigh_markers(self, frame: CameraObservations) -> bool:
-        """Weigh one frame's markers, or begin with them. Whether they showed anything."""
+    def _choose(self, markers: MarkersOfHand, marked: list[CameraObservations], contours: Contours, predicted: Estimate,
+                t_s: float) -> tuple[Estimate, list[BesideContours], Array]:
+        """The prediction, what the markers say of it, and where the contours are looked for: where it has the hand, or,
+        after markers have contradicted it, where these would show a less certain hand, whichever explains both best."""
+        hand, t_ns = self._hand, self._epoch_ns + round(1e9 * t_s)
+        found, wide = markers.residuals(marked, hand, predicted, t_ns), markers.widened(*predicted)
+        if not found or wide is None:
+            return predicted, found, predicted[0]
+        again, stationary = markers.residuals(marked, hand, wide, t_ns), hand.process.stationary
+        residuals: list[Residual] = [*again, hand.limits]
+        state = update(hand.process, t_s, wide, residuals, None, hand.filter.partial).state
+        state = update(hand.process, t_s, wide, [*residuals, contours], state, hand.filter.partial).state
+        away = hand.process.difference(state, predicted[0])[:POSE]
+        cost = (2.0 * RELOCATION_LOG_ODDS + float(away @ np.linalg.solve(wide[1][:POSE, :POSE], away))
+                + _cost(again, contours, state, stationary))
+        if cost < _cost(found, contours, predicted[0], stationary):
+            return wide, again, state
+        return predicted, found, predicted[0]
+
+    def _take_markers(self, frame: CameraObservations) -> bool:
+        """Begin with one frame's markers, or keep them until the edges of the same frame come, so that both are weighed
+        at once; weigh those alone whose edges do not come. Whether these showed anything."""
         assert self._markers is not None
-        if self._tracking:
-            try:
-                return self._markers.weigh(frame, self._hand, self._epoch_ns)
-            except np.linalg.LinAlgError:
-                self._give_up()
-                return False
+        if not (self._tracking and self._confirmed):
+            self._locate(frame)
+        if not self._tracking:
+            return False
+        frames = [*self._marked, frame]
+        self._marked = [one for one in frames if self._comes(one)]
+        try:
+            return self._weigh_alone([one for one in frames if not self._comes(one)])
+        except np.linalg.LinAlgError:  # the estimate contradicts itself
+            self._give_up()
+            return False
+
+    def _locate(self, frame: CameraObservations) -> None:
+        """Begin where the markers show a hand, or see whether they show the one that is followed."""
+        assert self._markers is not None
         found = self._markers.locate(frame)
         if found is None:
-            return False
-        self._start(*found)
-        return True
+            return
+        pose, t_ns = found
+        if self._tracking and same_hand(self._hand, self._hand.filter.newest.state, pose):
+            self._agreed_ns = t_ns
+        else:
+            self._start(pose, t_ns)
+
+    def _comes(self, frame: CameraObservations) -> bool:
+        """Whether the edges of a frame may still come."""
+        camera = self._cameras[frame.camera]
+        assert camera.newest is not None
+        return (camera.newest.t_row0_master_ns - frame.t_row0_master_ns < 1.5 * camera.period_ns
+                and frame.t_row0_master_ns - camera.answered_ns < WRONG_AFTER_PERIODS * camera.period_ns)
+
+    def _marked_with(self, waiting: dict[int, tuple[EdgeFrame, ContourFrame]]) -> list[CameraObservations]:
+        """The markers of the frames whose edges are `waiting`. Those of earlier frames are weighed alone."""
+        edges_ns = {number: frame.t_row0_master_ns for number, (frame, _) in waiting.items()}
+        marked = self._marked
+        self._marked = [one for one in marked if one.t_row0_master_ns > edges_ns.get(one.camera, _NEVER)]
+        self._weigh_alone([one for one in marked if one.t_row0_master_ns < edges_ns.get(one.camera, _NEVER)])
+        return [one for one in marked if one.t_row0_master_ns == edges_ns.get(one.camera, _NEVER)]
+
+    def _weigh_alone(self, frames: Sequence[CameraObservations]) -> bool:
+        """Weigh the markers of some frames. Whether they showed anything. Raises LinAlgError."""
+        assert self._markers is not None or not frames
+        return self._markers is not None and bool(
+            sum(self._markers.weigh(one, self._hand, self._epoch_ns) for one in frames))
 
     # -- requests ------------------------------------------------------------------------------------------------------
 
@@ -404,10 +469,15 @@ class ContourEstimator:
         self._requests.append(SliceRequest(number, contour.slices[:SLICES_MAX], STEP, contour))
 
     def _contour(self, frame: EdgeFrame) -> ContourFrame | None:
-        """The contour on the slices that were searched: as it was expected, or in a log as it is now."""
+        """The contour on the slices that were searched, with their edges: as it was expected, or in a log as it is
+        now."""
         expected = frame.request.expected
         if isinstance(expected, ContourFrame) and expected.surface is self._hand.surface:
-            return copy.copy(expected) if len(expected.slices) == len(frame.request.slices) else None  # for this frame
+            if len(expected.slices) != len(frame.request.slices):
+                return None
+            contour = copy.copy(expected)  # for this frame
+            contour.observe(frame.edges)
+            return contour
         middle_ns = round(0.5e9 * self._hand.row_s[frame.camera] * self._hand.cameras[frame.camera].height)
         state, covariance = self._hand.filter.predict(self._seconds(frame.t_row0_master_ns + middle_ns))
         return matched(self._hand, frame, state, covariance)
@@ -421,10 +491,18 @@ class ContourEstimator:
         return self._epoch_ns + round(1e9 * self._hand.filter.newest.t_s)
 
     def _state(self, frame: CameraObservations | EdgeFrame, begun: float) -> HandState:
-        hand = self._hand.state(begun) if self._tracking and self._confirmed else no_hand(
+        newest = self._hand.filter.newest if self._tracking else None
+        wide = self._markers.widened(newest.state, newest.covariance) if self._markers and newest else None
+        hand = self._hand.state(begun, wide and wide[1]) if self._tracking and self._confirmed else no_hand(
             frame.t_row0_master_ns, Condition.LOST if self._ever else Condition.SEARCHING)
         return published(hand, self._sequence - 1, frame, self.newest_frames(), self._rig.markers.ids, self._names,
                          time.perf_counter() - begun)
+
+
+def _cost(markers: list[BesideContours], contours: Contours, state: Array, stationary: Array) -> float:
+    """-2 log of how probable a hand in `state` makes its markers and contours, but for a constant."""
+    cost = float(np.sum(contours.linearise(state).error ** 2))
+    return cost + sum(one.cost(state, stationary) for one in markers)
 
 
 def _middle_ns(frame: EdgeFrame) -> int:

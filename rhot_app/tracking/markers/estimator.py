@@ -23,7 +23,7 @@ from rhot_app.tracking.association import GATE, MarkerAssociation, assign
 from rhot_app.tracking.markers.acquisition import Located, Starter
 from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObservations
 from rhot_app.tracking.markers.hand_size import HandSize
-from rhot_app.tracking.markers.marker_model import LASTING_PX, compile_markers
+from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.tracker import CameraObservations
@@ -81,7 +81,7 @@ class Estimator:
             self._resize(*self._size.known)
         self._tracking = self._ever = False
         self._epoch_ns = self._accepted_ns = self._plausible_ns = 0
-        self._rejected = np.zeros((len(self._rig.cameras), len(self._rig.marker_ids)), np.int64)
+        self._rejections = Rejections(len(self._rig.cameras), self._markers)
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; it is weighed by the next `solve`."""
@@ -175,8 +175,8 @@ class Estimator:
         self._observations.note_sizes(frame, prediction[0])
         frame.add_landmark_noise(prediction[0])
         pixels, covariances = frame.predict_pixels(*prediction)
-        distances = _distances(frame, pixels, covariances)
-        frame = self._associate(frame, pixels, covariances, distances)
+        distances = distances_of(frame, pixels, covariances)
+        frame = associate(frame, pixels, covariances, distances)
         self._note_bias(prediction[0])
         try:
             knot = self._filter.add(t_s, [frame], prediction)
@@ -185,7 +185,11 @@ class Estimator:
             return
         inliers = self._observations.accept(frame, knot.state, knot.weights)
         self._weighed(frame)
-        self._reacquire(frame, inliers, distances)
+        wrong = self._rejections.wrong(frame, inliers, distances, self._observations.periods_s[frame.camera])
+        for part, factor in wrong:
+            self._process.inflate(knot.covariance, part, factor)
+        if wrong:
+            self._filter.start(knot.t_s, knot.state, knot.covariance)  # so that no late frame undoes it
         accepted = np.count_nonzero(inliers)
         if accepted:
             self._accepted_ns = max(self._accepted_ns, frame.t_ns)
@@ -195,36 +199,6 @@ class Estimator:
     def _weighed(self, frame: MarkerFrame) -> None:
         """A frame has its knot; covariances are not inflated yet. A recording is smoothed from here (`smoothing`)."""
 
-    def _reacquire(self, frame: MarkerFrame, accepted: Mask, distances: Array) -> None:
-        """Inflate the covariance of a finger, or of the palm, whose marker one camera rejects REJECTIONS times in
-        a row: outliers do not last. All rejections of a landmark within the correlation time of its error count as one.
-        `distances` (M,): squared Mahalanobis distances, 2 on average."""
-        rejected = self._rejected[frame.camera]
-        rejected[accepted] = 0
-        rejected[self._reported(frame) & ~accepted] += 1
-        lasting = max(LASTING_S / self._observations.periods_s[frame.camera], 1.0)
-        enough = REJECTIONS * np.where(self._markers.landmark, lasting, 1.0)
-        for m in np.flatnonzero((rejected >= enough) & (distances > GATE)):
-            finger, knot = self._markers.finger[m], self._filter.newest
-            angles = ANGLE_SLICES[finger]
-            chosen = slice(6 + angles.start, 6 + angles.stop) if finger >= 0 else slice(0, 6)
-            self._process.inflate(knot.covariance, chosen, 0.5 * distances[m])
-            self._filter.start(knot.t_s, knot.state, knot.covariance)  # so that no late frame undoes it
-
-    def _reported(self, frame: MarkerFrame) -> Mask:
-        observations = frame.observations
-        return ((observations.flags & int(MarkerFlag.LOST)) == 0) & np.isfinite(observations.pixels[:, 0])
-
-    def _associate(self, frame: MarkerFrame, pixels: Array, covariances: Array, distances: Array) -> MarkerFrame:
-        """The frame with the blob of each marker, predicted at `pixels` (M, 2) with `covariances` (M, 2, 2) px^2."""
-        if frame.observations.further is None and not np.any(distances > GATE):
-            return frame
-        landmark = self._markers.landmark
-        return frame.associated(lambda listed, listed_covariances, own: assign(
-            np.nan_to_num(pixels), np.where(np.isfinite(pixels[:, :1, None]), covariances, np.eye(2)), listed,
-            listed_covariances, np.where(own, 0.0, np.where(landmark[:, None] | own[landmark].any(axis=0), np.inf,
-                                                            -2.0 * np.log(CONFUSION))))[0])
-
     def _note_bias(self, state: Array) -> None:
         m, bias = self._markers, np.empty((len(self._markers.finger), 3, 3))
         triangulation_covariance(state, m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX,
@@ -232,7 +206,43 @@ class Estimator:
         self._process.set_bias(bias)
 
 
-def _distances(frame: MarkerFrame, pixels: Array, covariances: Array) -> Array:
+class Rejections:
+    """How often in a row each of C cameras has rejected each marker."""
+
+    def __init__(self, cameras: int, markers: MarkerModel) -> None:
+        self._markers, self._counts = markers, np.zeros((cameras, len(markers.finger)), np.int64)
+
+    def wrong(self, frame: MarkerFrame, accepted: Mask, distances: Array, period_s: float) -> list[tuple[slice, float]]:
+        """The fingers, and the palm, whose marker one camera has rejected REJECTIONS times in a row: outliers do not
+        last. All rejections of a landmark within the correlation time of its error count as one. `distances` (M,):
+        squared Mahalanobis distances, 2 on average. `period_s`: between the camera's frames. Returns where they are in
+        a pose, and the factors by which their covariance is too small."""
+        rejected, observations = self._counts[frame.camera], frame.observations
+        reported = ((observations.flags & int(MarkerFlag.LOST)) == 0) & np.isfinite(observations.pixels[:, 0])
+        rejected[accepted] = 0
+        rejected[reported & ~accepted] += 1
+        enough = REJECTIONS * np.where(self._markers.landmark, max(LASTING_S / period_s, 1.0), 1.0)
+        found = []
+        for m in np.flatnonzero((rejected >= enough) & (distances > GATE)):
+            finger = self._markers.finger[m]
+            angles = ANGLE_SLICES[finger]
+            found.append((slice(6 + angles.start, 6 + angles.stop) if finger >= 0 else slice(0, 6),
+                          0.5 * float(distances[m])))
+        return found
+
+
+def associate(frame: MarkerFrame, pixels: Array, covariances: Array, distances: Array) -> MarkerFrame:
+    """The frame with the blob of each marker, predicted at `pixels` (M, 2) with `covariances` (M, 2, 2) px^2."""
+    if frame.observations.further is None and not np.any(distances > GATE):
+        return frame
+    landmark = frame.markers.landmark
+    return frame.associated(lambda listed, listed_covariances, own: assign(
+        np.nan_to_num(pixels), np.where(np.isfinite(pixels[:, :1, None]), covariances, np.eye(2)), listed,
+        listed_covariances, np.where(own, 0.0, np.where(landmark[:, None] | own[landmark].any(axis=0), np.inf,
+                                                        -2.0 * np.log(CONFUSION))))[0])
+
+
+def distances_of(frame: MarkerFrame, pixels: Array, covariances: Array) -> Array:
     """(M,) squared Mahalanobis distances of a frame's markers from their predictions."""
     offset, total = frame.pixels - pixels, covariances + frame.covariances
     a, b, c = total[:, 0, 0], total[:, 0, 1], total[:, 1, 1]

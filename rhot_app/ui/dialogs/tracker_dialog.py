@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.hand.anthropometry import scaled_hand
-from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, estimator_obstacle
+from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, estimator_obstacle, observation_obstacle
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.job import Job
@@ -30,6 +30,7 @@ from rhot_app.ui.models.proposal import RigChange
 from rhot_app.ui.models.words import (
     IK_METHODS,
     KINDS,
+    LANDMARKS_ONLY,
     LIMITS,
     OBSERVED,
     SIZE_MEANING,
@@ -143,8 +144,12 @@ class TrackerDialog(QDialog):
     def _choose(self) -> None:
         settings = self.chosen
         if settings != self._rig.tracker:
-            self._change(msgspec.structs.replace(self._rig, tracker=settings),
-                         f"choosing the tracker {settings_text(settings)}")
+            rig = msgspec.structs.replace(self._rig, tracker=settings)
+            obstacle = observation_obstacle(rig)
+            if obstacle is not None:
+                self._failed(f"{obstacle.why} {obstacle.remedy}")
+                return
+            self._change(rig, f"choosing the tracker {settings_text(settings)}")
 
     def use_size(self) -> None:
         """Put the estimated size into the rig's hand."""
@@ -217,7 +222,9 @@ class TrackerDialog(QDialog):
         self.limits_box.setCurrentIndex(self.limits_box.findData(settings.limits))
         self.size_check.setChecked(settings.float_scale)
         self.observe_box.setCurrentIndex(self.observe_box.findData(settings.observe))
-        self.observe_words.setText(OBSERVED[settings.observe][1])
+        unsaid = not settings.landmarks and all(marker.shape == "landmark" for marker in self._rig.markers.markers)
+        self.observe_words.setText(LANDMARKS_ONLY if unsaid and settings.observe != "contours"
+                                   else OBSERVED[settings.observe][1])
         self.variant_words.setText(VARIANTS[settings.variant][1])
         self.limits_words.setText(LIMITS[settings.limits][1])
         obstacle = estimator_obstacle(self._rig)

@@ -222,13 +222,17 @@ LIMITS: Final = {
                "living hands."),
 }
 OBSERVED: Final = {
-    "markers": ("markers or landmarks", "What the rig's marker set has: painted markers, or the landmarks that a "
-                "detector finds on a bare hand."),
-    "contours": ("bare hand", "No markers: the nodes search their pictures for the hand's edges. Calibrate, Background "
-                 "and skin comes first; then hold the hand still, fingers spread, until it is found."),
-    "both": ("bare hand and markers", "The bare hand's edges beside markers or landmarks. Calibrate, Background and "
-             "skin comes first here, too; the hand is shown once its foreground agrees."),
+    "markers": ("Paint", "The painted markers of the rig's marker set."),
+    "landmarks": ("Landmarks", "The joints that a detector finds on a bare hand, in the nodes or in another program. "
+                  "The rig's marker set is landmarks21 or another one with landmarks."),
+    "contours": ("Contours", "No markers: the nodes search their pictures for the bare hand's edges. Calibrate, "
+                 "Background and skin comes first; then hold the hand still, fingers spread, until it is found."),
+    "both": ("Paint and contours", "The hand's edges beside its painted markers, such as two fingertips. Calibrate, "
+             "Background and skin comes first here, too."),
+    "landmarks_and_contours": ("Landmarks and contours", "The bare hand's edges beside a detector's landmarks, which "
+                               "find the hand at once. Calibrate, Background and skin comes first here, too."),
 }
+LANDMARKS_ONLY: Final = "The rig's marker set has landmarks, no paint: they are tracked. Choose Landmarks to say so."
 SIZE_MEANING: Final = ("The hand's size is estimated as it moves, so that a hand file that is some percent too large "
                        "or too small does no harm. Open and close the hand for half a minute.")
 
@@ -241,8 +245,10 @@ def settings_text(settings: TrackerSettings) -> str:
     if settings.kind == "classic":
         return "classic" if settings.ik == "fabrik" else f"classic, {IK_METHODS[settings.ik][0]}"
     size = ", size estimated" if settings.float_scale else ""
-    if settings.observe != "markers":
-        return f"estimator, {OBSERVED[settings.observe][0]}{size}"
+    if settings.contours:
+        return f"estimator, {OBSERVED[settings.observe][0].lower()}{size}"
+    if settings.landmarks:
+        return f"estimator, landmarks, {settings.variant}, {settings.limits} limits{size}"
     return f"estimator, {settings.variant}, {settings.limits} limits{size}"
 
 

@@ -133,6 +133,7 @@ class MouseWindow(QDialog):
     def begin_or_end_test(self) -> None:
         """Nine targets in place of the balls, or the balls again, which lie where they were."""
         self.test = TargetTest() if self.test is None else None
+        self.pick.interrupt()
         self.test_button.setText("Target test" if self.test is None else "End the test")
         self._told = ""
 

@@ -26,7 +26,7 @@ def make_plan(kit: Kit) -> Plan:
 
     def put_back() -> None:
         """What was only tried out goes."""
-        if accept.state != "used" and (empty.learnt or skin.learnt):
+        if accept.state != "used" and (empty.tried or skin.tried):
             asker = kit.connect()
             try:
                 for node_id in cameras.values():

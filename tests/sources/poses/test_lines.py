@@ -200,9 +200,9 @@ def test_a_file_has_no_trackers_to_choose_from() -> None:
         open_source("recording.csv", "LHR-1A2B3C4D")
 
 
-def rhot(*arguments: str) -> subprocess.CompletedProcess[str]:
+def rhot(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-m", "rhot_app", "poses", *arguments], capture_output=True, text=True,
-                          check=False, env={**os.environ, "PYTHONPATH": str(ROOT)})
+                          check=False, env={**os.environ, "PYTHONPATH": str(ROOT), **environment})
 
 
 def test_the_command_says_figures_and_records(tmp_path: Path) -> None:
@@ -216,7 +216,8 @@ def test_the_command_says_figures_and_records(tmp_path: Path) -> None:
     assert len(stream.t_ns) == fields["tracked"]
     speeds = np.diff(stream.poses[:, 0, 3]) / np.diff(stream.t_ns)
     assert np.median(speeds) == pytest.approx(1e-10, rel=0.01)
-    text = rhot("--source", str(out))
+    text = rhot("--source", str(out), NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    assert "being compiled" in text.stderr
     assert text.returncode == 0 and "Hz" in text.stdout and "rejected" in text.stdout
 
 

@@ -15,7 +15,7 @@ from rhot_app.ui.wizards.foreground import make_plan
 from rhot_app.ui.wizards.framework.plan import Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow
 from rhot_app.ui.wizards.steps import foreground_steps
-from rhot_app.ui.wizards.steps.foreground_steps import findings_of, mask_of
+from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, SkinStep, findings_of, mask_of, propose
 from rhot_node.foreground_store import ForegroundStore
 from rhot_node.network.pictures import PictureBox
 
@@ -28,6 +28,7 @@ class LearningNodes(FakeRigAsker):
     def __init__(self, folder):
         super().__init__(synthetic_rig(), self.picture)
         self.hand, self.broken = False, False
+        self.failing = []  # node ids and requests
         self.stores = {node.node_id: ForegroundStore(folder / f"{node.name}.npz") for node in self.rig.nodes}
 
     def picture(self, node_id, t_s):
@@ -53,8 +54,8 @@ class LearningNodes(FakeRigAsker):
         kind, node_id = request.get("request", ""), arguments.get("node_id")
         if name != "node" or not ("foreground" in kind or kind.startswith(("learn_", "state"))):
             return super().command(name, timeout_s=timeout_s, **arguments)
-        if self.broken:
-            raise EngineError("node left does not answer on its control channel.")
+        if self.broken or (node_id, kind) in self.failing:
+            raise EngineError(f"node {node_id} does not answer on its control channel.")
         store = self.stores[node_id]
         if kind == "state":
             return {"answer": {"foreground": store.report(640, 480)}}
@@ -147,3 +148,69 @@ def test_the_verdict_names_what_is_wrong_with_a_mask(boxes, code):
         grey[y0:y1, x0:x1] = 255
     found = findings_of("left", mask_of(cv2.imencode(".png", grey)[1].tobytes()))
     assert [finding.code for finding in found] == ([code] if code else [])
+
+
+# -- a node that fails when it should keep something, or bring it back ---------------------------------------------
+
+def both_learnt(nodes, command):
+    """The proposal of a scene and a hand that both nodes have learnt."""
+    cameras = {node.name: node.node_id for node in nodes.rig.nodes}
+    empty, skin = EmptyStep(cameras), SkinStep(cameras, lambda: command)
+    for step, hand in ((empty, False), (skin, True)):
+        nodes.hand = hand
+        step.begin()
+        step.finish(step.learn(command))
+    skin.take(skin.see(dict.fromkeys(cameras)))
+    return propose(empty, skin)
+
+
+def known(nodes):
+    return [(store.report(640, 480)["background"], store.path.exists()) for store in nodes.stores.values()]
+
+
+def test_what_one_node_cannot_keep_no_node_keeps_and_it_can_be_used_again(nodes):
+    proposal = both_learnt(nodes, nodes.command)
+    nodes.failing = [(2, "save_foreground")]
+    with pytest.raises(EngineError, match="node 2 does not answer"):
+        proposal.use(nodes.command)
+    nodes.failing = []
+    assert not nodes.stores[1].report(640, 480)["background"]
+    proposal.use(nodes.command)
+    assert known(nodes) == [(True, True), (True, True)]
+    proposal.restore(nodes.command)
+    assert [background for background, _ in known(nodes)] == [False, False]
+    proposal.use(nodes.command)  # the old one was not better
+    assert [background for background, _ in known(nodes)] == [True, True]
+
+
+def test_a_node_that_cannot_take_it_back_is_named_and_the_others_do(nodes):
+    proposal = both_learnt(nodes, nodes.command)
+    nodes.failing = [(2, "save_foreground"), (1, "revert_foreground")]
+    with pytest.raises(EngineError, match="left still has what was learnt now"):
+        proposal.use(nodes.command)
+    nodes.failing = []
+    proposal.use(nodes.command)
+    nodes.failing = [(1, "revert_foreground")]
+    with pytest.raises(EngineError, match="left still has what was learnt now"):
+        proposal.restore(nodes.command)
+    nodes.failing = []
+    assert [background for background, _ in known(nodes)] == [True, False]
+    proposal.restore(nodes.command)
+    assert [background for background, _ in known(nodes)] == [False, False]
+
+
+def test_what_some_nodes_learnt_before_another_failed_is_forgotten_at_the_end(hands, nodes):
+    nodes.failing = [(2, "learn_background")]
+    hands.click(hands.window.page.learn_button)
+    hands.until(lambda: "does not answer" in hands.window.frame.hint.text())
+    hands.until(lambda: nodes.stores[1].report(640, 480)["background"])
+    hands.window.end().wait(5.0)
+    assert not nodes.stores[1].report(640, 480)["background"]
+
+
+def test_the_bar_begins_empty_again_when_the_scene_is_learnt_again(nodes):
+    step = EmptyStep({"left": 1})
+    step.begin()
+    step.finish(step.learn(nodes.command))
+    step.begin()
+    assert step.view().bars[0].fraction == 0.0

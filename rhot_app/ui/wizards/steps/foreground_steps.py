@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import cv2
@@ -55,6 +56,7 @@ class LearningStep(Step):
         self.nodes = dict(cameras)
         self.cameras = tuple(cameras)
         self.learning = self.learnt = False
+        self.tried = 0  # how often a learning was begun, of which some nodes may try something out
         self.problem = ""
 
     def learn(self, command: Command) -> str:
@@ -64,6 +66,7 @@ class LearningStep(Step):
     def begin(self) -> None:
         """It is being learnt."""
         self.learning, self.problem = True, ""
+        self.tried += 1
 
     def finish(self, problem: str = "", *, learnt: bool = True) -> None:
         """It has ended so."""
@@ -84,6 +87,11 @@ class EmptyStep(LearningStep):
         super().__init__(cameras)
         self.before: dict[str, dict[str, Any]] = {}
         self._until_s = 0.0
+
+    def begin(self) -> None:
+        """See `LearningStep`; the time runs from when the nodes have been asked."""
+        super().begin()
+        self._until_s = math.inf
 
     def learn(self, command: Command) -> str:
         """For SECONDS."""
@@ -223,26 +231,45 @@ def findings_of(camera: str, mask: Mask) -> list[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class ForegroundChange:
-    """What the nodes `node_ids` try out is kept in their files; a restore brings back what these had."""
+    """What the nodes (ids by name) try out since the `tried`-th learning is kept in their files; a restore brings back
+    what these had."""
 
-    node_ids: tuple[int, ...]
+    nodes: dict[str, int]
+    tried: int
+    _kept: dict[str, bool] = field(default_factory=dict, compare=False)  # True: kept; False: taken back
 
     def use(self, command: Command) -> None:
         """Keep it, on all nodes or on none."""
-        kept: list[int] = []
-        try:
-            for node_id in self.node_ids:
-                ask_node(command, node_id, "save_foreground")
-                kept.append(node_id)
-        except RhotError:
-            for node_id in kept:
-                ask_node(command, node_id, "revert_foreground", earlier=True)
-            raise
+        for name, node_id in self.nodes.items():
+            try:
+                if name not in self._kept:
+                    ask_node(command, node_id, "save_foreground")
+                elif not self._kept[name]:
+                    ask_node(command, node_id, "revert_foreground", earlier=True)  # what was taken back
+                self._kept[name] = True
+            except RhotError as exc:
+                problem = self._take_back(command)
+                if problem:
+                    raise EngineError(f"{exc} {problem}") from exc
+                raise
 
     def restore(self, command: Command) -> None:
-        """What was kept before."""
-        for node_id in self.node_ids:
-            ask_node(command, node_id, "revert_foreground", earlier=True)
+        """What was kept before. A node that does not answer keeps none of the others from it."""
+        problem = self._take_back(command)
+        if problem:
+            raise EngineError(problem)
+
+    def _take_back(self, command: Command) -> str:
+        """On every node that has kept it; a sentence on those where that failed."""
+        problems = []
+        for name, kept in self._kept.items():
+            try:
+                if kept:
+                    ask_node(command, self.nodes[name], "revert_foreground", earlier=True)
+                    self._kept[name] = False
+            except RhotError as exc:
+                problems.append(f"{name} still has what was learnt now: {exc}")
+        return " ".join(problems)
 
 
 def propose(empty: EmptyStep, skin: SkinStep) -> Proposal | None:
@@ -253,7 +280,7 @@ def propose(empty: EmptyStep, skin: SkinStep) -> Proposal | None:
     rows = [row for name in empty.nodes for row in (
         Row(f"{name}: background", _background(empty.before.get(name, {})), "learnt now"),
         Row(f"{name}: skin", str(empty.before.get(name, {}).get("skin", "none")), "learnt now"))]
-    return Proposal(REASON, verdict, tuple(rows), (ForegroundChange(tuple(empty.nodes.values())),),
+    return Proposal(REASON, verdict, tuple(rows), (ForegroundChange(empty.nodes, empty.tried + skin.tried),),
                     "Calibrate, Tracker chooses the bare hand.")
 
 

@@ -1,0 +1,122 @@
+"""What weighs contours live, piece by piece: recorded slices, the finder's runs, markers on a hand of another size."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from bare_scenes import DISTANCE_M, poses, rig_of, right_hand, scene, state_of
+from pictures import two_cameras
+
+from rhot_app.barehand.contours import STEP_M
+from rhot_app.barehand.observations import EdgeFrame, SliceRequest
+from rhot_app.barehand.start import Found
+from rhot_app.barehand.surface import SHAPE, WHOLE
+from rhot_app.barehand.tracker import SAME_POSE_S, BareHandTracker
+from rhot_app.hand.anthropometry import scaled_hand
+from rhot_app.hand.motion.hand_process import BIAS, MOTION
+from rhot_app.hand.skeleton import HandPose
+from rhot_app.project import Rig
+from rhot_app.tracking.contours import finder as finder_module
+from rhot_app.tracking.contours.evidence import asked, matched
+from rhot_app.tracking.contours.finder import Finder
+from rhot_app.tracking.contours.markers import BesideContours, MarkersOfHand
+from rhot_app.tracking.markers.marker_model import compile_markers
+from rhot_app.tracking.markers.marker_residual import MarkerFrame
+from rhot_app.tracking.tracker import CameraObservations
+from rhot_node.detect.edges import find_edges
+from rhot_node.detect.foreground import skin_foreground
+from rhot_node.files import resource_path
+from rhot_node.markers import load_markers
+
+
+@pytest.fixture
+def hand() -> BareHandTracker:
+    return BareHandTracker(rig_of(two_cameras(distance=DISTANCE_M), right_hand()))
+
+
+def test_recorded_slices_that_the_hand_does_not_cross_say_nothing(hand: BareHandTracker) -> None:
+    """A log with another calibration or another hand has such slices. It may be replayed twice."""
+    pose = poses("grasp", (0.5,))[0]
+    _, images, _ = scene(pose)
+    covariance = 1e-6 * np.eye(hand.process.size)
+    slices = asked(hand, 0, state_of(pose), covariance, STEP_M).slices
+    beside = slices[::2] * [1.0, 1.0, 1.0, 1.0, 0.2] + [250.0, 0.0, 0.0, 0.0, 0.0]
+    request = SliceRequest(0, np.vstack([beside, slices]))
+    edges = find_edges(images[0], request.slices, skin_foreground(), 2.0)
+    frame, before = EdgeFrame(0, 0, 0, 0, 0.0, 0.0, request, edges), [column.copy() for column in edges]
+    contour = matched(hand, frame, state_of(pose), covariance)
+    assert contour is not None and contour.edges is not None
+    assert all(np.array_equal(column, kept) for column, kept in zip(edges, before, strict=True))
+    assert len(contour.slices) == pytest.approx(len(slices), rel=0.03)
+    contour.linearise(state_of(pose))
+    found, expected = contour.seen.sum(axis=0)
+    assert found > 0.75 * expected, "the hand is found on the slices across it"
+    edges = find_edges(images[0], beside, skin_foreground(), 2.0)
+    assert matched(hand, EdgeFrame(0, 0, 0, 0, 0.0, 0.0, SliceRequest(0, beside), edges), state_of(pose),
+                   covariance) is None
+
+
+def test_phalanges_follow_the_contours_at_the_same_pace_beside_markers(hand: BareHandTracker) -> None:
+    hand.start(poses("grasp", (0.5,))[0], 0)
+    hand.take([0, 1], 0.0)
+    hand.take((), 0.1)
+    assert hand.filter.partial.share == 0.0, "their markers explain them, but do not move them"
+    hand.take([0, 1], 0.1)
+    assert hand.filter.partial.share == pytest.approx(0.1 / SAME_POSE_S)
+
+
+def test_a_search_that_ends_while_its_track_is_given_up_gives_no_pose(hand: BareHandTracker,
+                                                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    finder = Finder(hand)
+    pose = poses("grasp", (0.5,))[0]
+    monkeypatch.setattr(finder_module, "find_in_maps", lambda *_: [Found(pose, 1.0)])
+
+    class Maps:
+        probabilities = ()
+
+        @property
+        def t_ns(self) -> int:
+            finder.reset()
+            return 1
+
+    finder.look(Maps())  # type: ignore[arg-type]
+    finder.wait()
+    assert finder.found() is None
+
+
+@pytest.mark.parametrize("markers", ["landmarks21", "rhot6"])
+def test_markers_lie_on_a_hand_as_large_as_the_contours_say(markers: str) -> None:
+    rig = msgspec.structs.replace(rig_of(two_cameras(distance=DISTANCE_M), right_hand()), markers=load_markers(
+        resource_path("markers", f"{markers}.json")))
+    hand, pose, factor = BareHandTracker(rig, known_size=False), poses("grasp", (0.5,))[0], 1.1
+    MarkersOfHand(rig, hand)
+    state = np.zeros(BIAS + SHAPE + 3 * len(rig.markers.ids))
+    state[:BIAS + SHAPE] = state_of(pose)
+    state[BIAS + WHOLE] = np.log(factor)
+    model = compile_markers(rig)
+    residual = BesideContours(MarkerFrame(model, observations(pixels_of(rig, pose, factor))), model, hand.surface.bone,
+                              (state, hand.process.stationary), 0)
+    assert np.abs(residual.linearise(state).error).max() < 1.0, "mm of paint and of creases beside"
+    state[BIAS:BIAS + SHAPE] += np.random.default_rng(0).normal(0.0, 0.02, SHAPE)
+    rows, size = residual.linearise(state), hand.process.size
+    for column in range(MOTION, MOTION + SHAPE):
+        step = np.zeros(size)
+        step[column] = 1e-6
+        moved = residual.linearise(hand.process.retract(state, step)).error
+        np.testing.assert_allclose((rows.error - moved) / 1e-6, rows.jacobian[:, column], rtol=1e-3,
+                                   atol=2e-2 * np.abs(rows.jacobian[:, MOTION]).max())
+
+
+def pixels_of(rig: Rig, pose: HandPose, factor: float) -> np.ndarray:
+    """(M, 2) where the first camera sees the markers of a hand `factor` times as large."""
+    large = msgspec.structs.replace(rig, hand=scaled_hand(rig.hand, factor))
+    model = compile_markers(large)
+    blank = MarkerFrame(model, observations(np.zeros((len(model.finger), 2))))
+    return blank.expected(np.concatenate([state_of(pose)[:BIAS], np.zeros(3 * len(model.finger))]))
+
+
+def observations(pixels: np.ndarray) -> CameraObservations:
+    count = len(pixels)
+    return CameraObservations(0, 0, 0, 0.0, 0, 0.0, 0.0, pixels, np.tile(np.eye(2), (count, 1, 1)), np.ones(count),
+                              np.ones(count), np.zeros(count, np.uint16))
