@@ -24,7 +24,7 @@ from rhot_node.files import write_atomically
 
 FPS = 15.0
 TIMES = tuple(k / 30.0 for k in range(14))
-STILL = 120  # frames of the hand at rest, in which it is found
+STILL = 240  # frames of the hand at rest, in which it is found, by a busy machine, too
 MOVING = (*range(14), *range(13, -1, -1)) * 2
 ORDER = (*([0] * STILL), *MOVING, *([0] * 30))
 ERROR_MM = 8.0  # median joint; 1 when all is well

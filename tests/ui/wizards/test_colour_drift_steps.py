@@ -87,7 +87,7 @@ def test_a_light_that_has_changed_since_the_picking_is_said_on_the_mask_and_in_t
     assert finding.figure.startswith("Camera left: The light has become colder")
     proposal = propose(apart.judged, rig, None, {})
     assert proposal is not None and proposal.verdict == verdict
-    look(apart, MOST)
+    look(apart, 2 * MOST)  # the colder pictures are remembered for a while
     assert apart.view().verdict == calm
 
 
