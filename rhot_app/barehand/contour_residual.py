@@ -129,7 +129,8 @@ class Contours:
         self.frames = frames
 
     def linearise(self, state: Array) -> Rows:
-        """COLUMNS rows with the information of all frames of an instant, and one with the rest of their cost."""
+        """For each instant of the frames, COLUMNS whitened rows of their information and one of the remaining cost.
+        Frames within SAME_TIME_S of the state count as of its instant."""
         by_time: dict[float, list[ContourFrame]] = {}
         for frame in self.frames:
             late_s = float(frame.late_s.mean()) if len(frame.late_s) else 0.0

@@ -37,7 +37,7 @@ TIP_TAPER = 0.85
 
 HYPOTHENAR = 0.22
 """How far the muscles of the little finger's ball stand out beyond its metacarpal, of the palm's thickness: 6 mm of 28,
-measured in a video of a real hand (1200 points of the palm's ulnar contour, 107 images, poses by landmarks)."""
+measured once in a video of a real hand (1200 points of the palm's ulnar contour, 107 images, poses by landmarks)."""
 
 
 class Surface(NamedTuple):
@@ -93,6 +93,7 @@ def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, 
         add(carpal, roots[k], radius, 0.5 * (radius + float(model.radii[k + 1, 0])))
     for k in range(3):
         add(roots[k], roots[k + 1], float(model.radii[k + 1, 0]), float(model.radii[k + 2, 0]))
+    # A capsule beside the last one, over 0.7 of its length and a little thinner at its end: chosen by that video.
     beside = np.array([0.0, -HYPOTHENAR * 2.0 * thick, 0.0])
     add(carpal + beside, carpal + 0.7 * (roots[3] - carpal) + beside, radius, 0.9 * radius)
     heel = np.array([CARPAL_X, 0.4 * thumb[1], -0.006])

@@ -244,8 +244,8 @@ class BareHandTracker:
         return bool(wide > CONFUSED_PX or unfound or self.covered(seen, state) < self.cover - COVER_DROP)
 
     def take(self, cameras: Iterable[int], t_s: float) -> None:
-        """Note that images of `cameras` of the time `t_s`, s since the start, are weighed next. Without cameras it is
-        something else, which the phalanges' lengths and radii explain, too, but do not follow."""
+        """Note that images of `cameras` at `t_s`, s since the start, are weighed next. Without cameras the phalanges'
+        lengths and radii are considered, not updated (Brink 2017)."""
         cameras = list(cameras)
         last_s = max(self._taken_s) if np.isfinite(self._taken_s).any() else self.filter.newest.t_s
         for camera in cameras:

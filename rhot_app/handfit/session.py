@@ -209,7 +209,7 @@ class HandFit:
             pose = self.instant.pose if self.instant is not None else self._before(self.cameras[min(images)])
         limits = self.solver.limits
         pose = HandPose(pose.world_from_palm.copy(), np.clip(pose.angles, limits[:, 0], limits[:, 1]))
-        taken = [int(one.name.split()[-1]) for one in self.state.instants]
+        taken = [int(one.name.split()[-1]) for state in (*self._history.past, self.state) for one in state.instants]
         one = Instant(f"Instant {max(taken, default=0) + 1}", dict(images), pose, np.zeros(2))
         self.take(replace(self.state, instants=(*self.state.instants, one)), f"taking {one.name.lower()}")
         self._current = len(self.state.instants) - 1

@@ -18,6 +18,7 @@ from rhot_app.barehand.contour_residual import COLUMNS, compressed
 from rhot_app.barehand.contours import NEAREST_M, STEP_M, project
 from rhot_app.barehand.surface import FINGERS, FOREARM_TURN, LENGTH, RADIUS, SHAPE, WHOLE
 from rhot_app.barehand.tracker import FOREARM_SD, START_SD
+from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import Dense, minimise
 from rhot_app.estimation.residual import UNIT, Rows
 from rhot_app.geometry.camera import CameraModel
@@ -88,7 +89,11 @@ class Solver:
             replace(one, pose=HandPose(one.pose.world_from_palm, mean)) for one in state.instants))
 
     def solve(self, state: FitState, evidence: Evidence, free: NDArray[np.bool_], steps: int = FIT_STEPS) -> FitState:
-        """The most probable state from `state` on; only numbers that are `free` (n,) change."""
+        """The most probable state from `state` on; only numbers that are `free` (n,) change. Raises CalibrationError
+        where an anchored joint is behind its camera."""
+        if not self._visible(state):
+            raise CalibrationError("A joint with an anchor is behind its camera. Move the hand before the camera, or "
+                                   "free the joint.")
         chosen = np.flatnonzero(free)
 
         def retract(before: FitState, step: Array) -> FitState:

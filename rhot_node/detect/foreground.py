@@ -30,14 +30,16 @@ SKIN_CB, SKIN_CR = (77, 127), (133, 173)
 UNUSUAL = 0.02
 """Probability that a pixel shows what the learnt colours do not: highlights, shadows, new things."""
 
-USUAL_IMAGES = 8
-"""Images whose worth the median pixel's variance has for every pixel: a few images show one pixel's variance badly."""
+PRIOR_IMAGES = 8
+"""Weight, in images, of the median variance of all pixels when one pixel's variance is estimated (shrinkage; chosen: as
+many as show a background in a quarter of a second)."""
 
 _BIN = 256 // BINS  # values of a channel in one bin
 _INVERSE_ROOT_2PI = 0.3989423
 _SAMPLES = 1200  # pixels of which the exposure is estimated, about
 _DARK, _BRIGHT = 16.0, 240.0  # of 255: less is noise, more is clipped
 _GAIN_LOG, _GAIN_BINS = 0.7, 70  # exposures differ by a factor of 2 at most; bins of 2 %
+_LEAST_SAMPLES = 70  # the median of so many ratios errs by 15 % of one ratio's standard deviation
 _FOREIGN = 4.0  # standard deviations of the background
 _OPEN_PX, _LEAST_PIXELS = 3, 400  # smaller patches of skin are none
 _LEAST_SD = 2.0  # of 255: quantisation and compression, below which no background is known
@@ -113,8 +115,8 @@ class BackgroundSums:
             raise ValueError("the background needs at least one image of the scene without a hand")
         mean = self._sum / self.count
         square = np.maximum(self._squares / self.count - mean * mean, 0.0)
-        usual = np.median(square.reshape(-1, square.shape[2]), axis=0)
-        variance = (self.count * square + USUAL_IMAGES * usual) / (self.count + USUAL_IMAGES) * (1.0 + 1.0 / self.count)
+        prior = np.median(square.reshape(-1, square.shape[2]), axis=0)
+        variance = (self.count * square + PRIOR_IMAGES * prior) / (self.count + PRIOR_IMAGES) * (1.0 + 1.0 / self.count)
         return model._replace(mean=mean.astype(np.float32),
                               sd=np.sqrt(np.maximum(variance, _LEAST_SD**2)).astype(np.float32))
 
@@ -137,8 +139,10 @@ def learn_skin(image: Image, model: Foreground | None = None) -> Foreground:
     background. An image without skin gives the generic colours of skin."""
     model = no_foreground() if model is None else model
     skin = skin_mask(image)
-    if model.mean.size:  # skin of which the background has none
-        skin &= np.max(np.abs(image - model.mean) / model.sd, axis=2) > _FOREIGN
+    if model.mean.size:  # skin of which the background, at this exposure, has none
+        gain = gain_of(image, model)
+        sd = model.sd * np.maximum(gain, np.float32(1.0))
+        skin &= np.max(np.abs(image - gain * model.mean) / sd, axis=2) > _FOREIGN
     kernel = np.ones((2 * _OPEN_PX + 1, 2 * _OPEN_PX + 1), np.uint8)
     large = cv2.morphologyEx(skin.astype(np.uint8), cv2.MORPH_OPEN, kernel)
     hand, rest = cv2.erode(large, kernel) > 0, cv2.dilate(large, kernel) == 0
@@ -160,8 +164,8 @@ def _density(pixels: Image) -> Array32:
 
 
 def gain_of(image: Image, model: Foreground) -> Array32:
-    """(3,) how much brighter each channel of an image is than where the background was learnt: an automatic exposure
-    or white balance. It is the most frequent ratio of its pixels to the background's, so the hand does not matter."""
+    """(3,) ratio of an image's brightness to the learnt background's, per channel: automatic exposure, white balance.
+    The mode over pixels, robust while the hand covers less than the background; 1 where it is beyond a factor of 2."""
     gain = np.ones(3, np.float32)
     if model.mean.size:
         _gain(image, model.mean, gain)
@@ -190,7 +194,7 @@ def _gain(image, mean, gain):
         if whole[used] > -_GAIN_LOG and place < _GAIN_BINS:
             counts[place] += 1
             used += 1
-    if used < _GAIN_BINS:
+    if used < _LEAST_SAMPLES:
         return
     top, most = 1, -1
     for k in range(1, _GAIN_BINS - 1):

@@ -87,6 +87,15 @@ def test_an_automatic_exposure_makes_no_background_a_hand(gain: tuple[float, ...
     assert np.mean(probability[:, :18] > 0.5) < 0.03
 
 
+def test_a_brighter_empty_scene_shows_no_skin() -> None:
+    rng = np.random.default_rng(0)
+    scene = SKIN * rng.uniform(0.6, 0.8, (120, 160, 1))
+    known = learn_background(no_foreground(), [np.clip(scene + rng.normal(0.0, 2.0, scene.shape), 0, 255)
+                                               .astype(np.uint8) for _ in range(8)])
+    brighter = np.clip(1.25 * scene + rng.normal(0.0, 2.0, scene.shape), 0, 255).astype(np.uint8)
+    assert np.array_equal(learn_skin(brighter, known).hand, skin_foreground().hand)
+
+
 def test_nothing_learnt_is_said_and_decides_nothing() -> None:
     image, _ = half_plane(0.0, 0.0, 1)
     assert "No background is learnt" in no_foreground().sentence

@@ -106,8 +106,12 @@ class MarkersOfHand:
         """What the markers of some cameras' frames say of a hand that is predicted for master time `t_ns`, as far as
         they may be its markers; none of a frame that shows none."""
         self._note(hand, prediction[0])
-        return [BesideContours(markers, self._markers, hand.surface.bone, prediction, t_ns) for markers in
-                (MarkerFrame(self._markers, frame) for frame in frames) if markers.seen.any()]
+        reported = [MarkerFrame(self._markers, frame) for frame in frames]
+        for one in reported:
+            if not one.seen.any():
+                self._wrong[one.camera] = []  # a marker that is not seen contradicts nothing
+        return [BesideContours(one, self._markers, hand.surface.bone, prediction, t_ns) for one in reported
+                if one.seen.any()]
 
     def judge(self, found: list[BesideContours], knot: Knot) -> None:
         """A knot has weighed `found`, its first residuals."""
@@ -129,8 +133,12 @@ class MarkersOfHand:
         if not wrong:
             return None
         covariance = with_errors_of(self._process.stationary, covariance)
-        for part, factor in wrong:
-            self._process.inflate(covariance, part, factor)
+        largest: dict[tuple[int, int], float] = {}
+        for part, factor in wrong:  # two cameras may say the same
+            key = part.start, part.stop
+            largest[key] = max(largest.get(key, 1.0), factor)
+        for (first, last), factor in largest.items():
+            self._process.inflate(covariance, slice(first, last), factor)
         return without_errors(state), covariance
 
     def _note(self, hand: BareHandTracker, state: Array) -> None:

@@ -51,8 +51,10 @@ def in_order(rig: Rig, paths: Sequence[str]) -> list[str]:
     """The files that a person chose, each with the camera whose name is in its own; where that does not tell them
     apart, sorted by name."""
     names = [node.name for node in rig.nodes]
-    cameras = [[name for name in names if name.lower() in Path(path).stem.lower()] for path in paths]
-    told = [named[0] for named in cameras if len(named) == 1]
-    if len(told) == len(paths) == len(set(told)):
-        return [f"{name}={path}" for name, path in zip(told, paths, strict=True)]
+    # the longest: cam1 is in cam10, too
+    longest = [max((name for name in names if name.lower() in Path(path).stem.lower()), key=len, default=None)
+               for path in paths]
+    named = [name for name in longest if name is not None]
+    if len(named) == len(paths) == len(set(named)):
+        return [f"{name}={path}" for name, path in zip(named, paths, strict=True)]
     return sorted(paths)

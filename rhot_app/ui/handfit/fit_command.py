@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
         fit.add_pictures(read_instant(rig, given, args.at[k] if k < len(args.at) else 0.0))
     fit.begin()
     _require_screen()
-    announce_compilation()
+    announce_compilation("barehand")
     warm_up(rig)
     from PySide6.QtWidgets import QApplication
 

@@ -35,6 +35,9 @@ Image = NDArray[np.uint8]
 REACH_PX: Final = 12.0
 """Of the screen: a press so near to a joint takes it, a fingertip's half width on a touch screen."""
 
+CLICK_PX: Final = 3.0
+"""Of the screen: a press that moves less is a click, and drags nothing (chosen)."""
+
 HANDLE_PX: Final = 4.5
 MOST_ZOOM: Final = 16.0
 NUDGE_PX, LARGE_NUDGE_PX = 0.5, 5.0
@@ -69,7 +72,7 @@ class FitPicture(QWidget):
         self._outline: Sequence[Outline] = ()
         self.joint = -1  # the one meant
         self.usable = False
-        self._dragging = False
+        self._dragging, self._moved, self._pressed = False, False, QPointF()
         self._zoom, self._middle = 1.0, np.array([0.5, 0.5])  # the part of the picture at the widget's middle
         self._pan: QPointF | None = None
         self.setMinimumSize(240, 180)
@@ -172,7 +175,7 @@ class FitPicture(QWidget):
         self.choose(joint)
         self.chosen.emit(joint)
         if event.button() == Qt.MouseButton.LeftButton:
-            self._dragging = True
+            self._dragging, self._moved, self._pressed = True, False, event.position()
             self.grabbed.emit(joint)
         elif event.button() == Qt.MouseButton.RightButton:
             self.removed.emit(joint)
@@ -185,7 +188,9 @@ class FitPicture(QWidget):
             self._look_at(self._middle - np.array([moved.x() / place.target.width(),
                                                    moved.y() / place.target.height()]))
         elif self._dragging:
-            self.dragged.emit(*self._to_picture(event.position()), False)
+            self._moved = self._moved or (event.position() - self._pressed).manhattanLength() >= CLICK_PX
+            if self._moved:
+                self.dragged.emit(*self._to_picture(event.position()), False)
         elif self.usable:
             joint = self._joint_at(event.position())
             self.setCursor(Qt.CursorShape.OpenHandCursor if joint >= 0 else Qt.CursorShape.ArrowCursor)
@@ -195,9 +200,10 @@ class FitPicture(QWidget):
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802
         """The end of a drag."""
         self._pan = None
-        if self._dragging:
+        if self._dragging and event.button() == Qt.MouseButton.LeftButton:
             self._dragging = False
-            self.dragged.emit(*self._to_picture(event.position()), True)
+            if self._moved:
+                self.dragged.emit(*self._to_picture(event.position()), True)
             self.released.emit()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802

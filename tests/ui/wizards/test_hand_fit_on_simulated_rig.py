@@ -50,6 +50,7 @@ def drag(view, joint, to):
     ends = [view.to_widget(*place) for place in (view.joints[joint], to)]
     start, end = (QPoint(round(point.x()), round(point.y())) for point in ends)
     QTest.mousePress(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, start)
+    QTest.mouseMove(view, start + QPoint(4, 4))  # farther than a click
     QTest.mouseMove(view, (start + end) / 2)
     QTest.mouseRelease(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, end)
 

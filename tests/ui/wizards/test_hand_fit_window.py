@@ -57,6 +57,7 @@ class Person:
         """Over the screen by so many px; returns where in the picture it ended."""
         view, start = self.frame.views[camera], self.at(camera, joint)
         QTest.mousePress(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, start)
+        QTest.mouseMove(view, start + QPoint(4, 4))  # farther than a click
         for part in (0.25, 0.5, 0.75, 1.0):
             QTest.mouseMove(view, start + QPoint(round(part * dx), round(part * dy)))
         QTest.mouseRelease(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, start + QPoint(dx, dy))
@@ -185,8 +186,10 @@ def test_a_number_is_typed(person):
 
 def test_a_click_on_a_joint_shows_the_numbers_of_its_finger(person):
     one = person()
-    one.drag(0, JOINTS.index("ring_tip"), 1, 1)
+    QTest.mouseClick(one.frame.views[0], Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
+                     one.at(0, JOINTS.index("ring_tip")))
     assert one.frame.form.group == "Ring"
+    assert one.frame.errors.text() == "no anchors", "a click drags nothing"
     one.frame.form.show_group("Lengths")
     one.drag(0, JOINTS.index("thumb_tip"), 1, 1)
     assert one.frame.form.group == "Lengths", "a group of the shape stays"
