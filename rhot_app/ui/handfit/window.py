@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.barehand.tracker import LEAST_SUPPORT
 from rhot_app.errors import CalibrationError, RhotError
 from rhot_app.hand.anatomy import HandAnatomy, save_hand
 from rhot_app.hand.skeleton import JOINTS, HandPose
@@ -73,6 +74,7 @@ class HandFitWindow(QDialog):
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
         self.resize(*_SIZE)
         self._job: Job | None = None
+        self._storing = False  # the job writes the rig, which nothing takes back half way
         self._guide: GuideViewer | None = None
         self.told = fit.warning
         self._bad, self._at_s = False, 0.0
@@ -248,7 +250,7 @@ class HandFitWindow(QDialog):
             one = self.fit.instant
             found = one.contour.found if one is not None and one.contour is not None else 0.0
             return (f"{found:.0%} of the hand's contour was found in the pictures."
-                    + ("" if found > 0.77 else " Drag what is wrong to its place, then fit again."))
+                    + ("" if found > LEAST_SUPPORT else " Drag what is wrong to its place, then fit again."))
 
         self._work("Fitting to the contours", lambda progress: self.fit.fitted_to_contours(), "fitting to contours",
                    say)
@@ -301,14 +303,14 @@ class HandFitWindow(QDialog):
 
     def cancel(self) -> None:
         """Give up what is computed."""
-        if self._job is not None and self._kept is not None:
+        if self._job is not None and not self._storing:
             self._job.cancel()
             self._job = None
             self.tell("Cancelled; nothing was changed.")
             self.refresh()
 
     def _failed(self, sentence: str) -> None:
-        self._job = None
+        self._job, self._storing = None, False
         self.tell(sentence, bad=True)
         self.refresh()
 
@@ -347,12 +349,13 @@ class HandFitWindow(QDialog):
             return
 
         def done(_: None) -> None:
-            self._job = None
+            self._job, self._storing = None, False
             self.fit.note_saved()
             self.tell("The rig has this hand now. Calibrate, Bring back an earlier calibration restores the old one.")
             self.refresh()
             self.used.emit()
 
+        self._storing = True
         self._job = Job(lambda progress: use(hand), done, self._failed, None, self).start()
         self.refresh()
 
@@ -390,6 +393,7 @@ class HandFitWindow(QDialog):
             self.frame.form.fill(fit.value, fit.sd)
         self.frame.errors.setText(_error_words(list(errors.values())))
         self.frame.show_buttons(fit, fitted=fitted, anchored=bool(errors), idle=self._job is None)
+        self.frame.cancel_button.setVisible(self._job is not None and not self._storing)
         self._show_sentence()
 
     def _show_sentence(self) -> None:
