@@ -5,7 +5,7 @@ MIRROR="${MIRROR:-http://deb.debian.org/debian}"
 
 fail() { printf '%s\n' "$@" >&2; exit 2; }
 
-# What this machine lacks to make userlands, for arm64 ($1) an emulator as well, which the kernel is told of.
+# What this machine lacks to make userlands, and for arm64 ($1) an emulator, registered with the kernel.
 need_programs() {
   local packages=() rule=/usr/lib/binfmt.d/qemu-aarch64.conf rules=/proc/sys/fs/binfmt_misc
   [ "$(id -u)" = 0 ] || fail "Only root may make and enter a Debian userland: run this script with sudo."

@@ -182,11 +182,14 @@ class BareHandTracker:
     def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
         """Look for a hand of which nothing is known, and begin with the most probable one. False without any.
 
-        The best poses by the foreground are followed in the same images; the one whose contour is found best stays.
+        The best poses by the foreground are followed in the same images; the one whose contour is found best stays. A
+        pose that is less probable than no hand (a negative score) is none.
         """
         size = np.zeros(SHAPE)
         best: tuple[float, Found] | None = None
         for found in find_hand(images, self.cameras, self.foreground, self.model, self.surface, size, self._rng):
+            if found.score <= 0.0:
+                continue
             self.start(found.pose, t_ns)
             self.see({c: image for c, image in enumerate(images) if image is not None}, t_ns)
             seen = self.fit.seen.sum(axis=(0, 1))

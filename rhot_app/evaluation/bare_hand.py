@@ -107,7 +107,9 @@ CASES: Final = (
 class EvaluatedRun:
     """One seed of a case, by frame (F,): `joint_m` mean joint error, `angle_rad` mean angle error, `image_px` mean
     joint error in the first camera's picture, `within` share of joints within three sigma; NaN where there is no
-    state. `step_s` (F,): time that a step took. `followed` (F,): a state that is not confused. `judged` (F,).
+    state. `exact_m` (F,): the mean error of joints whose image points are exact, triangulated with the calibration that
+    the tracker is given; NaN before one camera. `step_s` (F,): time that a step took. `followed` (F,): a state that is
+    not confused. `judged` (F,).
     `start_s`: from the first frame that shows the whole hand (or from the end of a loss) to the first good state, NaN:
     never."""
 
@@ -117,6 +119,7 @@ class EvaluatedRun:
     angle_rad: Array
     image_px: Array
     within: Array
+    exact_m: Array
     step_s: Array
     followed: NDArray[np.bool_]
     judged: NDArray[np.bool_]
@@ -211,8 +214,23 @@ def _judged(case: Case, sequence: BareHandSequence, frames: Sequence[BareHandFra
     judged_s = LOSS_S[0] if case.lost else good_s + SETTLE_S
     judged = in_view & (times_s >= (judged_s if np.isfinite(judged_s) else begin_s + SETTLE_S))
     joint_m, angle_rad, image_px, consistent = figures.T
-    return EvaluatedRun(sequence.seed, sequence.motion, joint_m, angle_rad, image_px, consistent, step_s, followed,
+    return EvaluatedRun(sequence.seed, sequence.motion, joint_m, angle_rad, image_px, consistent,
+                        np.array([_exact(sequence, case, frame) for frame in frames]), step_s, followed,
                         judged, good_s - begin_s)
+
+
+def _exact(sequence: BareHandSequence, case: Case, frame: BareHandFrame) -> float:
+    """Mean error, m, of the joints of a frame, seen exactly by the true cameras and triangulated by the tracker's."""
+    if case.cameras < 2:
+        return np.nan
+    joints, rows = frame.truth.joints, []
+    for true, given in zip(sequence.rig.nodes, sequence.tracker_rig.nodes, strict=True):
+        pixels = CameraModel.from_rig(true.intrinsics, true.pose).project(joints)
+        camera = CameraModel.from_rig(given.intrinsics, given.pose)
+        matrix = camera.camera_from_world[:3]
+        rows.append(camera.undistort(pixels)[:, :, None] * matrix[2] - matrix[:2])
+    last = np.linalg.svd(np.concatenate(rows, axis=1))[2][:, 3]
+    return float(np.mean(np.linalg.norm(last[:, :3] / last[:, 3:] - joints, axis=1)))
 
 
 def _within(error: Array, covariances: Array) -> float:
@@ -255,7 +273,9 @@ def figures_of(runs: Sequence[EvaluatedRun]) -> Figures:
     consistent = np.concatenate([run.within[run.judged] for run in runs])
     lost = np.concatenate([~run.followed[run.judged] for run in runs])
     starts = np.array([run.start_s for run in runs])
+    exact = np.concatenate([1e3 * run.exact_m[run.judged] for run in runs])
     return figures | {
+        "exact_mm_median": _or_none(np.median, exact[np.isfinite(exact)]),
         "rate_hz_median": 1.0 / float(np.median(steps)) if len(steps) else None,
         "step_ms_p99": 1e3 * float(np.percentile(steps, 99.0)) if len(steps) else None,
         "within_3_sd": _or_none(np.mean, consistent[np.isfinite(consistent)]),

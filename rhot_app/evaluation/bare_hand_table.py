@@ -30,16 +30,18 @@ PUBLISHED: Final = (
 
 COLUMNS: Final = (
     ("joint_mm_median", "median", ".1f"), ("joint_mm_p95", "p95", ".1f"), ("joint_mm_worst_seed", "worst", ".1f"),
+    ("exact_mm_median", "exact", ".1f"),
     ("angle_deg_median", "median", ".1f"), ("angle_deg_p95", "p95", ".1f"), ("angle_deg_worst_seed", "worst", ".1f"),
     ("image_px_median", "median", ".1f"), ("image_px_p95", "p95", ".1f"),
     ("within_3_sd", "3 sg", ".3f"), ("lost_part", "lost", ".3f"), ("start_s_median", "start s", ".2f"),
     ("started", "started", ".0f"), ("rate_hz_median", "Hz", ".0f"), ("step_ms_p99", "p99 ms", ".0f"))
-_GROUPS: Final = (("joints mm", 3), ("angles deg", 3), ("image px", 2), ("", 6))
+_GROUPS: Final = (("joints mm", 4), ("angles deg", 3), ("image px", 2), ("", 6))
 _WIDTH: Final = 8
 
 LEGEND: Final = """\
 Over all judged frames of all seeds; worst: the seed with the largest mean.
   joints, angles  mean error of the 21 joints, and of the 21 angles, of a frame
+  exact           what exact image points would give with the tracker's calibration, median
   image           the same of the joints in the first camera's picture
   3 sg            part of the joints within three sigma of their covariance (0.997 where it is true)
   lost            part of the frames that show the whole hand and have no state, or one off by more than 20 mm

@@ -32,12 +32,6 @@ def require_calibrated(rig: Rig) -> str:
     return "" if finding is None else f"{finding.finding.figure} {finding.finding.cause}".strip()
 
 
-def pictures_of(rig: Rig, given: Sequence[str]) -> dict[int, Image]:
-    """(H, W, 3) RGB pictures by the camera's number, of files as `files_by_camera` takes them. Raises CalibrationError
-    for what is no picture of a camera of the rig."""
-    return {camera: read_picture(path, rig.nodes[camera]) for camera, path in files_by_camera(rig, given).items()}
-
-
 def files_by_camera(rig: Rig, given: Sequence[str]) -> dict[int, Path]:
     """Files by the camera's number: in the order of the rig's cameras, or as NAME=FILE. Raises CalibrationError."""
     names = [node.name for node in rig.nodes]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import COLUMNS, compressed
 from rhot_app.barehand.contours import NEAREST_M, STEP_M, project
+from rhot_app.barehand.joints import add_lengths
 from rhot_app.barehand.surface import FINGERS, FOREARM_TURN, LENGTH, RADIUS, SHAPE, WHOLE
 from rhot_app.barehand.tracker import FOREARM_SD, START_SD
 from rhot_app.errors import CalibrationError
@@ -203,19 +204,13 @@ def joint_places(model: HandModel, bone: NDArray[np.int64], shape: Array, instan
     jacobian_arrays(dh, pose.world_from_palm, frames, points, moves)
     out = np.zeros((count, 3, SIZE + OWN))
     out[:, :, SIZE:SIZE + POSE] = moves[:count]
-    out[:, :, WHOLE] = points[:count] - pose.world_from_palm[:3, 3]
+    lengths = np.zeros((count, 3, 2 + RADIUS - LENGTH))
+    add_lengths(dh, bone, pose.world_from_palm, frames, points[:count], lengths)
+    out[:, :, WHOLE], out[:, :, FINGERS], out[:, :, LENGTH:RADIUS] = lengths[..., 0], lengths[..., 1], lengths[..., 2:]
     roots = np.exp(shape[WHOLE]) * pose.world_from_palm[:3, :3] * np.array([1.0, model.mirror, 1.0])
-    for joint in range(count):
-        if joint:
-            finger = (joint - 1) // 4
-            out[joint, :, ROOTS + 3 * finger:ROOTS + 3 * finger + 3] = roots
-        row = dh.point_row[joint]
-        while row >= 0:
-            if bone[row] >= 0:
-                along = dh.a[row] * frames[row, :, 0]
-                out[joint, :, LENGTH + bone[row]] += along
-                out[joint, :, FINGERS] += along
-            row = dh.parent[row]
+    for joint in range(1, count):
+        finger = (joint - 1) // 4
+        out[joint, :, ROOTS + 3 * finger:ROOTS + 3 * finger + 3] = roots
     return points[:count], out
 
 

@@ -7,7 +7,7 @@ import pytest
 from bare_scenes import model_and_surface, poses, scene, state_of
 from pictures import picture, two_cameras
 
-from rhot_app.barehand.contour_residual import ContourFrame, slices_of
+from rhot_app.barehand.contour_residual import ContourFrame, Contours, slices_of
 from rhot_app.barehand.contours import COLUMNS, INNER, SILHOUETTE, contour_points
 from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.surface import FOREARM_TURN, SHAPE, Surface
@@ -69,6 +69,28 @@ def test_contours_follow_the_hand_as_their_derivatives_say(features: bool) -> No
         difference = (moved[1] - moved[0]) / 4e-5
         scale = max(np.abs(difference).max(), 1.0)
         assert np.abs(difference - rows[:, column]).max() < 2e-3 * scale, f"column {column}"
+
+
+def test_contours_of_a_later_image_follow_the_velocity() -> None:
+    _, surface = model_and_surface()
+    process, camera, state = process_of(), two_cameras()[1], state_of(poses("grasp", (0.9,))[0])
+    frame = frame_of(surface, state, camera)
+    empty = np.zeros((len(frame.slices), MOST))
+    edges = Edges(np.ones(len(empty), np.int64), *(empty.copy() for _ in range(5)))
+    frame.expected_sd[:] = 0.0
+    edges.offset[:, 0], edges.sd[:, 0], edges.strength[:, 0], edges.inside[:, 0] = 0.3, 0.5, 5.0, 1.0
+    frame.observe(edges)
+    frame.late_s = frame.late_s + 0.013
+    rows = Contours([frame]).linearise(state)
+    slope = rows.jacobian.T @ rows.error
+    step = np.zeros(process.size)
+    for axis in range(3):
+        costs = []
+        for sign in (-1.0, 1.0):
+            step[:] = 0.0
+            step[POSE + axis] = sign * 1e-3
+            costs.append(float(np.sum(Contours([frame]).linearise(process.retract(state, step)).error ** 2)))
+        assert 0.5 * (costs[1] - costs[0]) / 2e-3 == pytest.approx(-slope[POSE + axis], rel=0.02, abs=0.05)
 
 
 def test_edges_within_the_hand_are_told_from_its_silhouette() -> None:

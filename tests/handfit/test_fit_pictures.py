@@ -9,8 +9,9 @@ import pytest
 from fit_scenes import drawn
 
 from rhot_app.errors import CalibrationError
-from rhot_app.handfit.pictures import pictures_of, require_calibrated
+from rhot_app.handfit.pictures import require_calibrated
 from rhot_app.handfit.session import HandFit
+from rhot_app.ui.handfit.files import read_instant
 
 
 @pytest.fixture
@@ -26,10 +27,10 @@ def files(tmp_path):
 def test_pictures_are_in_the_order_of_the_cameras_or_named(files):
     rig, (first, second) = files
     for given in ([first, second], [f"camera 2={second}", f"camera 1={first}"]):
-        found = pictures_of(rig, given)
+        found = read_instant(rig, given)
         for camera, image in enumerate(drawn()[2]):
             assert np.array_equal(found[camera], image)
-    assert set(pictures_of(rig, [f"camera 2={second}"])) == {1}
+    assert set(read_instant(rig, [f"camera 2={second}"])) == {1}
 
 
 def test_what_is_no_picture_of_a_camera_is_said(files, tmp_path):
@@ -43,7 +44,7 @@ def test_what_is_no_picture_of_a_camera_is_said(files, tmp_path):
                             ([first, second, first], "one picture more"),
                             ([first, f"camera 1={first}"], "two pictures"), ([], "No picture was given")):
         with pytest.raises(CalibrationError, match=sentence):
-            pictures_of(rig, given)
+            read_instant(rig, given)
 
 
 def test_uncalibrated_cameras_are_refused(files):

@@ -126,7 +126,7 @@ class NumberForm(QWidget):
         self.group_box.setCurrentText(group)
 
     def fill(self, value: Callable[[Number], float], sd: Callable[[Number], float]) -> None:
-        """Show the newest values of the group in sight."""
+        """Show the newest values of the group that is shown."""
         for row in self.rows.values():
             if row.number.group == self.group:
                 row.fill(value(row.number), sd(row.number))

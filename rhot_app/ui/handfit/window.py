@@ -76,7 +76,7 @@ class HandFitWindow(QDialog):
         self._job: Job | None = None
         self._storing = False  # the job writes the rig, which nothing takes back half way
         self._guide: GuideViewer | None = None
-        self.told = fit.warning
+        self.message = fit.warning
         self._bad, self._at_s = False, 0.0
         self.frame = FitFrame(fit, scheme, kept, self, live=live is not None)
         self._connect_parts()
@@ -363,7 +363,7 @@ class HandFitWindow(QDialog):
 
     def tell(self, sentence: str, *, bad: bool = False) -> None:
         """What was done, or why it could not be done."""
-        self.told, self._bad = sentence, bad
+        self.message, self._bad = sentence, bad
         self._show_sentence()
 
     def tick(self) -> None:
@@ -397,7 +397,7 @@ class HandFitWindow(QDialog):
         self._show_sentence()
 
     def _show_sentence(self) -> None:
-        sentence = self.told
+        sentence = self.message
         if not sentence and self.live:
             sentence = "Hold the hand still in all pictures, fingers spread, and press Take pictures."
         elif not sentence and self.fit.instant is None:

@@ -72,17 +72,17 @@ def test_a_hand_of_the_wrong_size_is_fitted_by_anchors_and_used(window, simulate
             drag(view, JOINTS.index(name), fit.cameras[camera].project(joints)[JOINTS.index(name)])
     frame.freedom_box.setCurrentIndex(1)
     QTest.mouseClick(frame.anchors_button, Qt.MouseButton.LeftButton)
-    Hands.wait(lambda: "Fitted to the anchors" in window.told, 30.0)
+    Hands.wait(lambda: "Fitted to the anchors" in window.message, 30.0)
     QTest.mouseClick(frame.contours_button, Qt.MouseButton.LeftButton)
-    Hands.wait(lambda: "contour was found" in window.told, 120.0)
-    print(window.told, frame.errors.text())
+    Hands.wait(lambda: "contour was found" in window.message, 120.0)
+    print(window.message, frame.errors.text())
     frame.form.show_group("Lengths")
     window.frame_hand()
     for view in frame.views:
         view.choose(-1)
     check("hand-fit-live", window.grab().toImage(), 60)
     QTest.mouseClick(frame.use_button, Qt.MouseButton.LeftButton)
-    Hands.wait(lambda: "The rig has this hand now" in window.told, 60.0)
+    Hands.wait(lambda: "The rig has this hand now" in window.message, 60.0)
     saved = simulated_rig.saved.hand
     for finger in saved.fingers:
         ratio = sum(saved.fingers[finger].bones_mm) / sum(truth.hand.fingers[finger].bones_mm)

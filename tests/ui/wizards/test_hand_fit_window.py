@@ -475,13 +475,13 @@ def test_pictures_are_taken_of_live_cameras_and_the_hand_goes_to_the_rig(live):
     wait(lambda: all(view._kept is not None for view in window.frame.views))
     assert window.frame.instant_box.currentText() == "Live pictures"
     QTest.keyClick(window, Qt.Key.Key_Space)
-    assert window.fit.instant is not None and "where it is tracked" in window.told
+    assert window.fit.instant is not None and "where it is tracked" in window.message
     assert not window.live and set(window.fit.instant.images) == {0, 1}
     window.frame.form.show_group("Lengths")
     number = next(one for one in window.fit.numbers if one.kind == "length")
     window.frame.form.rows[number.key].box.setValue(50.0)
     QTest.mouseClick(window.frame.use_button, Qt.MouseButton.LeftButton)
-    wait(lambda: "The rig has this hand now" in window.told)
+    wait(lambda: "The rig has this hand now" in window.message)
     assert asker.rig.hand.fingers["thumb"].bones_mm[0] == pytest.approx(50.0, abs=1e-4)
     assert load_rig(path).hand == asker.rig.hand and versions(path)[0].replaced_by == "hand fitted to pictures"
     window.frame.instant_box.setCurrentIndex(0)
