@@ -63,30 +63,56 @@ def silhouettes(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequence[
 
 
 @njit(cache=True)
-def _paint(c0, c1, r0, r1, pose, intrinsics, step, mask, value, a, b, slope):
-    """Mark the pixels of a capsule in `mask` (h, w) that are not marked yet."""
+def _outline(c0, c1, r0, r1, pose, intrinsics, step, a, b, slope, circles):
+    """Fill `circles` (9,) with what a capsule covers of an image, px of the map: places and radii at its ends, the
+    way between them, and 1 / its square. False where it is not in front of the camera."""
     if not (project(c0[0], c0[1], c0[2], pose, intrinsics, a, slope)):
-        return
+        return False
     if not (project(c1[0], c1[1], c1[2], pose, intrinsics, b, slope)):
-        return
+        return False
     z0 = pose[2, 3] + pose[2, 0] * c0[0] + pose[2, 1] * c0[1] + pose[2, 2] * c0[2]
     z1 = pose[2, 3] + pose[2, 0] * c1[0] + pose[2, 1] * c1[1] + pose[2, 2] * c1[2]
-    u0, v0 = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5
-    u1, v1 = (b[0] + 0.5) / step - 0.5, (b[1] + 0.5) / step - 0.5
-    s0, s1 = intrinsics[0] * r0 / z0 / step, intrinsics[0] * r1 / z1 / step
-    height, width = mask.shape
-    left, right = max(int(min(u0 - s0, u1 - s1)), 0), min(int(max(u0 + s0, u1 + s1)) + 1, width - 1)
-    top, bottom = max(int(min(v0 - s0, v1 - s1)), 0), min(int(max(v0 + s0, v1 + s1)) + 1, height - 1)
-    du, dv = u1 - u0, v1 - v0
-    square = max(du * du + dv * dv, 1e-9)
+    circles[0], circles[1] = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5
+    circles[2], circles[3] = (b[0] + 0.5) / step - 0.5, (b[1] + 0.5) / step - 0.5
+    circles[4], circles[5] = intrinsics[0] * r0 / z0 / step, intrinsics[0] * r1 / z1 / step
+    circles[6], circles[7] = circles[2] - circles[0], circles[3] - circles[1]
+    circles[8] = 1.0 / max(circles[6] * circles[6] + circles[7] * circles[7], 1e-9)
+    return True
+
+
+@njit(cache=True)
+def _paint(circles, ring, ring_slope, mask, box):
+    """Mark a capsule's pixels in `mask` (h, w) with 1, those in the ring about it, px wide at the first end and at the
+    last, with 2 where no capsule is. `box`: first and last row and column marked so far."""
+    u0, v0, u1, v1, s0, s1 = circles[0], circles[1], circles[2], circles[3], circles[4], circles[5]
+    du, dv, inverse = circles[6], circles[7], circles[8]
+    wide0, wide1 = s0 + ring, s1 + ring + ring_slope
+    left = max(int(min(u0 - wide0, u1 - wide1)), 0)
+    right = min(int(max(u0 + wide0, u1 + wide1)) + 1, mask.shape[1] - 1)
+    top = max(int(min(v0 - wide0, v1 - wide1)), 0)
+    bottom = min(int(max(v0 + wide0, v1 + wide1)) + 1, mask.shape[0] - 1)
+    box[0], box[1] = min(box[0], top), max(box[1], bottom)
+    box[2], box[3] = min(box[2], left), max(box[3], right)
     for row in range(top, bottom + 1):
         for column in range(left, right + 1):
-            if mask[row, column]:
+            if mask[row, column] == 1:
                 continue
-            t = min(max(((column - u0) * du + (row - v0) * dv) / square, 0.0), 1.0)
+            t = min(max(((column - u0) * du + (row - v0) * dv) * inverse, 0.0), 1.0)
             x, y, r = column - u0 - t * du, row - v0 - t * dv, s0 + t * (s1 - s0)
-            if x * x + y * y <= r * r:
-                mask[row, column] = value
+            square, wide = x * x + y * y, r + ring + t * ring_slope
+            if square <= r * r:
+                mask[row, column] = 1
+            elif square <= wide * wide:
+                mask[row, column] = 2
+
+
+@njit(cache=True)
+def _covers(circles, column, row):
+    """Whether a pixel lies on a capsule (`_outline`)."""
+    x, y = column - circles[0], row - circles[1]
+    t = min(max((x * circles[6] + y * circles[7]) * circles[8], 0.0), 1.0)
+    x, y, r = x - t * circles[6], y - t * circles[7], circles[4] + t * (circles[5] - circles[4])
+    return x * x + y * y <= r * r
 
 
 @njit(cache=True)
@@ -122,7 +148,7 @@ def _arm(world, wrist, thick, bend, odds, step, pose, intrinsics, mask, a, b, sl
 @njit(cache=True)
 def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, parts):
     """Log odds of a pose; `parts` (C, 3): of each camera the sum of log odds on the hand, its pixels, and the sum of
-    log odds in the ring about it."""
+    log odds in the ring about it. `mask` (h, w) is 0, and is so again afterwards."""
     count = surface.row.shape[0]
     frames = np.empty((surface.dh.parent.shape[0], 3, 4))
     centres, radii = np.empty((count, 2, 3)), np.empty((count, 2))
@@ -133,39 +159,36 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
     for k in range(count):
         if surface.group[k] == FOREARM:
             thick = max(thick, radii[k, 0])
+    circles, cone, box = np.empty(9), np.empty(9), np.empty(4, np.int64)
     for camera in range(odds.shape[0]):
-        mask[:] = 0
+        pose, lens = poses[camera], intrinsics[camera]
+        box[0], box[1], box[2], box[3] = mask.shape[0], -1, mask.shape[1], -1
         for k in range(count):
-            if surface.group[k] != FOREARM:
-                _paint(centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1], poses[camera], intrinsics[camera], step,
-                       mask, 1, a, b, slope)
+            if surface.group[k] != FOREARM and _outline(centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1], pose,
+                                                        lens, step, a, b, slope, circles):
+                first, last = circles[4] * RING_M / radii[k, 0], circles[5] * RING_M / radii[k, 1]
+                _paint(circles, first, last - first, mask, box)
         # the arm ends at the camera's housing at the latest
         end, depth0, depth1 = 1.0, 0.0, 0.0
         for i in range(3):
-            depth0 += poses[camera, 2, i] * wrist[i]
-            depth1 += poses[camera, 2, i] * elbow[i]
-        depth0, depth1 = depth0 + poses[camera, 2, 3], depth1 + poses[camera, 2, 3]
+            depth0 += pose[2, i] * wrist[i]
+            depth1 += pose[2, i] * elbow[i]
+        depth0, depth1 = depth0 + pose[2, 3], depth1 + pose[2, 3]
         if depth1 < 0.1 and depth0 > 0.1:
             end = (depth0 - 0.1) / (depth0 - depth1)
-        reach = wrist + end * (elbow - wrist)
-        _paint(wrist, reach, thick, thick + end * ARM_M * ARM_SPREAD, poses[camera], intrinsics[camera], step, mask, 2,
-               a, b, slope)
-        for k in range(count):
-            if surface.group[k] != FOREARM:
-                _paint(centres[k, 0], centres[k, 1], radii[k, 0] + RING_M, radii[k, 1] + RING_M, poses[camera],
-                       intrinsics[camera], step, mask, 3, a, b, slope)
+        arm = _outline(wrist, wrist + end * (elbow - wrist), thick, thick + end * ARM_M * ARM_SPREAD, pose, lens, step,
+                       a, b, slope, cone)
         for n in range(BENDS.shape[0]):
-            arms[n] += _arm(world, wrist, thick, BENDS[n], odds[camera], step, poses[camera], intrinsics[camera], mask,
-                            a, b, slope)
+            arms[n] += _arm(world, wrist, thick, BENDS[n], odds[camera], step, pose, lens, mask, a, b, slope)
         own = ring = area = 0.0
-        for row in range(mask.shape[0]):
-            for column in range(mask.shape[1]):
-                value = mask[row, column]
-                o = odds[camera, row, column]
+        for row in range(box[0], box[1] + 1):
+            for column in range(box[2], box[3] + 1):
+                value, o = mask[row, column], odds[camera, row, column]
+                mask[row, column] = 0
                 if value == 1:
                     own += o
                     area += 1.0
-                elif value == 3:
+                elif value == 2 and not (arm and _covers(cone, column, row)):
                     ring += o
         parts[camera, 0], parts[camera, 1], parts[camera, 2] = own, area, ring
         total += own - ring

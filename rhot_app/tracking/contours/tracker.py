@@ -65,8 +65,8 @@ _NEVER = -(1 << 62)
 @dataclass(slots=True)
 class _Camera:
     """What is known of one camera's frames. `period_ns`: between them; `target_ns`: the frame that was asked about
-    last; `shows`: whether its last image shows the hand where it is estimated, `supported`: by its contour; `whole`:
-    most of it.
+    last; `supported_ns`, `covered_ns`: the newest that showed the contour of the hand where it is estimated, and
+    foreground there; `judged_ns`: the newest that could have; `whole`: most of the hand lies in its image.
     """
 
     newest: CameraObservations | None = None
@@ -74,9 +74,15 @@ class _Camera:
     target_ns: int = _NEVER
     asked_ns: int = _NEVER
     answered_ns: int = _NEVER
-    shows: bool = False
-    supported: bool = False
+    supported_ns: int = _NEVER
+    covered_ns: int = _NEVER
+    judged_ns: int = _NEVER
     whole: bool = False
+
+    @property
+    def seen_ns(self) -> int:
+        """When it last showed the hand. Edges and foreground of one frame come apart."""
+        return min(self.supported_ns, self.covered_ns)
 
     def delivers(self, t_ns: int) -> bool:
         """Whether frames come from it about `t_ns`."""
@@ -110,7 +116,7 @@ class ContourEstimator:
         self._marked: list[CameraObservations] = []
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._epoch_ns = self._seen_ns = 0
-        self._judged_ns = self._agreed_ns = _NEVER
+        self._judged_ns = self._covered_ns = self._agreed_ns = _NEVER
         self._tracking = self._confirmed = self._ever = False
         self._latest: CameraObservations | EdgeFrame | None = None
 
@@ -233,8 +239,12 @@ class ContourEstimator:
         for number, (one, contour) in waiting.items():
             self._hand.frames[number] = contour
             seen = contour.seen.sum(axis=0)
-            self._cameras[number].supported = bool(seen[0] > MOST * seen[1])
+            camera = self._cameras[number]
+            camera.judged_ns = max(camera.judged_ns, one.t_row0_master_ns)
+            if seen[0] > MOST * seen[1]:
+                camera.supported_ns = one.t_row0_master_ns
             self._ask(number, one.t_row0_master_ns)
+        self._note_seen()
         if not self._confirmed:
             return False
         self._latest = frame
@@ -247,22 +257,27 @@ class ContourEstimator:
             self._begin(frame)
             return
         camera = self._cameras[frame.camera]
-        if camera.answered_ns < frame.t_row0_master_ns:  # there was nothing to search
-            camera.supported = False
-        state = self._hand.filter.newest.state
-        inside, share = on_foreground(self._hand, frame, state)
+        inside, share = on_foreground(self._hand, frame, self._hand.filter.newest.state)
         camera.whole = inside > MOST
-        camera.shows = camera.supported and (share > MOST if camera.whole else self._confirmed)
+        camera.judged_ns = max(camera.judged_ns, frame.t_row0_master_ns)
+        if share > MOST if camera.whole else self._confirmed:
+            camera.covered_ns = frame.t_row0_master_ns
+        self._note_seen()
         maps = self._newest_maps(frame.t_row0_master_ns)
-        if maps is None or maps.t_ns == self._judged_ns or self._waiting:
+        if maps is None or maps.t_ns == self._covered_ns or self._waiting:
             return
-        self._judged_ns = maps.t_ns
-        delivering = [one for one in self._cameras if one.delivers(maps.t_ns)]
-        if any(one.whole for one in delivering) and all(one.shows for one in delivering):
-            self._seen_ns = max(self._seen_ns, maps.t_ns)
-            if not self._confirmed:
-                self._confirm(maps)
+        self._covered_ns = maps.t_ns
+        if not self._confirmed and self._seen_ns > max(self._epoch_ns, maps.t_ns - _SAME_NS):
+            self._confirm(maps)
         self._cover(maps)
+
+    def _note_seen(self) -> None:
+        """Note when all cameras last showed the hand, and until when they could have."""
+        newest_ns = max(camera.judged_ns for camera in self._cameras)
+        delivering = [camera for camera in self._cameras if camera.delivers(newest_ns)]
+        if delivering and any(camera.whole for camera in delivering):
+            self._seen_ns = max(self._seen_ns, min(camera.seen_ns for camera in delivering))
+        self._judged_ns = min((camera.judged_ns for camera in delivering), default=_NEVER)
 
     def _confirm(self, maps: Maps) -> None:
         """Have the hand looked for once more: two random searches agree on a wrong hand less often than one errs.
@@ -334,7 +349,7 @@ class ContourEstimator:
         self._epoch_ns, self._seen_ns, self._agreed_ns, self._marked = t_ns, t_ns, _NEVER, []
         self._tracking, self._confirmed = True, False
         for number, camera in enumerate(self._cameras):
-            camera.shows = camera.supported = False
+            camera.supported_ns = camera.covered_ns = camera.judged_ns = _NEVER
             if camera.newest is not None:
                 camera.answered_ns = camera.newest.t_row0_master_ns  # it is waited for
                 self._ask(number, max(camera.newest.t_row0_master_ns, t_ns))
@@ -349,11 +364,11 @@ class ContourEstimator:
             camera.asked_ns = camera.answered_ns = _NEVER
 
     def _lost(self, t_ns: int) -> bool:
-        """Whether the cameras have not shown the hand for too long."""
+        """Whether the cameras have told nothing of the hand for too long, or have shown that it is elsewhere."""
         period_ns = min(camera.period_ns for camera in self._cameras)
-        after = (max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns)
-                 if self._confirmed else max(LOST_AFTER_NS, 2 * LOST_AFTER_PERIODS * period_ns))
-        return t_ns - self._seen_ns > after + 2 * period_ns
+        silent_ns = max(LOST_AFTER_NS, 2 * LOST_AFTER_PERIODS * period_ns)
+        wrong_ns = max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns) if self._confirmed else silent_ns
+        return bool(t_ns - self._seen_ns > silent_ns + 2 * period_ns or self._judged_ns - self._seen_ns > wrong_ns)
 
     def _weigh(self, waiting: dict[int, tuple[EdgeFrame, ContourFrame]]) -> None:
         """Estimate, PASSES times with the same edges: each expects the contour twice as near."""
