@@ -2,12 +2,13 @@
 
 Every pixel on the hand is worth the log odds that it shows the hand, and every pixel in a ring about it the log odds
 that it does not. Where the forearm may be there is no ring, because the wrist bends. Other foreground does not count.
-The search draws poses from a Gaussian, keeps the best and draws again (cross-entropy method, Rubinstein 1999).
+The search draws poses from a Gaussian and moves it to the better ones (CMA-ES, Hansen, "The CMA Evolution Strategy: A
+Tutorial", arXiv:1604.00772).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +40,12 @@ and 280 mm)."""
 
 BENDS = np.array([[0.0, 0.0], [0.6, 0.0], [-0.6, 0.0], [0.0, 0.35], [0.0, -0.35]])
 """rad: flexion and deviation of the wrist that are tried (`tracker.FOREARM_SD`)."""
+
+DRAWS = 14
+"""Poses drawn in a round of the search: 4 + 3 ln 27 (Hansen's default), and an even number."""
+
+START_STEP = 0.5
+"""Spread of the first round, of the expected one: larger, and most draws are worse than the start."""
 
 
 class Silhouettes(NamedTuple):
@@ -225,24 +232,57 @@ def score_steps(surface: Surface, world: Array, angles: Array, steps: Array, lim
 
 
 def search(surface: Surface, world: Array, angles: Array, covariance: Array, limits: Array, size: Array,
-           images: Silhouettes, rng: np.random.Generator, draws: int = 100, rounds: int = 3, best: int = 10) \
-        -> tuple[Array, Array, float]:
-    """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, and its score.
+           images: Silhouettes, rng: np.random.Generator, rounds: int) -> tuple[Array, Array, float]:
+    """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, and its score, after
+    `rounds` of DRAWS poses.
 
     The score is that of the images as correlated as they are, less half of the squared Mahalanobis distance.
     """
     root = np.linalg.cholesky(covariance + 1e-12 * np.eye(len(covariance)))
-    mean, spread = np.zeros(len(root)), np.ones(len(root))
-    top = (-np.inf, np.zeros(len(root)))
-    for _ in range(rounds):
-        white = mean + spread * rng.standard_normal((draws, len(root)))
-        white[0] = mean
-        scores = score_steps(surface, world, angles, white @ root.T, limits, size, images)
-        scores = scores / CORRELATED - 0.5 * np.sum(white * white, axis=1)
-        order = np.argsort(-scores)[:best]
-        if scores[order[0]] > top[0]:
-            top = float(scores[order[0]]), white[order[0]]
-        mean, spread = white[order].mean(axis=0), np.sqrt(white[order].var(axis=0) + 0.01)
+
+    def scores(white: Array) -> Array:
+        values = score_steps(surface, world, angles, white @ root.T, limits, size, images)
+        return np.asarray(values / CORRELATED - 0.5 * np.sum(white * white, axis=1))
+    best, value = _evolved(scores, len(root), rng, rounds)
     moved, turned = np.empty((4, 4)), np.empty(21)
-    move(world, angles, root @ top[1], moved, turned)
-    return moved, np.clip(turned, limits[:, 0], limits[:, 1]), top[0]
+    move(world, angles, root @ best, moved, turned)
+    return moved, np.clip(turned, limits[:, 0], limits[:, 1]), value
+
+
+def _evolved(value: Callable[[Array], Array], n: int, rng: np.random.Generator, rounds: int) -> tuple[Array, float]:
+    """The best (n,) found for a function of (DRAWS, n), from 0 with START_STEP, and its value: CMA-ES, with the
+    tutorial's names and its default parameters. The first draw is the start itself."""
+    mu = DRAWS // 2
+    weights = np.log(mu + 0.5) - np.log(np.arange(1, mu + 1))
+    weights /= weights.sum()
+    mu_eff = 1.0 / float(np.sum(weights * weights))
+    c_c, c_s = (4.0 + mu_eff / n) / (n + 4.0 + 2.0 * mu_eff / n), (mu_eff + 2.0) / (n + mu_eff + 5.0)
+    c_1 = 2.0 / ((n + 1.3) ** 2 + mu_eff)
+    c_mu = min(1.0 - c_1, 2.0 * (mu_eff - 2.0 + 1.0 / mu_eff) / ((n + 2.0) ** 2 + mu_eff))
+    damping = 1.0 + 2.0 * max(0.0, np.sqrt((mu_eff - 1.0) / (n + 1.0)) - 1.0) + c_s
+    expected = np.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n))  # length of a standard normal
+    mean, step, path, step_path = np.zeros(n), START_STEP, np.zeros(n), np.zeros(n)
+    covariance, axes, lengths = np.eye(n), np.eye(n), np.ones(n)
+    best, best_value = mean, -np.inf
+    for number in range(rounds):
+        if number and number % 5 == 0:  # seldom: it takes as long as DRAWS scores
+            squares, axes = np.linalg.eigh(covariance)
+            lengths = np.sqrt(np.maximum(squares, 1e-12))
+        drawn = rng.standard_normal((DRAWS, n)) * lengths @ axes.T
+        if number == 0:
+            drawn[0] = 0.0
+        points = mean + step * drawn
+        values = value(points)
+        order = np.argsort(-values)[:mu]
+        if values[order[0]] > best_value:
+            best, best_value = points[order[0]], float(values[order[0]])
+        moved = weights @ drawn[order]
+        mean = mean + step * moved
+        step_path = (1.0 - c_s) * step_path + np.sqrt(c_s * (2.0 - c_s) * mu_eff) * (axes @ (axes.T @ moved / lengths))
+        length = float(np.linalg.norm(step_path)) / expected
+        steady = length / np.sqrt(1.0 - (1.0 - c_s) ** (2 * (number + 1))) < 1.4 + 2.0 / (n + 1.0)
+        path = (1.0 - c_c) * path + steady * np.sqrt(c_c * (2.0 - c_c) * mu_eff) * moved
+        covariance = ((1.0 - c_1 - c_mu) * covariance + c_1 * np.outer(path, path)
+                      + c_mu * (drawn[order].T * weights) @ drawn[order])
+        step *= float(np.exp(c_s / damping * (length - 1.0)))
+    return best, best_value

@@ -29,10 +29,14 @@ STEP = 8
 """px: spacing of the pixels of the foreground map."""
 
 ROTATIONS = 400
-"""Rotations tried at a candidate: 25 degrees apart."""
+"""Rotations of a relaxed hand tried at a candidate: 25 degrees apart."""
 
-KEPT = 10
-"""Poses refined of each candidate."""
+SHAPED, KEPT, REFINED = 80, 20, 4
+"""Of these, the best that are tried with other shapes too; of all, the best that are searched about; of what is found,
+the best that are searched about for long."""
+
+FIRST_ROUNDS, LAST_ROUNDS = 15, 120
+"""Rounds of a search (`silhouette.search`): enough to tell good from bad, and enough to converge."""
 
 PALMS = 6
 """Candidates of each camera."""
@@ -76,27 +80,45 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
     turns = Rotation.random(ROTATIONS, random_state=int(rng.integers(2**31))).as_matrix()
     tried: list[tuple[float, Array, Array]] = []
     middle = np.array([0.6 * model.base[2, 0] * np.exp(size[0]), 0.0, 0.0])
-    for centre, (turn, angles) in product(centres, product(turns, shapes)):
-        world = rigid(turn, centre - turn @ middle)
+
+
+    def try_pose(world: Array, angles: Array) -> None:
         value = float(score_steps(surface, world, angles, np.zeros((1, 27)), model.limits, size, seen)[0])
         tried.append((value, world, angles))
+    for centre, turn in product(centres, turns):
+        try_pose(rigid(turn, centre - turn @ middle), shapes[0])
+    tried.sort(key=lambda one: -one[0])
+    for (_, world, _), angles in product(tried[:SHAPED], shapes[1:]):
+        try_pose(world, angles)
     tried.sort(key=lambda one: -one[0])
     covariance = np.diag(np.repeat(np.square(_SPREAD), (3, 3, 21)))
     covariance[6:, 6:] = np.linalg.inv(model.pose_prior.information + np.eye(21) / _SPREAD[2] ** 2)
-    for _, world, angles in _distinct(tried, KEPT * max(min(len(centres), 2), 1)):
-        moved, bent, value = settle(surface, world, angles, covariance, model, size, seen, rng, (60, 4, 8))
+    for _, world, angles in _distinct(tried, KEPT):
+        moved, bent, value = search(surface, world, angles, covariance, model.limits, size, seen, rng, FIRST_ROUNDS)
         found.append(Found(HandPose(moved, bent), value))
-    found.sort(key=lambda one: -one.score)
-    return found[:most]
+    found = [_refined(one, covariance, model, surface, size, seen, rng) for one in _best(found, REFINED)]
+    return _best(found, most)
+
+
+def _best(found: list[Found], most: int) -> list[Found]:
+    return sorted(found, key=lambda one: -one.score)[:most]
+
+
+def _refined(found: Found, covariance: Array, model: HandModel, surface: Surface, size: Array, images: Silhouettes,
+             rng: np.random.Generator) -> Found:
+    world, angles = found.pose.world_from_palm, found.pose.angles
+    angles = bend_fingers(surface, world, angles, model, size, images)
+    world, angles, value = search(surface, world, angles, covariance, model.limits, size, images, rng, LAST_ROUNDS)
+    return Found(HandPose(world, angles), value)
 
 
 def settle(surface: Surface, world: Array, angles: Array, covariance: Array, model: HandModel, size: Array,
-           images: Silhouettes, rng: np.random.Generator, draws: tuple[int, int, int]) -> tuple[Array, Array, float]:
+           images: Silhouettes, rng: np.random.Generator) -> tuple[Array, Array, float]:
     """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, each finger bent or
-    straight, and its score (`silhouette.search`, which takes `draws`)."""
-    moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, images, rng, *draws)
+    straight, and its score (`silhouette.search`)."""
+    moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, images, rng, FIRST_ROUNDS)
     bent = bend_fingers(surface, moved, bent, model, size, images)
-    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, images, rng, *draws)
+    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, images, rng, FIRST_ROUNDS)
 
 
 def bend_fingers(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array,
@@ -129,7 +151,7 @@ def _distinct(tried: list[tuple[float, Array, Array]], most: int) -> list[tuple[
 
 
 def _shapes(model: HandModel) -> list[Array]:
-    """Angles (21,) of an open, a relaxed, a closed and a pointing hand."""
+    """Angles (21,) of a relaxed, an open, a closed and a pointing hand."""
     out = []
     for curl in _CURLS_DEG:
         angles = model.pose_prior.mean.copy()
@@ -138,7 +160,7 @@ def _shapes(model: HandModel) -> list[Array]:
         out.append(angles)
     pointing = out[2].copy()
     pointing[list(FLEXIONS[1])] = np.radians(_CURLS_DEG[0])
-    return [*out, pointing]
+    return [out[1], out[0], out[2], pointing]
 
 
 def _palm_centres(maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraModel], breadth: float) -> list[Array]:

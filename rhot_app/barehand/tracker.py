@@ -99,9 +99,6 @@ SAME_POSE_S = 1.0
 """s: images within this time show the hand in much the same pose, and count as one for its phalanges: a grasp takes a
 second. Errors of edges and of the surface last as long, and would move the lengths otherwise."""
 
-DRAWS = 60, 4, 8
-"""Poses drawn in each round of a search, rounds, and how many of them the next round is drawn about."""
-
 RELOCATION_LOG_ODDS = 5.0
 """Log odds by which a pose that was searched for must be better than the predicted one: 150 to 1."""
 
@@ -310,7 +307,7 @@ class BareHandTracker:
         world = np.eye(4)
         world[:3] = state[:ANGLES].reshape(3, 4)
         world, angles, value = settle(self.surface, world, state[ANGLES:VELOCITY].copy(), spread, self.model,
-                                      state[BIAS:BIAS + SHAPE].copy(), seen, self._rng, DRAWS)
+                                      state[BIAS:BIAS + SHAPE].copy(), seen, self._rng)
         if value < self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS:
             return None
         out = state.copy()

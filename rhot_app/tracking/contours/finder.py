@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 MOVED_M, TURNED = 0.05, 0.4
 """m and rad: how far a hand that is being looked for moves while it is, at most: it is held still, more or less."""
 
-_DRAWS = 150, 5, 10  # of the search about what was found, in the newest maps
+_ROUNDS = 60  # of the search about what was found, in the newest maps: from nearby
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +109,7 @@ class Finder:
         covariance = np.diag(np.repeat(np.square([MOVED_M, TURNED, TURNED]), (3, 3, 21)))
         covariance[6:, 6:] = natural
         world, angles, _ = search(hand.surface, pose.world_from_palm, pose.angles, covariance, hand.model.limits,
-                                  np.zeros(SHAPE), seen, self._rng, *_DRAWS)
+                                  np.zeros(SHAPE), seen, self._rng, _ROUNDS)
         return HandPose(world, angles)
 
 

@@ -67,8 +67,8 @@ def test_a_hand_of_the_wrong_size_is_fitted_by_anchors_and_used(window, simulate
     standing = load_motion("still", model, np.array([0.5e-3 * twin.baseline_mm, 0.0, twin.distance_m]), 1).pose(0.0)
     joints = forward(model, standing).joints
     for camera, view in enumerate(frame.views):
-        for name in ("wrist", "index_mcp", "little_mcp", "thumb_tip", "index_tip", "middle_tip", "ring_tip",
-                     "little_tip"):
+        for name in ("wrist", "index_mcp", "little_mcp", "thumb_mcp", "thumb_tip", "index_tip", "middle_tip",
+                     "ring_tip", "little_tip"):
             drag(view, JOINTS.index(name), fit.cameras[camera].project(joints)[JOINTS.index(name)])
     frame.freedom_box.setCurrentIndex(1)
     QTest.mouseClick(frame.anchors_button, Qt.MouseButton.LeftButton)
