@@ -112,8 +112,8 @@ class LayeredFrame:
             spread[one.layer] = one.contrast(self.level) ** 2
         return float(_boundary(self.bodies, placed, self.pose, self.intrinsics, self.image,
                                np.empty((0, 0), np.float32) if self.background is None else self.background,
-                               *self.outline, shown, offset, spread, noise, BRIGHTNESS_SD,
-                               math.hypot(self.sigma_px, LENS_PX), self.spread, information, pull))
+                               *self.outline, shown, offset, spread, noise, math.hypot(self.sigma_px, LENS_PX),
+                               self.spread, information, pull))
 
 
 def compressed(information: Array, pull: Array, cost: float, size: int) -> Rows:
@@ -289,7 +289,7 @@ def _nearest(shown, layer, x, y, offset, means):
 
 @njit(cache=True)
 def _boundary(bodies, placed, pose, intrinsics, image, background, layers, behind, points, pixels, across, shown,
-              offset, spread, noise, brightness_sd, width, expected, information, pull):
+              offset, spread, noise, width, expected, information, pull):
     """Add the information of the outline; see `Outline` for `layers` to `across`. Returns the cost."""
     size, cost = pull.shape[0], 0.0
     means, number = np.zeros(offset.shape[0]), np.zeros(offset.shape[0])
@@ -299,7 +299,6 @@ def _boundary(bodies, placed, pose, intrinsics, image, background, layers, behin
     for i in range(means.shape[0]):
         means[i] /= max(number[i], 1.0)
     pixel, slope, g, row, value = np.empty(2), np.empty((2, 3)), np.empty(3), np.empty(size), np.empty(3)
-    normal, drawn = np.empty((3, 3)), np.empty(3)  # of the point's motion across, and of the two sides' values
     for k in range(layers.shape[0]):
         layer = layers[k]
         nx, ny = across[k, 0], across[k, 1]
@@ -307,7 +306,7 @@ def _boundary(bodies, placed, pose, intrinsics, image, background, layers, behin
         if math.isnan(inner):
             continue
         reach = 2.0 * width
-        texture, outer_sd = 0.0, 1.0
+        variance = noise + spread[layer]
         if behind[k] == NONE:
             if background.shape[0] == 0 or not sample(background, pixels[k, 0] + reach * nx, pixels[k, 1] + reach * ny,
                                                       value):
@@ -315,7 +314,7 @@ def _boundary(bodies, placed, pose, intrinsics, image, background, layers, behin
             outer = value[0]
         else:
             outer = _nearest(shown, behind[k], pixels[k, 0] + reach * nx, pixels[k, 1] + reach * ny, offset, means)
-            texture, outer_sd = spread[behind[k]], brightness_sd
+            variance += spread[behind[k]]
         if math.isnan(outer):
             continue
         base = placed.root[:3] if bodies.layer_row[layer] < 0 else placed.frames[bodies.layer_row[layer]]
@@ -329,40 +328,24 @@ def _boundary(bodies, placed, pose, intrinsics, image, background, layers, behin
         for i in range(3):
             g[i] = nx * slope[0, i] + ny * slope[1, i]
         point_row(bodies, placed, layer, x, y, z, g, row)
-        rough = (SHAPE_SD_M * math.sqrt(g[0] ** 2 + g[1] ** 2 + g[2] ** 2)) ** 2  # px^2: of the surface
-        normal[:], drawn[:], square = 0.0, 0.0, 0.0
+        scale = math.sqrt(g[0] ** 2 + g[1] ** 2 + g[2] ** 2)
+        step, motion = outer - inner, _form(expected, row)
         for s in range(ACROSS.shape[0]):
             e = ACROSS[s] * width
             if not sample(image, pixels[k, 0] + e * nx, pixels[k, 1] + e * ny, value):
                 continue
             t = (e - moved) / width
-            part = 0.5 * (1.0 + math.erf(t / math.sqrt(2.0)))
-            g[0] = (inner - outer) * math.exp(-0.5 * t * t) / (width * math.sqrt(2.0 * math.pi))
-            g[1], g[2] = 1.0 - part, part
-            error = value[0] - (inner + (outer - inner) * part)
-            w = 1.0 / (noise + (1.0 - part) ** 2 * spread[layer] + part**2 * texture)
-            square += w * error * error
-            for i in range(3):
-                drawn[i] += w * g[i] * error
-                for j in range(3):
-                    normal[i, j] += w * g[i] * g[j]
-        normal[1, 1] += 1.0 / brightness_sd**2
-        normal[2, 2] += 1.0 / outer_sd**2
-        determinant = normal[1, 1] * normal[2, 2] - normal[1, 2] ** 2
-        b1 = (normal[2, 2] * normal[0, 1] - normal[1, 2] * normal[0, 2]) / determinant
-        b2 = (normal[1, 1] * normal[0, 2] - normal[1, 2] * normal[0, 1]) / determinant
-        known = max(normal[0, 0] - b1 * normal[0, 1] - b2 * normal[0, 2], 0.0)
-        pulled = drawn[0] - b1 * drawn[1] - b2 * drawn[2]
-        square -= (normal[2, 2] * drawn[1] ** 2 - 2.0 * normal[1, 2] * drawn[1] * drawn[2]
-                   + normal[1, 1] * drawn[2] ** 2) / determinant
-        motion = rough + _form(expected, row)
-        square -= pulled * pulled * motion / (1.0 + known * motion)
-        square = max(square, 0.0)
-        cost += (DEGREES + ACROSS.shape[0]) * math.log(1.0 + square / DEGREES)
-        w = (DEGREES + ACROSS.shape[0]) / (DEGREES + square) / (1.0 + known * rough)
-        for i in range(size):
-            if row[i] != 0.0:
-                pull[i] += w * pulled * row[i]
-                for j in range(size):
-                    information[i, j] += w * known * row[i] * row[j]
+            predicted = inner + step * 0.5 * (1.0 + math.erf(t / math.sqrt(2.0)))
+            slant = -step * math.exp(-0.5 * t * t) / (width * math.sqrt(2.0 * math.pi))
+            whole = variance + (slant * SHAPE_SD_M * scale) ** 2
+            error = value[0] - predicted
+            square = error * error / (whole + slant * slant * motion)
+            cost += (DEGREES + 1.0) * math.log(1.0 + square / DEGREES)
+            w = (DEGREES + 1.0) / (DEGREES + square) / whole
+            for i in range(size):
+                if row[i] != 0.0:
+                    wi = w * slant * row[i]
+                    pull[i] += wi * error
+                    for j in range(size):
+                        information[i, j] += wi * slant * row[j]
     return cost
