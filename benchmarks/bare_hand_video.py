@@ -1,6 +1,9 @@
 """The bare hand in a real stereo video, from nothing, against the image points of a landmark network.
 
     python benchmarks/bare_hand_video.py ../shared/data/bare_hand_stereo [--from 13] [--to 120] [--square-m 0.0385]
+        [--templates]
+
+`--templates` follows the same images a second time, by contours and then by templates of the first tracked images.
 
 The unit of the video's extrinsics is a chessboard square of unknown size: `--square-m` makes the hand as large as the
 default hand file. Errors are parts of the hand's size in the image, the largest distance of two landmarks.
@@ -21,10 +24,14 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "barehand")]
 
 from bare_scenes import rig_of, right_hand  # noqa: E402
 
+from rhot_app.articulated.bodies import hand_bodies, root_of  # noqa: E402
+from rhot_app.articulated.tracker import LayeredTracker  # noqa: E402
 from rhot_app.barehand.overlay import overlay  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.geometry.transforms import inverse, rigid  # noqa: E402
+from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY  # noqa: E402
+from rhot_app.hand.skeleton import HandPose  # noqa: E402
 from rhot_node.detect.foreground import learn_skin  # noqa: E402
 
 
@@ -73,6 +80,7 @@ def main() -> None:
     parser.add_argument("--from", dest="first", type=int, default=13)
     parser.add_argument("--to", dest="last", type=int, default=120)
     parser.add_argument("--square-m", type=float, default=0.0385)
+    parser.add_argument("--templates", action="store_true", help="by contours and templates, too")
     parser.add_argument("--overlay", type=Path, help="write the last images with the tracked contour there (PNG)")
     arguments = parser.parse_args()
     cameras = [camera_of(arguments.folder, c, arguments.square_m) for c in (0, 1)]
@@ -80,25 +88,53 @@ def main() -> None:
     films = [film(arguments.folder / f"cam{c}_first120.mp4") for c in (0, 1)]
     first = [frames[arguments.first] for frames in films]
     tracker = BareHandTracker(rig_of(cameras, right_hand()), foreground=[learn_skin(image) for image in first])
-    print("found" if tracker.find(first, round(1e9 * arguments.first / 30.0)) else "no hand found")
-    worst, median = [], []
+    found = tracker.find(first, round(1e9 * arguments.first / 30.0))
+    print("found" if found else "no hand found")
+    if not found:
+        return
+    begin = tracker.filter.newest
+    ways = ("contours", "contours and templates") if arguments.templates else ("contours",)
+    for way in ways:  # from the same state, in the same images
+        tracker.start(HandPose(root_of(begin.state), begin.state[ANGLES:VELOCITY].copy()),
+                      round(1e9 * arguments.first / 30.0))
+        follow(tracker, cameras, films, points, arguments, way)
+
+
+def follow(tracker: BareHandTracker, cameras: list[CameraModel], films: list[list[np.ndarray]],
+           points: list[dict[int, np.ndarray]], arguments: argparse.Namespace, way: str) -> None:
+    layered = None
+    worst, median, pixels = [], [], []
     for k in range(arguments.first, arguments.last):
-        images = [frames[k] for frames in films]
-        state = tracker.step(images, [round(1e9 * k / 30.0)] * 2)
+        images, t_ns = [frames[k] for frames in films], round(1e9 * k / 30.0)
+        tracker.step(images, [t_ns] * 2)
+        if way != "contours":  # the templates' update follows that of the contours, at the same instant
+            if layered is None:
+                bodies, _ = hand_bodies(tracker.surface)
+                layered = LayeredTracker(bodies, tracker.model.limits, tracker.process, cameras, outline=False)
+                layered.filter = tracker.filter
+                layered.start(tracker.filter.newest.state, tracker.filter.newest.covariance, dict(enumerate(images)),
+                              t_ns)
+            else:
+                layered.see(dict(enumerate(images)), t_ns)
+        state = tracker.state()
         if k not in points[0] or k not in points[1]:
             continue
         errors = []
         for c in (0, 1):
             size = np.linalg.norm(points[c][k][:, None] - points[c][k], axis=2).max()
-            errors.append(np.linalg.norm(cameras[c].project(state.joint_positions) - points[c][k], axis=1) / size)
+            pixels.append(np.linalg.norm(cameras[c].project(state.joint_positions) - points[c][k], axis=1))
+            errors.append(pixels[-1] / size)
         worst.append(np.max(errors))
         median.append(np.median(errors))
+    print(f"{way}: to the landmarks, px: median {np.median(pixels):.1f}, p95 {np.percentile(pixels, 95):.1f}, worst "
+          f"{np.max(pixels):.1f}" + ("" if layered is None else f"; templates {len(layered.templates.templates)}"))
     print(f"frames {len(worst)}, tracked {np.mean(np.array(worst) < 0.1):.0%}, worst joint {np.median(worst):.2f}, "
           f"median joint {np.median(median):.3f}, contour found {np.nanmean(tracker.fit.support):.2f}")
     if arguments.overlay is not None:
         shown = [overlay(frames[arguments.last - 1], frame, tracker.filter.newest.state)
                  for frames, frame in zip(films, tracker.frames, strict=True) if frame is not None]
-        cv2.imwrite(str(arguments.overlay), np.hstack(shown)[..., ::-1])
+        name = arguments.overlay.with_stem(f"{arguments.overlay.stem}-{way.replace(' ', '-')}")
+        cv2.imwrite(str(name), np.hstack(shown)[..., ::-1])
 
 
 if __name__ == "__main__":
