@@ -1,6 +1,10 @@
 """The bare hand in a real stereo video, from nothing, against the image points of a landmark network.
 
     python benchmarks/bare_hand_video.py ../shared/data/bare_hand_stereo [--from 13] [--to 120] [--square-m 0.0385]
+        [--templates]
+
+`--templates` follows the same images a second time, by contours and then by templates of the first tracked images.
+`--start landmarks` begins at the pose that fits the first image's landmarks, not by looking for the hand.
 
 The unit of the video's extrinsics is a chessboard square of unknown size: `--square-m` makes the hand as large as the
 default hand file. Errors are parts of the hand's size in the image, the largest distance of two landmarks.
@@ -14,6 +18,7 @@ import sys
 from pathlib import Path
 
 import cv2
+import msgspec
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
@@ -21,10 +26,18 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "barehand")]
 
 from bare_scenes import rig_of, right_hand  # noqa: E402
 
+from rhot_app.articulated.bodies import hand_bodies, root_of  # noqa: E402
+from rhot_app.articulated.tracker import LayeredTracker  # noqa: E402
 from rhot_app.barehand.overlay import overlay  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.geometry.transforms import inverse, rigid  # noqa: E402
+from rhot_app.hand.kinematics import forward  # noqa: E402
+from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY  # noqa: E402
+from rhot_app.hand.skeleton import HandPose  # noqa: E402
+from rhot_app.handfit.session import HandFit  # noqa: E402
+from rhot_app.handfit.state import Anchor  # noqa: E402
+from rhot_app.project import CameraCalibration, Rig  # noqa: E402
 from rhot_node.detect.foreground import learn_skin  # noqa: E402
 
 
@@ -73,32 +86,84 @@ def main() -> None:
     parser.add_argument("--from", dest="first", type=int, default=13)
     parser.add_argument("--to", dest="last", type=int, default=120)
     parser.add_argument("--square-m", type=float, default=0.0385)
+    parser.add_argument("--start", choices=("find", "landmarks"), default="find")
+    parser.add_argument("--templates", action="store_true", help="by contours and templates, too")
     parser.add_argument("--overlay", type=Path, help="write the last images with the tracked contour there (PNG)")
     arguments = parser.parse_args()
     cameras = [camera_of(arguments.folder, c, arguments.square_m) for c in (0, 1)]
     points = [landmarks(arguments.folder / f"landmarks_c{c}.csv") for c in (0, 1)]
     films = [film(arguments.folder / f"cam{c}_first120.mp4") for c in (0, 1)]
     first = [frames[arguments.first] for frames in films]
-    tracker = BareHandTracker(rig_of(cameras, right_hand()), foreground=[learn_skin(image) for image in first])
-    print("found" if tracker.find(first, round(1e9 * arguments.first / 30.0)) else "no hand found")
-    worst, median = [], []
+    rig = rig_of(cameras, right_hand())
+    tracker = BareHandTracker(rig, foreground=[learn_skin(image) for image in first])
+    t_ns = round(1e9 * arguments.first / 30.0)
+    if arguments.start == "landmarks":
+        begin = pose_of(rig, first, [one[arguments.first] for one in points])
+        joints = forward(tracker.model, begin).joints
+        away = [np.linalg.norm(camera.project(joints) - one[arguments.first], axis=1)
+                for camera, one in zip(cameras, points, strict=True)]
+        print(f"the start fits its landmarks to px: median {np.median(away):.1f}, worst {np.max(away):.1f}")
+    else:
+        found = tracker.find(first, t_ns)
+        print("found" if found else "no hand found")
+        if not found:
+            return
+        state = tracker.filter.newest.state
+        begin = HandPose(root_of(state), state[ANGLES:VELOCITY].copy())
+    ways = ("contours", "contours and templates") if arguments.templates else ("contours",)
+    for way in ways:  # from the same pose, in the same images
+        tracker.start(begin, t_ns)
+        follow(tracker, cameras, films, points, arguments, way)
+
+
+def pose_of(rig: Rig, images: list[np.ndarray], points: list[np.ndarray]) -> HandPose:
+    """The pose whose joints fit the image points (21, 2) px of each camera."""
+    fit = HandFit(msgspec.structs.replace(rig, calibration=CameraCalibration("the video's own")))
+    fit.add_pictures(dict(enumerate(images)))
+    instant = fit.state.instants[0]
+    for camera, own in enumerate(points):
+        for joint, (x, y) in enumerate(own):
+            instant = instant.with_anchor(Anchor(camera, joint, (float(x), float(y))))
+    fit.take(fit.state.change(0, instant), "landmarks")
+    fit.fit_to_anchors()
+    return fit.state.instants[0].pose
+
+
+def follow(tracker: BareHandTracker, cameras: list[CameraModel], films: list[list[np.ndarray]],
+           points: list[dict[int, np.ndarray]], arguments: argparse.Namespace, way: str) -> None:
+    layered = None
+    worst, median, pixels = [], [], []
     for k in range(arguments.first, arguments.last):
-        images = [frames[k] for frames in films]
-        state = tracker.step(images, [round(1e9 * k / 30.0)] * 2)
+        images, t_ns = [frames[k] for frames in films], round(1e9 * k / 30.0)
+        tracker.step(images, [t_ns] * 2)
+        if way != "contours":  # the templates' update follows that of the contours, at the same instant
+            if layered is None:
+                bodies, _ = hand_bodies(tracker.surface)
+                layered = LayeredTracker(bodies, tracker.model.limits, tracker.process, cameras, outline=False)
+                layered.filter = tracker.filter
+                layered.start(tracker.filter.newest.state, tracker.filter.newest.covariance, dict(enumerate(images)),
+                              t_ns)
+            else:
+                layered.see(dict(enumerate(images)), t_ns)
+        state = tracker.state()
         if k not in points[0] or k not in points[1]:
             continue
         errors = []
         for c in (0, 1):
             size = np.linalg.norm(points[c][k][:, None] - points[c][k], axis=2).max()
-            errors.append(np.linalg.norm(cameras[c].project(state.joint_positions) - points[c][k], axis=1) / size)
+            pixels.append(np.linalg.norm(cameras[c].project(state.joint_positions) - points[c][k], axis=1))
+            errors.append(pixels[-1] / size)
         worst.append(np.max(errors))
         median.append(np.median(errors))
+    print(f"{way}: to the landmarks, px: median {np.median(pixels):.1f}, p95 {np.percentile(pixels, 95):.1f}, worst "
+          f"{np.max(pixels):.1f}" + ("" if layered is None else f"; templates {len(layered.templates.templates)}"))
     print(f"frames {len(worst)}, tracked {np.mean(np.array(worst) < 0.1):.0%}, worst joint {np.median(worst):.2f}, "
           f"median joint {np.median(median):.3f}, contour found {np.nanmean(tracker.fit.support):.2f}")
     if arguments.overlay is not None:
         shown = [overlay(frames[arguments.last - 1], frame, tracker.filter.newest.state)
                  for frames, frame in zip(films, tracker.frames, strict=True) if frame is not None]
-        cv2.imwrite(str(arguments.overlay), np.hstack(shown)[..., ::-1])
+        name = arguments.overlay.with_stem(f"{arguments.overlay.stem}-{way.replace(' ', '-')}")
+        cv2.imwrite(str(name), np.hstack(shown)[..., ::-1])
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Layered templates and visibility orders, with known truth.
 
     python benchmarks/templates.py [--only crossing,order,turning] [--seeds 3] [--poses 10000] [--seconds 60]
+        [--hand-seed 1] [--outline]
 
 crossing: two planar fingers curl by turns before one camera at 15 Hz, with and without layers (Rehg 1995, 4.4.2).
 order: the visibility order of a 27-degree hand against a depth buffer. turning: a textured hand of the digital twin
@@ -158,12 +159,12 @@ def two_cameras() -> list[CameraModel]:
     return [look_at(np.array([x, 0.0, 0.0]), np.array([0.0, 0.0, 0.45])) for x in (-0.12, 0.12)]
 
 
-def turning(seconds: float, amplitude_deg: float = 35.0, rate_hz: float = 60.0, speed_deg: float = 90.0,
-            show: Path | None = None) -> None:
+def turning(seconds: float, seed: int = 1, outline: bool = False, amplitude_deg: float = 35.0, rate_hz: float = 60.0,
+            speed_deg: float = 90.0, show: Path | None = None) -> None:
     model, surface = model_and_surface()
     bodies, _ = hand_bodies(surface)
     cameras, source = two_cameras(), Turning(pose_prior().mean.copy(), 0.45, *np.radians([speed_deg, amplitude_deg]))
-    hand = textured_hand(source, 1)
+    hand = textured_hand(source, seed)
     walls = [np.ascontiguousarray(wall(camera, k, False).transpose(2, 0, 1), np.float32)
              for k, camera in enumerate(cameras)]
     painters = [BareHandPainter(hand, camera, one, samples=4) for camera, one in zip(cameras, walls, strict=True)]
@@ -171,8 +172,8 @@ def turning(seconds: float, amplitude_deg: float = 35.0, rate_hz: float = 60.0, 
     natural = pose_prior()
     process = HandProcess(surface.dh, model.limits, natural.mean, np.asarray(np.linalg.inv(natural.information)),
                           PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.zeros((0, 3, 3)), 1.0)
-    tracker = LayeredTracker(bodies, model.limits, process, cameras, backgrounds=empty)
-    errors, spent = [], 0.0
+    tracker = LayeredTracker(bodies, model.limits, process, cameras, outline=outline, backgrounds=empty)
+    away, spent = [], 0.0
     for k in range(round(seconds * rate_hz)):
         images = filmed(painters, walls, source, k / rate_hz, k)
         world, angles = (one[0] for one in source.sample(np.array([k / rate_hz])))
@@ -186,21 +187,30 @@ def turning(seconds: float, amplitude_deg: float = 35.0, rate_hz: float = 60.0, 
         found[:3] = state[:ANGLES].reshape(3, 4)
         joints = [forward(model, HandPose(*pose)).joints
                   for pose in ((found, state[ANGLES:ANGLES + 21]), (world, angles))]
-        errors.append(1e3 * np.linalg.norm(joints[0] - joints[1], axis=1))
+        away.append(1e3 * (joints[0] - joints[1]))
         if show is not None and k % 10 == 0:
             drawn = [draw_layers(images[c], bodies, place(bodies, found, state[ANGLES:ANGLES + 21]), camera,
                                  tracker.views[c].rays) for c, camera in enumerate(cameras)]
             cv2.imwrite(str(show / f"turning_{k:04d}.png"), np.hstack([images[0], *drawn])[100:, :, ::-1])
-            print(k, np.round(errors[-1][[0, 4, 8, 12, 16, 20]], 1), len(tracker.templates.templates), flush=True)
-    errors = np.array(errors)
+            tips = np.linalg.norm(away[-1], axis=1)[[0, 4, 8, 12, 16, 20]]
+            print(k, np.round(tips, 1), len(tracker.templates.templates), flush=True)
+    away = np.array(away)
+    errors = np.linalg.norm(away, axis=2)
     way = f"to and fro by {amplitude_deg:.0f} degrees" if amplitude_deg else "on and on"
-    print(f"a textured hand turning {way} at {speed_deg:.0f} degrees/s, {rate_hz:.0f} Hz, two cameras")
-    print("seconds   mean joint error mm   wrist mm   largest joint mm")
+    print(f"a textured hand (seed {seed}) turning {way} at {speed_deg:.0f} degrees/s, {rate_hz:.0f} Hz, two cameras, "
+          f"{'with' if outline else 'without'} the boundary part")
+    print("seconds   mean joint error mm   wrist mm   median   p95   largest joint mm")
     period = round(10.0 * rate_hz)
     for first in range(0, len(errors), period):
         part = errors[first:first + period]
         print(f"{round(first / rate_hz):3d}-{round((first + len(part)) / rate_hz):3d}   {part.mean():19.2f}   "
-              f"{part[:, 0].mean():8.2f}   {part.max():16.1f}")
+              f"{part[:, 0].mean():8.2f}   {np.median(part):6.2f} {np.percentile(part, 95):5.2f}   "
+              f"{part.max():16.1f}")
+    turn = round(2.0 * np.pi * amplitude_deg / speed_deg * rate_hz) if amplitude_deg else len(away)
+    if len(away) >= 2 * turn:  # drift: the mean error vector of the last turn less that of the first, by joint
+        drift = np.linalg.norm(away[-turn:].mean(axis=0) - away[:turn].mean(axis=0), axis=1)
+        print(f"drift of the joints over {len(away) / rate_hz:.0f} s, mm: median {np.median(drift):.2f}, worst "
+              f"{drift.max():.2f}, wrist {drift[0]:.2f}")
     print(f"templates {len(tracker.templates.templates)}, processor time {1e3 * spent / max(len(errors), 1):.0f} ms a "
           "frame")
 
@@ -211,10 +221,12 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--poses", type=int, default=10_000)
     parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--hand-seed", type=int, default=1, help="texture of the turning hand")
+    parser.add_argument("--outline", action="store_true", help="turning: compare outlines, too")
     arguments = parser.parse_args()
     for name in arguments.only.split(","):
         {"crossing": lambda: crossing(arguments.seeds), "order": lambda: order(arguments.poses),
-         "turning": lambda: turning(arguments.seconds)}[name]()
+         "turning": lambda: turning(arguments.seconds, arguments.hand_seed, arguments.outline)}[name]()
 
 
 if __name__ == "__main__":

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from rhot_app.articulated.bodies import ANGLES, CAPSULE, POSE, Bodies, Placed, camera_rays, place, root_of
 from rhot_app.articulated.layered import LayeredFrame, layer_covariance
 from rhot_app.articulated.outline import outline_of
-from rhot_app.articulated.process import AngleLimits
 from rhot_app.articulated.templates import LEAST_POINTS, Filtered, Image, Kind, TemplateSet, filtered
 from rhot_app.articulated.visibility import Visibility, segment, visibility
-from rhot_app.barehand.contour_residual import SHAPE_SD_M
+from rhot_app.barehand.contour_residual import SHAPE_SD_M, JointLimits
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, update
 from rhot_app.estimation.residual import Process, Residual
@@ -64,7 +63,7 @@ class LayeredTracker:
         for view, background in zip(self.views, backgrounds or (), strict=False):
             view.background = self.templates.images(background)
         self.filter = IteratedFilter(process)
-        self._limits = AngleLimits(limits)
+        self._limits = JointLimits(limits)
         self._pose, self._epoch_ns = POSE + len(limits), 0
 
     def start(self, state: Array, covariance: Array, images: Mapping[int, Image], t_ns: int) -> None:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, follow
 from rhot_app.barehand.surface import FOREARM, SHAPE, Surface
+from rhot_app.estimation import residual
 from rhot_app.estimation.residual import UNIT, Rows
 from rhot_app.hand.limits import LIMIT_SD_RAD
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE
@@ -149,24 +150,23 @@ class Contours:
 def compressed(information: Array, pull: Array, cost: float, size: int, size_column: int, late_s: float = 0.0) -> Rows:
     """Rows of whitened errors with this information (COLUMNS, COLUMNS), of which the lower triangle is read, gradient
     (COLUMNS,) and cost in all, from images `late_s` later than the state."""
-    root = np.linalg.cholesky(information + _RIDGE * np.eye(COLUMNS))
-    error, jacobian = np.zeros(COLUMNS + 1), np.zeros((COLUMNS + 1, size))
-    error[:-1] = np.linalg.solve(root, pull)
-    error[-1] = np.sqrt(max(cost - float(error @ error), 0.0))
-    jacobian[:-1, :POSE], jacobian[:-1, size_column:size_column + SHAPE] = root.T[:, :POSE], root.T[:, POSE:]
-    jacobian[:-1, POSE:2 * POSE] = late_s * root.T[:, :POSE]  # its velocity moves it meanwhile
+    error, own = residual.compressed(information, pull, cost, _RIDGE)
+    jacobian = np.zeros((COLUMNS + 1, size))
+    jacobian[:, :POSE], jacobian[:, size_column:size_column + SHAPE] = own[:, :POSE], own[:, POSE:]
+    jacobian[:, POSE:2 * POSE] = late_s * own[:, :POSE]  # its velocity moves it meanwhile
     return Rows(error, jacobian, UNIT)
 
 
 class JointLimits:
-    """Implements `Residual`: angles beyond their limits (21, 2) rad are drawn to them."""
+    """Implements `Residual`: angles beyond their limits (A, 2) rad are drawn to them. A state begins with the root's
+    pose and the A angles, its tangent space with six numbers of the pose and the angles."""
 
     def __init__(self, limits: Array) -> None:
         self.limits = limits
 
     def linearise(self, state: Array) -> Rows:
         """One row for each angle beyond its limits."""
-        angles = state[ANGLES:ANGLES + 21]
+        angles = state[ANGLES:ANGLES + len(self.limits)]
         excess = np.minimum(self.limits[:, 1] - angles, 0.0) + np.maximum(self.limits[:, 0] - angles, 0.0)
         beyond = np.flatnonzero(excess)
         jacobian = np.zeros((len(beyond), len(state) - BIAS + MOTION))

@@ -108,6 +108,16 @@ class Process(Protocol):
         ...
 
 
+def compressed(information: Array, pull: Array, cost: float, ridge: float) -> tuple[Array, Array]:
+    """Whitened errors (P + 1,) and their Jacobian (P + 1, P) that have an `information` (P, P), of which the lower
+    triangle is read, a gradient `pull` (P,) and a cost in all; the last row has the rest of the cost. `ridge`: the
+    information of what no observation shows."""
+    root = np.linalg.cholesky(information + ridge * np.eye(len(pull)))
+    error = np.append(np.linalg.solve(root, pull), 0.0)
+    error[-1] = np.sqrt(max(cost - float(error @ error), 0.0))
+    return error, np.vstack([root.T, np.zeros(len(pull))])
+
+
 def stack(rows: Sequence[Rows], size: int, weigh: bool) -> tuple[Array, Array, Array, float, Array]:
     """All rows whitened: error (K,), jacobian (K, n), variances (K,), the robust cost, and the weights (G,).
 
