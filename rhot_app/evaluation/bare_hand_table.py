@@ -78,8 +78,8 @@ def published_lines() -> list[str]:
     return ["Published figures of other trackers, each with its own hands and truth. The columns beside which they "
             "stand are means",
             "of absolute errors against the simulation's exact truth; a step's time is only a part of a latency.",
-            *(f"  {one.tracker:<25} {one.quantity:<19} {f'{one.value:g} {one.unit}':<9} beside {one.beside:<12} against "
-              f"{one.truth} ({one.source})" for one in PUBLISHED)]
+            *(f"  {one.tracker:<25} {one.quantity:<19} {f'{one.value:g} {one.unit}':<9} beside {one.beside:<12} "
+              f"against {one.truth} ({one.source})" for one in PUBLISHED)]
 
 
 def bare_hand_fields(found: Sequence[tuple[Case, Sequence[EvaluatedRun]]], seconds: float) -> dict[str, object]:
