@@ -1,8 +1,9 @@
-"""Feature mode: slices across the links' axes and at the fingertips, whatever hides them (Rehg 1995, 4.3).
+"""Feature mode: slices across the links' axes and at the fingertips (Rehg 1995, 4.3).
 
 Both edges of a link are on slices of the same places; its radius is integrated out, so that a pair of edges is one
 point of the projected axis (eq. 2.17). One edge alone is extrapolated with the radius of the model. A fingertip is
-found along its axis (eq. 2.19). Fewer slices than in contour mode, no visibility: quick, for open hands.
+found along its axis (eq. 2.19). The thesis left out features that other fingers hide by hand; here the model tells.
+Fewer slices than in contour mode and none of the palm: quick, for open hands.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import (
     END_BALL,
-    SILHOUETTE,
     ContourPoints,
+    _behind,
     camera_centre,
     image_normal,
     project,
@@ -27,20 +28,19 @@ from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
 
 Array = NDArray[np.float64]
 
-PLACES = 3
-"""Slices along a link; two fix a line, the third one may be lost."""
+PLACES = 2
+"""Slices along a link on either side: so many fix a line."""
 
 
 def feature_points(surface: Surface, state: Array, size: Array, pose: Array, intrinsics: Array,
                    image_size: tuple[int, int]) -> ContourPoints:
-    """Places of the edges of all links and fingertips; arguments as of `contours.contour_points`."""
+    """Places of the visible edges of all links and fingertips; arguments as of `contours.contour_points`."""
     most = len(surface.row) * (2 * PLACES + 1)
-    ints, floats = np.empty((most, 2), np.int64), np.empty((most, 6))
+    ints, floats = np.empty((most, 3), np.int64), np.empty((most, 6))
     count = _features(surface, state, size, pose, intrinsics, float(image_size[0]), float(image_size[1]), ints, floats)
     ints, floats = ints[:count], floats[:count]
-    return ContourPoints(ints[:, 0].copy(), ints[:, 1].copy(), floats[:, 0].copy(),
-                         np.full(count, SILHOUETTE, np.int64), floats[:, 1:3].copy(), floats[:, 3:5].copy(),
-                         floats[:, 5].copy())
+    return ContourPoints(ints[:, 0].copy(), ints[:, 1].copy(), floats[:, 0].copy(), ints[:, 2].copy(),
+                         floats[:, 1:3].copy(), floats[:, 3:5].copy(), floats[:, 5].copy())
 
 
 @njit(cache=True)
@@ -85,6 +85,9 @@ def _features(surface, state, size, pose, intrinsics, width, height, ints, float
                 continue
             if not (0.0 < pixel[0] < width - 1.0 and 0.0 < pixel[1] < height - 1.0):
                 continue
+            behind = _behind(surface, centres, radii, o, u[0], u[1], u[2], n)
+            if behind < 0:
+                continue
             for i in range(3):
                 u[i] -= o[i]
                 away += u[i] * u[i]
@@ -95,7 +98,7 @@ def _features(surface, state, size, pose, intrinsics, width, height, ints, float
             scale = 0.0
             for i in range(3):
                 scale += (normal[0] * slope[0, i] + normal[1] * slope[1, i]) * n[i]
-            ints[used, 0], ints[used, 1] = k, kind
+            ints[used, 0], ints[used, 1], ints[used, 2] = k, kind, behind
             floats[used, 0], floats[used, 1], floats[used, 2] = along, pixel[0], pixel[1]
             floats[used, 3], floats[used, 4], floats[used, 5] = normal[0], normal[1], scale
             used += 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Final
 
 from rhot_app.evaluation.bare_hand import Case, EvaluatedRun, Figures, figures_of
@@ -12,20 +12,31 @@ from rhot_app.evaluation.compare import cell
 
 @dataclass(frozen=True, slots=True)
 class PublishedFigure:
-    """What others measured with other hands, other truths and other pictures: an order of magnitude, no comparison."""
+    """What others measured with other hands, other truths and other pictures: an order of magnitude, no comparison.
+    `truth`: what they measured against; `beside`: the columns of the table that come nearest."""
 
     tracker: str
     quantity: str
     value: float
     unit: str
+    truth: str
+    source: str
+    beside: str
 
+
+_DORTMUND: Final = "Sensors 2025, 25(24), 7473"
+_SPRAGUE: Final = "Sprague et al., Sensors 2025, 25(18), 5716"
+_ABDLKARIM: Final = "Abdlkarim et al., bioRxiv 2022.02.18.481001"
 
 PUBLISHED: Final = (
-    PublishedFigure("Leap Motion Controller 2", "palm position", 5.2, "mm"),
-    PublishedFigure("Leap Motion Controller 2", "joint angles", 14.8, "deg"),
-    PublishedFigure("Meta Quest 2", "fingertip position", 11.0, "mm"),
-    PublishedFigure("Meta Quest 2", "latency", 38.0, "ms"),
-    PublishedFigure("MediaPipe Hands", "joint angles", 22.5, "deg"),
+    PublishedFigure("Leap Motion Controller 2", "palm position", 5.2, "mm", "a printed hand on a robot", _DORTMUND,
+                    "joints mm"),
+    PublishedFigure("Leap Motion Controller 2", "joint angles, rms", 14.8, "deg", "markers, 11 people", _SPRAGUE,
+                    "angles deg"),
+    PublishedFigure("Meta Quest 2", "fingertip position", 11.0, "mm", "a grid of targets", _ABDLKARIM, "joints mm"),
+    PublishedFigure("Meta Quest 2", "latency", 38.0, "ms", "the same; 45 in the journal", _ABDLKARIM,
+                    "step's time"),
+    PublishedFigure("MediaPipe Hands", "joint angles, rms", 22.5, "deg", "markers, 11 people", _SPRAGUE, "angles deg"),
 )
 
 COLUMNS: Final = (
@@ -64,8 +75,11 @@ def bare_hand_table(found: Sequence[tuple[Case, Sequence[EvaluatedRun]]]) -> str
 
 def published_lines() -> list[str]:
     """Figures of other trackers, a line each."""
-    return ["Published figures of other trackers, each with its own hands and truth (docs/twin.md):",
-            *(f"  {one.tracker:<26}{one.quantity:<20}{one.value:g} {one.unit}" for one in PUBLISHED)]
+    return ["Published figures of other trackers, each with its own hands and truth. The columns beside which they "
+            "stand are means",
+            "of absolute errors against the simulation's exact truth; a step's time is only a part of a latency.",
+            *(f"  {one.tracker:<25} {one.quantity:<19} {f'{one.value:g} {one.unit}':<9} beside {one.beside:<12} "
+              f"against {one.truth} ({one.source})" for one in PUBLISHED)]
 
 
 def bare_hand_fields(found: Sequence[tuple[Case, Sequence[EvaluatedRun]]], seconds: float) -> dict[str, object]:
@@ -76,5 +90,4 @@ def bare_hand_fields(found: Sequence[tuple[Case, Sequence[EvaluatedRun]]], secon
 
     return {"seconds": seconds,
             "cases": {case.name: {**figures_of(runs), "runs": [of_run(run) for run in runs]} for case, runs in found},
-            "published": [{"tracker": one.tracker, "quantity": one.quantity, "value": one.value, "unit": one.unit}
-                          for one in PUBLISHED]}
+            "published": [asdict(one) for one in PUBLISHED]}

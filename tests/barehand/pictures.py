@@ -15,6 +15,18 @@ from rhot_app.geometry.transforms import inverse, rigid
 Array = NDArray[np.float64]
 LIGHT = np.array([-0.4, -0.7, -0.59])
 SKIN = np.array([205.0, 150.0, 125.0])
+SHIRT, HAIR, EYE, LIPS = ((60.0, 75.0, 110.0), (50.0, 35.0, 25.0), (40.0, 30.0, 30.0), (170.0, 80.0, 80.0))
+HEAD = (  # ends of a capsule m, x right, y down, z away from the camera; radii m; colour
+    ((0.0, -0.02, 0.0), (0.0, 0.05, 0.0), 0.075, 0.065, SKIN),
+    ((0.0, 0.05, 0.02), (0.0, 0.15, 0.03), 0.05, 0.055, SKIN),
+    ((0.0, -0.06, 0.02), (0.0, -0.05, 0.03), 0.085, 0.085, HAIR),
+    ((0.0, 0.0, -0.068), (0.0, 0.025, -0.072), 0.008, 0.012, SKIN),
+    ((-0.03, -0.01, -0.066), (-0.025, -0.01, -0.066), 0.01, 0.01, EYE),
+    ((0.03, -0.01, -0.066), (0.025, -0.01, -0.066), 0.01, 0.01, EYE),
+    ((-0.02, 0.055, -0.055), (0.02, 0.055, -0.055), 0.007, 0.007, LIPS),
+    ((-0.17, 0.22, 0.03), (0.17, 0.22, 0.03), 0.06, 0.06, SHIRT),
+    ((-0.12, 0.3, 0.03), (0.12, 0.3, 0.03), 0.1, 0.1, SHIRT),
+    ((-0.12, 0.5, 0.03), (0.12, 0.5, 0.03), 0.12, 0.12, SHIRT))
 
 
 def look_at(place: Array, target: Array, focal: float = 600.0, width: int = 640, height: int = 480) -> CameraModel:
@@ -53,8 +65,8 @@ def wall(camera: CameraModel, seed: int, clutter: bool) -> Array:
 
 def picture(surface: Surface, world: Array, angles: Array, camera: CameraModel, background: Array, seed: int,
             forearm_m: float = 0.4, blur_px: float = 0.8, noise: float = 2.0,
-            paint: dict[int, tuple[float, float, float]] | None = None) -> NDArray[np.uint8]:
-    """(H, W, 3) RGB of a hand; `paint`: colours of fingertips by finger."""
+            paint: dict[int, tuple[float, float, float]] | None = None, exposure: float = 1.0) -> NDArray[np.uint8]:
+    """(H, W, 3) RGB of a hand; `paint`: colours of fingertips by finger; `exposure`: as of `taken`."""
     centres, radii = capsules_of(surface, world, angles)
     for k in np.flatnonzero(surface.group == FOREARM):
         line = centres[k, 1] - centres[k, 0]
@@ -62,14 +74,31 @@ def picture(surface: Surface, world: Array, angles: Array, camera: CameraModel, 
     out, colours = background.copy(), np.tile(SKIN, (len(radii), 1))
     for finger, colour in (paint or {}).items():
         colours[np.flatnonzero(surface.group == finger)[-1]] = colour
-    pose = camera.camera_from_world[:3]
-    o = np.empty(3)
-    camera_centre(pose, o)
-    _draw(centres, radii, o, camera.camera_from_world[:3, :3].copy(), camera.intrinsics, LIGHT / np.linalg.norm(LIGHT),
-          colours, out)
-    out = cv2.GaussianBlur(out, (0, 0), blur_px) if blur_px else out
+    _cast(centres, radii, colours, camera, out)
+    return taken(out, seed, blur_px, noise, exposure)
+
+
+def person(camera: CameraModel, background: Array, place: Array) -> Array:
+    """(H, W, 3) a head with a face, a neck and shoulders before a background; `place` (3,) m of the head's middle."""
+    ends = np.array([[first, second] for first, second, *_ in HEAD]) + place
+    out = background.copy()
+    _cast(ends, np.array([[a, b] for _, _, a, b, _ in HEAD]), np.array([colour for *_, colour in HEAD]), camera, out)
+    return out
+
+
+def taken(scene: Array, seed: int, blur_px: float = 0.8, noise: float = 2.0,
+          exposure: float = 1.0) -> NDArray[np.uint8]:
+    """(H, W, 3) RGB: a scene (H, W, 3) through a lens, `exposure` times as bright, with noise."""
+    out = exposure * (cv2.GaussianBlur(scene, (0, 0), blur_px) if blur_px else scene)
     out += np.random.default_rng([seed, 7]).normal(0.0, noise, out.shape)
     return np.clip(out + 0.5, 0.0, 255.0).astype(np.uint8)
+
+
+def _cast(centres: Array, radii: Array, colours: Array, camera: CameraModel, out: Array) -> None:
+    o = np.empty(3)
+    camera_centre(camera.camera_from_world[:3], o)
+    _draw(centres, radii, o, camera.camera_from_world[:3, :3].copy(), camera.intrinsics, LIGHT / np.linalg.norm(LIGHT),
+          colours, out)
 
 
 @njit(cache=True)

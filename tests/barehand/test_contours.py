@@ -49,6 +49,19 @@ def test_silhouette_points_lie_between_hand_and_background(side: str, motion: st
             assert np.mean(mask[at[:, 1], at[:, 0]] == expected) > most
 
 
+def test_features_of_links_behind_others_are_left_out() -> None:
+    """Where the hand is expected behind a point, there is hand beside it, and background where not."""
+    _, surface = model_and_surface()
+    pose, camera = poses("grasp", (1.4,))[0], two_cameras()[0]
+    black = np.zeros((camera.height, camera.width, 3))
+    mask = picture(surface, pose.world_from_palm, pose.angles, camera, black, 0, blur_px=0.0, noise=0.0)[..., 0] > 0
+    points = feature_points(surface, state_of(pose), np.zeros(SHAPE), camera.camera_from_world[:3].copy(),
+                            camera.intrinsics, (camera.width, camera.height))
+    assert {SILHOUETTE, INNER} == set(points.behind)
+    at = np.rint(points.pixel + 2.0 * points.normal).astype(int)
+    assert np.mean(mask[at[:, 1], at[:, 0]] == (points.behind == INNER)) > 0.9
+
+
 @pytest.mark.parametrize("features", [False, True])
 def test_contours_follow_the_hand_as_their_derivatives_say(features: bool) -> None:
     _, surface = model_and_surface()

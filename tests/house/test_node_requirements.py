@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import os
 import re
 import subprocess
@@ -14,6 +15,7 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[2]
 SYSTEMS = ("bookworm", "trixie")
+MASTERS_IMPORTS = {"scipy", "PySide6", "pyqtgraph", "OpenGL", "rhot_app"}
 MASTERS_ONLY = {"scipy", "pyside6-essentials", "pyqtgraph", "pyopengl"}
 
 
@@ -38,6 +40,46 @@ def test_every_dependency_of_the_node_is_constrained_to_a_version_it_allows(syst
 
 def test_bookworms_numpy_is_that_of_its_picamera2() -> None:
     assert pinned("bookworm")["numpy"].startswith("1.")
+
+
+def link_dependencies(folder: Path) -> None:
+    """Links in `folder` to what the node's dependencies install here, with what they need themselves."""
+    waiting, seen = list(node_dependencies().values()), set[str]()
+    while waiting:
+        requirement = waiting.pop()
+        if requirement.name in seen or not (requirement.marker is None or requirement.marker.evaluate({"extra": ""})):
+            continue
+        seen.add(requirement.name)
+        found = importlib.metadata.distribution(requirement.name)
+        waiting += map(Requirement, found.requires or [])
+        for top in {path.parts[0] for path in found.files or [] if path.parts[0] != ".."}:
+            if not (folder / top).exists():
+                (folder / top).symlink_to(Path(str(found.locate_file(top))).resolve())
+
+
+def test_the_landmark_part_runs_with_the_nodes_dependencies_alone(tmp_path: Path) -> None:
+    packages = tmp_path / "packages"
+    packages.mkdir()
+    link_dependencies(packages)
+    program = f"""
+import sys
+sys.path += [{str(packages)!r}, {str(ROOT)!r}, {str(ROOT / "tests" / "keypoints")!r}]
+from pathlib import Path
+import numpy as np
+from rhot_node.detect.image import from_bgr
+from rhot_node.files import resource_path
+from rhot_node.keypoints.detector import KeypointDetector
+from rhot_node.markers import load_markers
+from tiny_network import place
+detector = KeypointDetector(place(Path({str(tmp_path)!r})), load_markers(resource_path("markers", "landmarks21.json")))
+print(sum(one.found for one in detector.detect(from_bgr(np.full((240, 320, 3), (0, 0, 255), np.uint8)))))
+print(sorted(name for name in sys.modules if name in {sorted(MASTERS_IMPORTS)!r}))
+"""
+    done = subprocess.run([sys.executable, "-I", "-S", "-c", program], capture_output=True, text=True, timeout=120,
+                          check=False)
+    assert done.returncode == 0, done.stderr
+    found, masters = done.stdout.splitlines()
+    assert int(found) > 15 and masters == "[]"
 
 
 @pytest.mark.skipif(os.environ.get("RHOT_NETWORK") != "1", reason="asks the package index: only with RHOT_NETWORK=1")

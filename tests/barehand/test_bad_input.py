@@ -1,0 +1,90 @@
+"""Pictures that show no hand, or hardly one: the follower says that there is none, rather than a wrong one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from bare_scenes import DISTANCE_M, model_and_surface, poses, rig_of, right_hand
+from pictures import person, picture, taken, two_cameras, wall
+
+from rhot_app.barehand.follower import HandFollower
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.skeleton import HandPose
+from rhot_app.state import HandState
+from rhot_node.detect.foreground import learn_background, skin_foreground
+
+IMAGES = 2  # two searches that agree are a hand
+FPS = 30.0
+WRONG_M = 0.02  # neighbouring knuckles are so far apart
+Draw = Callable[..., np.ndarray]
+
+
+def states(draw: Draw, known: bool) -> list[HandState]:
+    """What the follower says of pictures `draw(camera, wall, number)`, with a learnt background or by skin alone."""
+    cameras = two_cameras(distance=DISTANCE_M)
+    walls = [wall(camera, 10 * k + 1, False) for k, camera in enumerate(cameras)]
+    learnt = [learn_background(skin_foreground(), [taken(empty, 90 + k) for k in range(8)]) for empty in walls]
+    follower = HandFollower(rig_of(cameras, right_hand()), learnt if known else None, known_size=True)
+    return [follower.step([draw(camera, empty, number) for camera, empty in zip(cameras, walls, strict=True)],
+                          [round(1e9 * number / FPS)] * 2) for number in range(IMAGES)]
+
+
+def pose_of(number: int, distance_m: float = DISTANCE_M) -> HandPose:
+    pose = poses("grasp", (number / FPS,))[0]
+    world = pose.world_from_palm.copy()
+    world[2, 3] += distance_m - DISTANCE_M
+    return HandPose(world, pose.angles)
+
+
+def hand(camera, empty, number, distance_m=DISTANCE_M, exposure=1.0) -> np.ndarray:
+    _, surface = model_and_surface()
+    pose = pose_of(number, distance_m)
+    return picture(surface, pose.world_from_palm, pose.angles, camera, empty, number, exposure=exposure)
+
+
+def wrong(found: list[HandState], distance_m: float = DISTANCE_M) -> list[int]:
+    """Numbers of the states that have a hand which is not there."""
+    model, _ = model_and_surface()
+    return [number for number, state in enumerate(found) if state.tracked and np.linalg.norm(
+        state.joint_positions - forward(model, pose_of(number, distance_m)).joints, axis=1).mean() > WRONG_M]
+
+
+@pytest.mark.parametrize(("distance_m", "known"), [(0.5, False), (0.7, True)])
+def test_a_face_is_no_hand(distance_m: float, known: bool) -> None:
+    place = np.array([0.0, -0.02, distance_m])
+    found = states(lambda camera, empty, k: taken(person(camera, empty, place), k), known)
+    assert not any(state.tracked for state in found)
+
+
+def test_two_people_are_no_hand() -> None:
+    def draw(camera, empty, number) -> np.ndarray:
+        both = person(camera, person(camera, empty, np.array([-0.2, 0.0, 0.8])), np.array([0.22, -0.05, 0.85]))
+        return taken(both, number)
+
+    assert not any(state.tracked for state in states(draw, True))
+
+
+def test_a_hand_before_a_person_is_found_or_none_is() -> None:
+    place = np.array([0.12, -0.05, 0.95])
+    found = states(lambda camera, empty, k: hand(camera, person(camera, empty, place), k), True)
+    assert wrong(found) == []
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_hand_that_fills_the_picture_is_found_or_none_is(known: bool) -> None:
+    found = states(lambda camera, empty, k: hand(camera, empty, k, 0.16), known)
+    assert wrong(found, 0.16) == []
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("exposure", [0.03, 0.12, 8.0])
+def test_a_dark_or_burnt_picture_shows_no_hand(exposure: float, known: bool) -> None:
+    found = states(lambda camera, empty, k: hand(camera, empty, k, exposure=exposure), known)
+    assert not any(state.tracked for state in found)
+
+
+def test_without_a_learnt_background_a_hand_is_found_by_its_skin() -> None:
+    found = states(hand, False)
+    assert found[-1].tracked and wrong(found) == []
