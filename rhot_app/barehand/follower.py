@@ -14,7 +14,7 @@ from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, no_hand
-from rhot_node.detect.foreground import Foreground, foreground_map, learn_skin
+from rhot_node.detect.foreground import Foreground, foreground_at, gain_of, learn_skin
 
 Image = NDArray[np.uint8]
 Points = NDArray[np.float64]
@@ -111,11 +111,13 @@ class HandFollower:
             places = camera.project(state.joint_positions)
             with np.errstate(invalid="ignore"):
                 inside = np.all((places > -0.5) & (places < [camera.width - 0.5, camera.height - 0.5]), axis=1)
-            columns, rows = np.round(places[inside]).astype(int).T
             shown.append(bool(np.mean(inside) > MOST))
-            if (shown[-1] and known.informative
-                    and np.mean(foreground_map(image, known, 1)[rows, columns] > 0.5) <= MOST):
-                return False
+            if shown[-1] and known.informative:
+                gain = gain_of(image, known)
+                ours = [foreground_at(image, row, column, known.hand, known.rest, known.mean, known.sd, gain)
+                        for column, row in np.round(places[inside]).astype(int)]
+                if np.mean(np.array(ours) > 0.5) <= MOST:
+                    return False
         return all(shown) if whole else any(shown)
 
     def _confirmed(self, state: HandState) -> bool:
