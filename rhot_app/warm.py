@@ -100,11 +100,12 @@ def warm_calibrations(rig: Rig) -> None:
     simulate(footage, np.array([OFF]), np.array([OFF]))
 
 
-def warm_hand_fit(rig: Rig) -> None:
-    """Compile what fits a hand to pictures."""
+def warm_bare_hand(rig: Rig) -> None:
+    """Compile what tracks a bare hand, and what fits one to pictures."""
     from rhot_app.handfit.session import warm_up  # not above: nothing of it is compiled, so it decides no cache
 
     warm_up(rig, contours=True)
+    make_tracker(msgspec.structs.replace(rig, tracker=TrackerSettings(kind="estimator", observe="contours"))).warm_up()
 
 
 def warm_outputs(rig: Rig) -> None:
@@ -115,7 +116,7 @@ def warm_outputs(rig: Rig) -> None:
 STEPS: dict[str, Callable[[Rig], None]] = {"tracker": warm_tracker, "solvers": warm_solvers,
                                            "detector": warm_detector, "estimator": warm_estimator,
                                            "twin": warm_twin, "boards": warm_boards,
-                                           "calibrations": warm_calibrations, "hand fit": warm_hand_fit,
+                                           "calibrations": warm_calibrations, "bare hand": warm_bare_hand,
                                            "outputs": warm_outputs}
 """In this order two processors share them evenly, and neither compiles what the other one is compiling."""
 

@@ -161,6 +161,8 @@ class ContourEstimator:
         contour.observe(edges_of(len(contour.slices), np.zeros(1, np.int64), np.array([[0.0, 1.0, 9.0, 1.0, 0.0]])))
         hand.frames[0], hand.cover = contour, 1e9  # so that it is looked for elsewhere
         hand.filter.add(0.0, [contour, hand.limits])
+        state = hand.filter.newest.state
+        hand.process.difference(state, state)
         self._finder.relocate(maps, hand.filter.newest.state, hand.filter.newest.covariance, 0.03)
         self._finder.wait()
         self._finder.look(maps)
