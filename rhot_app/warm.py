@@ -102,10 +102,12 @@ def warm_calibrations(rig: Rig) -> None:
 
 def warm_bare_hand(rig: Rig) -> None:
     """Compile what tracks a bare hand, and what fits one to pictures."""
-    from rhot_app.handfit.session import warm_up  # not above: nothing of it is compiled, so it decides no cache
+    # not above: nothing of these files is compiled, so they decide no cache
+    from rhot_app.handfit.session import warm_up
+    from rhot_app.tracking.contours.tracker import ContourEstimator
 
     warm_up(rig, contours=True)
-    make_tracker(msgspec.structs.replace(rig, tracker=TrackerSettings(kind="estimator", observe="contours"))).warm_up()
+    ContourEstimator(msgspec.structs.replace(rig, tracker=TrackerSettings(kind="estimator", observe="contours"))).warm_up()
 
 
 def warm_outputs(rig: Rig) -> None:
