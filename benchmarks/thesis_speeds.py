@@ -10,8 +10,8 @@ cameras and the whole hand at 6.66 Hz, section 4.3.3; `fast`: the same at 60 Hz.
 An open hand slides to and fro on the table, which is learnt as background, as the thesis's black cloth. Speeds are
 means, way by time, as the thesis timed them. Lost is a hand whose joints are 20 mm off on average in any of 60 images.
 A seed is a direction on the table, with noise of its own. The speed is found by bisection, to 10 %, and held by all
-seeds; a dash: lost at 10 mm/s. A hand that the prediction misses is searched for in the background's difference, which
-the thesis did not do.
+seeds; a dash: lost at the lowest speed tried, 11 mm/s. A hand that the prediction misses is searched for in the
+background's difference, which the thesis did not do.
 """
 
 from __future__ import annotations

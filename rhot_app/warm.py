@@ -107,7 +107,8 @@ def warm_bare_hand(rig: Rig) -> None:
     from rhot_app.tracking.contours.tracker import ContourEstimator
 
     warm_up(rig, contours=True)
-    ContourEstimator(msgspec.structs.replace(rig, tracker=TrackerSettings(kind="estimator", observe="contours"))).warm_up()
+    settings = TrackerSettings(kind="estimator", observe="contours")
+    ContourEstimator(msgspec.structs.replace(rig, tracker=settings)).warm_up()
 
 
 def warm_outputs(rig: Rig) -> None:

@@ -2,8 +2,8 @@
 
 Both edges of a link are on slices of the same places; its radius is integrated out, so that a pair of edges is one
 point of the projected axis (eq. 2.17). One edge alone is extrapolated with the radius of the model. A fingertip is
-found along its axis (eq. 2.19). The thesis left out features that other fingers hide by hand; here the model tells.
-Fewer slices than in contour mode and none of the palm: quick, for open hands.
+found along its axis (eq. 2.19). In the thesis a person left out the features that other fingers hide; here the model
+tells which. Fewer slices than in contour mode and none of the palm: quick, for open hands.
 """
 
 from __future__ import annotations

@@ -42,10 +42,10 @@ BENDS = np.array([[0.0, 0.0], [0.6, 0.0], [-0.6, 0.0], [0.0, 0.35], [0.0, -0.35]
 """rad: flexion and deviation of the wrist that are tried (`tracker.FOREARM_SD`)."""
 
 DRAWS = 14
-"""Poses drawn in a round of the search: 4 + 3 ln 27 (Hansen's default), and an even number."""
+"""Poses drawn in a round of the search: Hansen's default for 27 dimensions, 4 + 3 ln 27, rounded up."""
 
 START_STEP = 0.5
-"""Spread of the first round, of the expected one: larger, and most draws are worse than the start."""
+"""Step size of the first round, in standard deviations of what is expected. Chosen: with 1, fewer starts are good."""
 
 
 class Silhouettes(NamedTuple):
@@ -250,8 +250,8 @@ def search(surface: Surface, world: Array, angles: Array, covariance: Array, lim
 
 
 def _evolved(value: Callable[[Array], Array], n: int, rng: np.random.Generator, rounds: int) -> tuple[Array, float]:
-    """The best (n,) found for a function of (DRAWS, n), from 0 with START_STEP, and its value: CMA-ES, with the
-    tutorial's names and its default parameters. The first draw is the start itself."""
+    """The best (n,) found for a function of (DRAWS, n), from 0 with START_STEP, and its value: CMA-ES with the default
+    parameters of Hansen's tutorial, positive weights only. The first draw is the start itself."""
     mu = DRAWS // 2
     weights = np.log(mu + 0.5) - np.log(np.arange(1, mu + 1))
     weights /= weights.sum()

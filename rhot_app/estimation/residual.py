@@ -108,14 +108,25 @@ class Process(Protocol):
         ...
 
 
-def compressed(information: Array, pull: Array, cost: float, ridge: float) -> tuple[Array, Array]:
+@njit(cache=True)
+def compressed(information, pull, cost, ridge):
     """Whitened errors (P + 1,) and their Jacobian (P + 1, P) that have an `information` (P, P), of which the lower
     triangle is read, a gradient `pull` (P,) and a cost in all; the last row has the rest of the cost. `ridge`: the
-    information of what no observation shows."""
-    root = np.linalg.cholesky(information + ridge * np.eye(len(pull)))
-    error = np.append(np.linalg.solve(root, pull), 0.0)
-    error[-1] = np.sqrt(max(cost - float(error @ error), 0.0))
-    return error, np.vstack([root.T, np.zeros(len(pull))])
+    information of what no observation shows. Raises LinAlgError: the information is not positive definite or finite."""
+    count = len(pull)
+    root = np.linalg.cholesky(information + ridge * np.eye(count))
+    error, jacobian = np.zeros(count + 1), np.zeros((count + 1, count))
+    for row in range(count):
+        left = pull[row]
+        for column in range(row):
+            left -= root[row, column] * error[column]
+        error[row] = left / root[row, row]
+        cost -= error[row] ** 2
+        jacobian[:row + 1, row] = root[row, :row + 1]
+    if not np.isfinite(cost):
+        raise np.linalg.LinAlgError("the information is not finite")
+    error[count] = math.sqrt(max(cost, 0.0))
+    return error, jacobian
 
 
 def stack(rows: Sequence[Rows], size: int, weigh: bool) -> tuple[Array, Array, Array, float, Array]:

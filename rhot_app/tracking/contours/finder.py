@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 MOVED_M, TURNED = 0.05, 0.4
 """m and rad: how far a hand that is being looked for moves while it is, at most: it is held still, more or less."""
 
-_ROUNDS = 60  # of the search about what was found, in the newest maps: from nearby
+_ROUNDS = 60  # of the search about what was found, in the newest maps: half of `start.LAST_ROUNDS`, for it is near
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,8 +65,9 @@ _NEVER = -(1 << 62)
 @dataclass(slots=True)
 class _Camera:
     """What is known of one camera's frames. `period_ns`: between them; `target_ns`: the frame that was asked about
-    last; `supported_ns`, `covered_ns`: the newest that showed the contour of the hand where it is estimated, and
-    foreground there; `judged_ns`: the newest that could have; `whole`: most of the hand lies in its image.
+    last; `searched_ns`, `mapped_ns`: the newest whose edges and whose foreground came; `supported_ns`, `covered_ns`:
+    the newest of these that showed the contour of the hand where it is estimated, and foreground there; `whole`: most
+    of the hand lies in its image.
     """
 
     newest: CameraObservations | None = None
@@ -76,13 +77,19 @@ class _Camera:
     answered_ns: int = _NEVER
     supported_ns: int = _NEVER
     covered_ns: int = _NEVER
-    judged_ns: int = _NEVER
+    searched_ns: int = _NEVER
+    mapped_ns: int = _NEVER
     whole: bool = False
 
     @property
     def seen_ns(self) -> int:
         """When it last showed the hand. Edges and foreground of one frame come apart."""
         return min(self.supported_ns, self.covered_ns)
+
+    @property
+    def judged_ns(self) -> int:
+        """Until when it could have shown the hand."""
+        return min(self.searched_ns, self.mapped_ns)
 
     def delivers(self, t_ns: int) -> bool:
         """Whether frames come from it about `t_ns`."""
@@ -116,7 +123,7 @@ class ContourEstimator:
         self._marked: list[CameraObservations] = []
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._epoch_ns = self._seen_ns = 0
-        self._judged_ns = self._covered_ns = self._agreed_ns = _NEVER
+        self._judged_ns = self._maps_ns = self._agreed_ns = _NEVER
         self._tracking = self._confirmed = self._ever = False
         self._latest: CameraObservations | EdgeFrame | None = None
 
@@ -162,7 +169,7 @@ class ContourEstimator:
         hand.frames[0], hand.cover = contour, 1e9  # so that it is looked for elsewhere
         hand.filter.add(0.0, [contour, hand.limits])
         state = hand.filter.newest.state
-        hand.process.difference(state, state)
+        hand.process.difference(state, state)  # compiled here, for `_choose`
         self._finder.relocate(maps, hand.filter.newest.state, hand.filter.newest.covariance, 0.03)
         self._finder.wait()
         self._finder.look(maps)
@@ -242,7 +249,7 @@ class ContourEstimator:
             self._hand.frames[number] = contour
             seen = contour.seen.sum(axis=0)
             camera = self._cameras[number]
-            camera.judged_ns = max(camera.judged_ns, one.t_row0_master_ns)
+            camera.searched_ns = one.t_row0_master_ns
             if seen[0] > MOST * seen[1]:
                 camera.supported_ns = one.t_row0_master_ns
             self._ask(number, one.t_row0_master_ns)
@@ -261,21 +268,21 @@ class ContourEstimator:
         camera = self._cameras[frame.camera]
         inside, share = on_foreground(self._hand, frame, self._hand.filter.newest.state)
         camera.whole = inside > MOST
-        camera.judged_ns = max(camera.judged_ns, frame.t_row0_master_ns)
+        camera.mapped_ns = frame.t_row0_master_ns
         if share > MOST if camera.whole else self._confirmed:
             camera.covered_ns = frame.t_row0_master_ns
         self._note_seen()
         maps = self._newest_maps(frame.t_row0_master_ns)
-        if maps is None or maps.t_ns == self._covered_ns or self._waiting:
+        if maps is None or maps.t_ns == self._maps_ns or self._waiting:
             return
-        self._covered_ns = maps.t_ns
+        self._maps_ns = maps.t_ns
         if not self._confirmed and self._seen_ns > max(self._epoch_ns, maps.t_ns - _SAME_NS):
             self._confirm(maps)
         self._cover(maps)
 
     def _note_seen(self) -> None:
         """Note when all cameras last showed the hand, and until when they could have."""
-        newest_ns = max(camera.judged_ns for camera in self._cameras)
+        newest_ns = max(max(camera.searched_ns, camera.mapped_ns) for camera in self._cameras)
         delivering = [camera for camera in self._cameras if camera.delivers(newest_ns)]
         if delivering and any(camera.whole for camera in delivering):
             self._seen_ns = max(self._seen_ns, min(camera.seen_ns for camera in delivering))
@@ -348,10 +355,11 @@ class ContourEstimator:
         self._finder.reset()
         if self._markers is not None:
             self._markers.begin(self._hand)
-        self._epoch_ns, self._seen_ns, self._agreed_ns, self._marked = t_ns, t_ns, _NEVER, []
+        self._epoch_ns, self._seen_ns, self._marked = t_ns, t_ns, []
+        self._judged_ns = self._maps_ns = self._agreed_ns = _NEVER
         self._tracking, self._confirmed = True, False
         for number, camera in enumerate(self._cameras):
-            camera.supported_ns = camera.covered_ns = camera.judged_ns = _NEVER
+            camera.supported_ns = camera.covered_ns = camera.searched_ns = camera.mapped_ns = _NEVER
             if camera.newest is not None:
                 camera.answered_ns = camera.newest.t_row0_master_ns  # it is waited for
                 self._ask(number, max(camera.newest.t_row0_master_ns, t_ns))
