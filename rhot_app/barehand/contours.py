@@ -210,7 +210,7 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
                 if not (_MARGIN_PX < pixel[0] < width - 1 - _MARGIN_PX
                         and _MARGIN_PX < pixel[1] < height - 1 - _MARGIN_PX):
                     continue
-                behind = _behind(surface, centres, radii, o, px, py, pz, n)
+                behind = link_behind(surface, centres, radii, o, px, py, pz, n)
                 if behind < 0 or used == ints.shape[0]:
                     continue
                 far = math.sqrt((px - o[0]) ** 2 + (py - o[1]) ** 2 + (pz - o[2]) ** 2)
@@ -253,7 +253,7 @@ def _square_to(u, e1, e2):
 
 
 @njit(cache=True)
-def _behind(surface, centres, radii, o, px, py, pz, n):
+def link_behind(surface, centres, radii, o, px, py, pz, n):
     """What a camera sees beside a contour point: SILHOUETTE, INNER, or -1 where the point is hidden or no edge."""
     px, py, pz = px + BESIDE_M * n[0], py + BESIDE_M * n[1], pz + BESIDE_M * n[2]
     ux, uy, uz = px - o[0], py - o[1], pz - o[2]

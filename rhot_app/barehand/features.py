@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from rhot_app.barehand.contours import (
     END_BALL,
     ContourPoints,
-    _behind,
     camera_centre,
     image_normal,
+    link_behind,
     project,
     side_normals,
 )
@@ -85,7 +85,7 @@ def _features(surface, state, size, pose, intrinsics, width, height, ints, float
                 continue
             if not (0.0 < pixel[0] < width - 1.0 and 0.0 < pixel[1] < height - 1.0):
                 continue
-            behind = _behind(surface, centres, radii, o, u[0], u[1], u[2], n)
+            behind = link_behind(surface, centres, radii, o, u[0], u[1], u[2], n)
             if behind < 0:
                 continue
             for i in range(3):

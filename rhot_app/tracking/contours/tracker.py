@@ -374,7 +374,7 @@ class ContourEstimator:
             camera.asked_ns = camera.answered_ns = _NEVER
 
     def _lost(self, t_ns: int) -> bool:
-        """Whether the cameras have told nothing of the hand for too long, or have shown that it is elsewhere."""
+        """Whether the cameras have not shown the hand for too long, or their images contradict it."""
         period_ns = min(camera.period_ns for camera in self._cameras)
         silent_ns = max(LOST_AFTER_NS, 2 * LOST_AFTER_PERIODS * period_ns)
         wrong_ns = max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns) if self._confirmed else silent_ns
