@@ -7,7 +7,9 @@ from collections.abc import Callable
 import msgspec
 import numpy as np
 import pytest
-from bare_scenes import model_and_surface, poses, rig_of, right_hand, scene
+from bare_scenes import DISTANCE_M, model_and_surface, poses, rig_of, right_hand, scene
+from pictures import look_at, picture, taken, wall
+from scipy.stats import chi2
 from searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
 
 from rhot_app.errors import RigError
@@ -111,6 +113,61 @@ def test_one_camera_goes_on_alone(film) -> None:
         nodes.step(number, [film[-1][1][0], None])
         number += 1
     assert len(nodes.states) > before + 3 and nodes.states[-1].tracked
+
+
+OUT_M = 0.22  # so far to the right, the second camera of `leaving` does not see the hand
+
+
+def leaving(frames: int, out: int) -> tuple[list[CameraModel], list[HandPose], list[list[np.ndarray]], list]:
+    """Two cameras, a grasping hand that goes to the right in `frames` frames, out of the picture of the second one,
+    stays there for `out` frames and comes back: its poses and pictures, and those of the empty scene."""
+    middle = np.array([0.0, 0.0, DISTANCE_M])
+    cameras = [look_at(np.array([-0.125, 0.0, 0.0]), middle), look_at(np.array([0.125, 0.0, 0.0]),
+                                                                      middle - [0.15, 0.0, 0.0])]
+    way = np.linspace(0.0, 1.0, frames)
+    away_m = OUT_M * np.concatenate([3.0 * way**2 - 2.0 * way**3, np.ones(out), 1.0 - 3.0 * way**2 + 2.0 * way**3])
+    moved = []
+    for pose, x_m in zip(poses("grasp", tuple(k / 30.0 for k in range(len(away_m)))), away_m, strict=True):
+        world = pose.world_from_palm.copy()
+        world[0, 3] += x_m
+        moved.append(HandPose(world, pose.angles))
+    walls = [wall(camera, 10 * k + 1, False) for k, camera in enumerate(cameras)]
+    images = [[picture(model_and_surface()[1], pose.world_from_palm, pose.angles, camera, walls[c], k)
+               for c, camera in enumerate(cameras)] for k, pose in enumerate(moved)]
+    return cameras, moved, images, [taken(one, 0) for one in walls]
+
+
+def test_a_hand_out_of_one_cameras_picture_is_kept_while_the_other_shows_it(monkeypatch) -> None:
+    frames, out = 24, 60
+    cameras, moved, images, empty = leaving(frames, out)
+    joints = [forward(model_and_surface()[0], pose).joints for pose in moved]
+    assert all((cameras[1].project(one)[:, 0] > cameras[1].width).all() for one in joints[frames:frames + out])
+    rig = bare_rig(cameras)
+    nodes = SearchedNodes(make_tracker(rig), [learn_background(skin_foreground(), [one]) for one in empty],
+                          len(rig.markers.ids))
+    number = 0
+    with monkeypatch.context() as patched:
+        patched.setattr(Finder, "found", lambda _: (moved[0], FIRST_NS + number * PERIOD_NS))
+        while not nodes.states or not nodes.states[-1].tracked:
+            assert number < 20
+            nodes.step(number, images[0])
+            number += 1
+    outside = []  # squared Mahalanobis distances of the joints while one camera shows them
+    for k, one in enumerate(images):
+        before = len(nodes.states)
+        nodes.step(number, one)
+        number += 1
+        assert all(state.tracked for state in nodes.states[before:]), f"lost in frame {k}"
+        if frames <= k < frames + out:
+            assert len(nodes.states) > before, "the camera that shows it is weighed without waiting for the other"
+            error = nodes.states[-1].joint_positions - joints[k]
+            outside.append(np.einsum("ij,ijk,ik->i", error, np.linalg.inv(nodes.states[-1].joint_covariances), error))
+    assert np.mean(np.array(outside) < chi2.ppf(0.997, 3)) > 0.9, "it says how uncertain it is"
+    assert error_mm(nodes.states[-1], moved[-1]) < 5.0
+    for _ in range(20):
+        nodes.step(number, empty)
+        number += 1
+    assert nodes.states[-1].condition is Condition.LOST, "both should show it, and do not"
 
 
 def landmarks(film: list[tuple[list, list, list]], pose: HandPose) -> list[np.ndarray]:

@@ -232,6 +232,7 @@ class ContourEstimator:
             return False
         contour = self._contour(frame)
         if contour is None:
+            self._cameras[frame.camera].answered_ns = _NEVER  # it is not waited for
             return False
         self._cameras[frame.camera].answered_ns = frame.t_row0_master_ns
         self._waiting[frame.camera] = frame, contour
@@ -245,6 +246,7 @@ class ContourEstimator:
         except np.linalg.LinAlgError:  # the estimate contradicts itself
             self._give_up()
             return False
+        self._hand.frames = [None] * len(self._names)
         for number, (one, contour) in waiting.items():
             self._hand.frames[number] = contour
             seen = contour.seen.sum(axis=0)
@@ -269,7 +271,7 @@ class ContourEstimator:
         inside, share = on_foreground(self._hand, frame, self._hand.filter.newest.state)
         camera.whole = inside > MOST
         camera.mapped_ns = frame.t_row0_master_ns
-        if share > MOST if camera.whole else self._confirmed:
+        if share > MOST:
             camera.covered_ns = frame.t_row0_master_ns
         self._note_seen()
         maps = self._newest_maps(frame.t_row0_master_ns)
@@ -281,12 +283,13 @@ class ContourEstimator:
         self._cover(maps)
 
     def _note_seen(self) -> None:
-        """Note when all cameras last showed the hand, and until when they could have."""
+        """Note when all cameras in whose images most of the hand lies last showed it, and until when they could have.
+        The others say nothing: it may be there or not."""
         newest_ns = max(max(camera.searched_ns, camera.mapped_ns) for camera in self._cameras)
-        delivering = [camera for camera in self._cameras if camera.delivers(newest_ns)]
-        if delivering and any(camera.whole for camera in delivering):
-            self._seen_ns = max(self._seen_ns, min(camera.seen_ns for camera in delivering))
-        self._judged_ns = min((camera.judged_ns for camera in delivering), default=_NEVER)
+        judging = [camera for camera in self._cameras if camera.whole and camera.delivers(newest_ns)]
+        if judging:
+            self._seen_ns = max(self._seen_ns, min(camera.seen_ns for camera in judging))
+        self._judged_ns = min((camera.judged_ns for camera in judging), default=_NEVER)
 
     def _confirm(self, maps: Maps) -> None:
         """Have the hand looked for once more: two random searches agree on a wrong hand less often than one errs.
@@ -360,6 +363,7 @@ class ContourEstimator:
         self._tracking, self._confirmed = True, False
         for number, camera in enumerate(self._cameras):
             camera.supported_ns = camera.covered_ns = camera.searched_ns = camera.mapped_ns = _NEVER
+            camera.whole = False
             if camera.newest is not None:
                 camera.answered_ns = camera.newest.t_row0_master_ns  # it is waited for
                 self._ask(number, max(camera.newest.t_row0_master_ns, t_ns))
@@ -374,7 +378,7 @@ class ContourEstimator:
             camera.asked_ns = camera.answered_ns = _NEVER
 
     def _lost(self, t_ns: int) -> bool:
-        """Whether the cameras have not shown the hand for too long, or their images contradict it."""
+        """Whether no camera has shown the hand for too long, or the images of one contradict it."""
         period_ns = min(camera.period_ns for camera in self._cameras)
         silent_ns = max(LOST_AFTER_NS, 2 * LOST_AFTER_PERIODS * period_ns)
         wrong_ns = max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns) if self._confirmed else silent_ns
@@ -490,6 +494,8 @@ class ContourEstimator:
         contour = asked(self._hand, number, state, covariance, STEP_M)
         if len(contour.slices) > SLICES_MAX:
             contour = asked(self._hand, number, state, covariance, STEP_M * len(contour.slices) / SLICES_MAX)
+        if not len(contour.slices):  # the hand is not in its image, so no edges will come
+            camera.answered_ns = _NEVER
         self._requests = [one for one in self._requests if one.camera != number]
         self._requests.append(SliceRequest(number, contour.slices[:SLICES_MAX], STEP, contour))
 
