@@ -64,7 +64,8 @@ class ForegroundStore:
         self._failure = ""
         self._until_s = 0.0
         self._thread: threading.Thread | None = None
-        self._ending = threading.Event()
+        self._ending = threading.Event()  # of the thread
+        self._changing = threading.Lock()
         if path is not None and path.exists():
             try:
                 self.current = load_foreground(path)
@@ -101,9 +102,9 @@ class ForegroundStore:
         ends or `revert`. Raises NodeError while that goes on already."""
         if self.learning:
             raise NodeError("the background is being learnt already; wait for its end.")
-        self._failure, self._until_s = "", time.monotonic() + seconds
-        self._thread = threading.Thread(target=self._learn, args=(pictures, save), name="background",
-                                        daemon=True)
+        self._failure, self._until_s, self._ending = "", time.monotonic() + seconds, threading.Event()
+        self._thread = threading.Thread(target=self._learn, args=(pictures, save, self._until_s, self._ending),
+                                        name="background", daemon=True)
         self._thread.start()
 
     def learn_skin(self, pictures: PictureBox, *, save: bool = True) -> bool:
@@ -131,10 +132,13 @@ class ForegroundStore:
         self._use(self.current, save=True)
 
     def revert(self, *, earlier: bool = False) -> None:
-        """Use what is in the file again; `earlier`: what was there before the last `save`, and once more, what that had
-        saved. Raises NodeError."""
-        if self.learning:
+        """Use what is in the file again; a background that is being learnt is given up. `earlier`: use what was there
+        before the last `save`, and once more, what that had saved. Raises NodeError."""
+        if self.learning and earlier:
             raise NodeError("the background is being learnt; wait for its end.")
+        with self._changing:
+            self._ending.set()
+            self._thread = None
         if earlier and self.path is not None:
             kept, saved = self._before(), self.path.read_bytes() if self.path.exists() else None
             self._use(load_foreground(kept) if kept.exists() else _FLAT, save=True)
@@ -178,19 +182,22 @@ class ForegroundStore:
         if self._thread is not None:
             self._thread.join()
 
-    def _learn(self, pictures: PictureBox, save: bool) -> None:
+    def _learn(self, pictures: PictureBox, save: bool, until_s: float, ending: threading.Event) -> None:
         sums = BackgroundSums()
         try:
-            while time.monotonic() < self._until_s or sums.count < PICTURES_MIN:
-                if self._ending.is_set():
+            while time.monotonic() < until_s or sums.count < PICTURES_MIN:
+                if ending.is_set():
                     return
                 sums.add(self._picture(pictures))
-            self._use(sums.learnt(self.current if _skin_of(self.current) != "none" else _GENERIC),
-                      save=save)
+            with self._changing:
+                if ending.is_set():
+                    return
+                self._use(sums.learnt(self.current if _skin_of(self.current) != "none" else _GENERIC), save=save)
             log.info("the background was learnt from %d pictures", sums.count)
         except (NodeError, ValueError) as exc:
-            self._failure = f"The background was not learnt: {exc}"
-            log.error("%s", self._failure)
+            if not ending.is_set():
+                self._failure = f"The background was not learnt: {exc}"
+                log.error("%s", self._failure)
 
     def _picture(self, pictures: PictureBox) -> NDArray[np.uint8]:
         picture = pictures.next_still(PICTURE_S)

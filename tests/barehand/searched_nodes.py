@@ -18,12 +18,14 @@ FIRST_NS = 10**9
 
 class SearchedNodes:
     """Hands the frames of some cameras to a tracker, and does what it asks for; with `forget`, it gives requests back
-    as a log has them."""
+    as a log has them. `rounded_ns`: by which the times of edges and maps differ from those of the markers."""
 
-    def __init__(self, tracker: Tracker, foreground: list[Foreground], markers: int, *, forget: bool = False) -> None:
+    def __init__(self, tracker: Tracker, foreground: list[Foreground], markers: int, *, forget: bool = False,
+                 rounded_ns: int = 0) -> None:
         assert isinstance(tracker, ImageTracking)
         tracker.warm_up()
         self.tracker, self.foreground, self.markers, self.forget = tracker, foreground, markers, forget
+        self.rounded_ns = rounded_ns
         self.asked: list[SliceRequest | None] = [None] * len(foreground)
         self.states: list[HandState] = []
 
@@ -35,7 +37,7 @@ class SearchedNodes:
         for camera, image in enumerate(images):
             if image is None:
                 continue
-            request, known = self.asked[camera], self.foreground[camera]
+            request, known, searched_ns = self.asked[camera], self.foreground[camera], t_ns + self.rounded_ns
             if seen is not None:
                 self.give(replace(seen[camera], t_row0_master_ns=t_ns, t_receive_ns=t_ns + 9_000_000))
             else:
@@ -46,9 +48,9 @@ class SearchedNodes:
             if len(request.slices):
                 found = find_edges(image, request.slices, known, noise_of(image))
                 told = replace(request, expected=None) if self.forget else request
-                self.give(EdgeFrame(camera, t_ns, 0, t_ns + 9_000_000, 0.004, 0.001, told, found))
+                self.give(EdgeFrame(camera, searched_ns, 0, t_ns + 9_000_000, 0.004, 0.001, told, found))
             if request.map_step:
-                self.give(ForegroundFrame(camera, t_ns, 0, t_ns + 9_000_000, request.map_step,
+                self.give(ForegroundFrame(camera, searched_ns, 0, t_ns + 9_000_000, request.map_step,
                                           foreground_map(image, known, request.map_step)))
 
     def give(self, frame: CameraFrame) -> None:

@@ -20,6 +20,7 @@ from rhot_app.hand.skeleton import FLEXIONS, JOINTS, HandPose
 from rhot_app.project import Rig, TrackerSettings, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.contours.finder import Finder
+from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.tracker import ShowsContours
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
@@ -102,6 +103,29 @@ def test_slices_lie_across_the_contour_of_the_next_frame(film) -> None:
                         for end in (request.slices[:, :2] + side * request.slices[:, 2:4] for side in (-5.0, 5.0)))
         assert np.mean(inner) > 0.9, "normals point from the hand outwards"
         assert 0.4 < np.mean(~outer) < 0.95, "most contours are outlines, some lie within the hand"
+
+
+@pytest.mark.parametrize("which", ["followed", "looked for"])
+def test_a_recording_that_starts_again_is_another_one(film, which: str) -> None:
+    rig = bare_rig(film[0][0])
+    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
+    number = 0
+    if which == "followed":
+        number = follow(nodes, film)
+    else:
+        while len(nodes.states) < 8:
+            nodes.step(number, film[0][1])
+            number += 1
+    nodes.states.clear()
+    first = number = number - 100  # three seconds earlier
+    while not nodes.states or not nodes.states[-1].tracked:
+        assert number < first + 40, "the hand was not found again"
+        nodes.step(number, film[0][1])
+        number += 1
+    assert number - first > 2, "of what was before, nothing is reported"
+    times_ns = [state.t_master_ns for state in nodes.states]
+    assert times_ns == sorted(times_ns) and times_ns[-1] <= FIRST_NS + number * PERIOD_NS
+    assert error_mm(nodes.states[-1], poses("grasp", TIMES)[0]) < 5.0
 
 
 def test_one_camera_goes_on_alone(film) -> None:
@@ -200,6 +224,21 @@ def test_landmarks_begin_and_contours_go_on_and_landmarks_find_it_again(film, mo
         number += 1
     assert nodes.states[-1].condition is Condition.LOST
     until_tracked(nodes, film, number, 5)
+
+
+@pytest.mark.parametrize("rounded_ns", [-300_000, 300_000])
+def test_landmarks_and_edges_of_one_picture_are_weighed_at_once(film, monkeypatch, rounded_ns: int) -> None:
+    """Their datagrams come apart, and the node's clock is compared anew for each."""
+    monkeypatch.setattr(Finder, "found", lambda _: None)
+    rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
+    nodes = SearchedNodes(make_tracker(rig), known(film), 21, rounded_ns=rounded_ns)
+    number = until_tracked(nodes, film, 0, 0)
+    alone: list[int] = []
+    monkeypatch.setattr(MarkersOfHand, "weigh", lambda _, frame, *__: bool(alone.append(frame.camera)))
+    for _ in range(8):
+        nodes.step(number, film[0][1], landmarks(film, poses("grasp", TIMES)[0]))
+        number += 1
+    assert nodes.states[-1].tracked and not alone
 
 
 def test_landmarks_mend_a_finger_that_is_taken_for_its_neighbour(film, monkeypatch) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import zmq
 from node_fakes import grey_image
-from patience import PATIENCE_MS, eventually
+from patience import PATIENCE_MS, eventually, settled
 
 from rhot_node.capture.camera import Frame
 from rhot_node.clock import NodeClock
@@ -266,6 +266,11 @@ def test_background_and_skin_are_learnt_over_the_channel(served: Served) -> None
         answer, png = served.ask_raw(b'{"request": "foreground_mask"}')
         assert json.loads(answer) == {"ok": True, "format": "png", "width": 320, "height": 240}
         assert cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_GRAYSCALE).shape == (240, 320)
+        learnt = served.foreground.current
+        assert served.ask(request="learn_background", seconds=0.5) == {"ok": True}
+        assert served.ask(request="revert_foreground") == {"ok": True}
+        assert not served.foreground.learning
+        assert settled(lambda: np.array_equal(served.foreground.current.mean, learnt.mean), 1.0), "it was given up"
         assert served.ask(request="forget_foreground") == {"ok": True}
         assert not served.foreground.report(640, 480)["background"]
     finally:

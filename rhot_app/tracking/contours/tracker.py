@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import ContourFrame, Contours
+from rhot_app.barehand.contour_residual import SAME_TIME_S, ContourFrame, Contours
 from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
 from rhot_app.barehand.silhouette import CORRELATED
@@ -56,6 +56,7 @@ LEAST_GAIN = RELOCATION_LOG_ODDS * CORRELATED
 RENEW_NS = 300_000_000
 """A node that is asked for a map alone is asked again after this long: three times before its request ends."""
 
+_SAME_FRAME_NS = round(1e9 * SAME_TIME_S)  # markers and edges of one frame come apart, and their times are rounded
 _SAME_NS = 100_000_000  # maps of different cameras farther apart are of different moments
 _JUMP_NS = 1_000_000_000  # frames farther apart are of different sessions
 _PERIOD_S = 1.0 / 30.0  # of a camera of which one frame has come
@@ -106,12 +107,18 @@ class ContourEstimator:
         self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale)
         self._markers = MarkersOfHand(rig, self._hand) if rig.tracker.observe != "contours" else None
         self._finder = Finder(self._hand)
+        self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._names = tuple(node.name for node in rig.nodes)
         self._sequence = 0
         self.reset()
 
     def reset(self) -> None:
         """Forget everything but the count of states."""
+        self._pending.clear()
+        self._begin_again()
+
+    def _begin_again(self) -> None:
+        """Forget what was taken in."""
         self._finder.reset()
         if self._markers is not None:
             self._markers.reset()
@@ -121,7 +128,6 @@ class ContourEstimator:
         self._requests: list[SliceRequest] = []
         self._waiting: dict[int, tuple[EdgeFrame, ContourFrame]] = {}
         self._marked: list[CameraObservations] = []
-        self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._epoch_ns = self._seen_ns = 0
         self._judged_ns = self._maps_ns = self._agreed_ns = _NEVER
         self._tracking = self._confirmed = self._ever = False
@@ -204,8 +210,11 @@ class ContourEstimator:
         camera = self._cameras[frame.camera]
         if camera.newest is not None:
             since_ns = frame.t_row0_master_ns - camera.newest.t_row0_master_ns
-            if since_ns <= 0 and since_ns > -_JUMP_NS:
+            if -_JUMP_NS < since_ns <= 0:
                 return False
+            if since_ns <= -_JUMP_NS:  # another session, or a clock that was set
+                self._begin_again()
+                camera = self._cameras[frame.camera]
             if 0 < since_ns < _JUMP_NS:
                 camera.period_ns += 0.1 * (since_ns - camera.period_ns)
         camera.newest = frame
@@ -465,10 +474,10 @@ class ContourEstimator:
     def _marked_with(self, waiting: dict[int, tuple[EdgeFrame, ContourFrame]]) -> list[CameraObservations]:
         """The markers of the frames whose edges are `waiting`. Those of earlier frames are weighed alone."""
         edges_ns = {number: frame.t_row0_master_ns for number, (frame, _) in waiting.items()}
-        marked = self._marked
-        self._marked = [one for one in marked if one.t_row0_master_ns > edges_ns.get(one.camera, _NEVER)]
-        self._weigh_alone([one for one in marked if one.t_row0_master_ns < edges_ns.get(one.camera, _NEVER)])
-        return [one for one in marked if one.t_row0_master_ns == edges_ns.get(one.camera, _NEVER)]
+        late = [(one, one.t_row0_master_ns - edges_ns.get(one.camera, _NEVER)) for one in self._marked]
+        self._marked = [one for one, late_ns in late if late_ns > _SAME_FRAME_NS]
+        self._weigh_alone([one for one, late_ns in late if late_ns < -_SAME_FRAME_NS])
+        return [one for one, late_ns in late if abs(late_ns) <= _SAME_FRAME_NS]
 
     def _weigh_alone(self, frames: Sequence[CameraObservations]) -> bool:
         """Weigh the markers of some frames. Whether they showed anything. Raises LinAlgError."""

@@ -25,7 +25,9 @@ def make_plan(kit: Kit) -> Plan:
              AcceptPage(accept, kit.scheme, _KEPT))
 
     def put_back() -> None:
-        """What was only tried out goes."""
+        """What was only tried out goes, and what is being learnt is given up."""
+        for step in (empty, skin):
+            step.stop()
         if accept.state != "used" and (empty.tried or skin.tried):
             asker = kit.connect()
             try:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from fake_engine import synthetic_rig
+from patience import eventually, settled
 from wizard_hands import Hands
 from wizard_rig import FakeMemory, FakeRigAsker
 
@@ -60,7 +61,7 @@ class LearningNodes(FakeRigAsker):
         if kind == "state":
             return {"answer": {"foreground": store.report(640, 480)}}
         if kind == "learn_background":
-            store.learn_background(self.box(node_id), 0.1, save=request["save"])
+            store.learn_background(self.box(node_id), request["seconds"], save=request["save"])
         elif kind == "learn_skin":
             return {"answer": {"found": store.learn_skin(self.box(node_id), save=request["save"])}}
         elif kind == "foreground_mask":
@@ -130,6 +131,19 @@ def test_closing_without_use_forgets_what_was_tried_out(hands, nodes):
     hands.until(lambda: hands.sentence.startswith("Learnt."))
     hands.window.end().wait(5.0)
     assert not any(store.report(640, 480)["background"] for store in nodes.stores.values())
+
+
+def test_closing_while_the_scene_is_learnt_keeps_the_old_one(hands, nodes, monkeypatch):
+    old = nodes.stores[1]
+    old.learn_background(nodes.box(1), 0.1)
+    eventually(lambda: not old.learning)
+    before = old.current.mean.copy()
+    nodes.hand = True  # so that the scene is another one
+    monkeypatch.setattr(foreground_steps, "SECONDS", 1.0)
+    hands.click(hands.window.page.learn_button)
+    hands.until(lambda: old.learning)
+    hands.window.end().wait(5.0)
+    assert settled(lambda: np.array_equal(old.current.mean, before) and not nodes.stores[2].current.mean.size, 1.5)
 
 
 def test_a_node_that_does_not_answer_is_named(hands, nodes):

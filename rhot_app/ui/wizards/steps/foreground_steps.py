@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -49,7 +50,7 @@ def foreground_of(command: Command, node_id: int) -> dict[str, Any]:
 
 
 class LearningStep(Step):
-    """Base of both: `learn` is called in a worker, between `begin` and `finish`."""
+    """Base of both: `learn` is called in a worker, between `begin` and `finish`; `stop` in another one."""
 
     def __init__(self, cameras: Mapping[str, int]) -> None:
         """`cameras`: node ids by name."""
@@ -58,6 +59,8 @@ class LearningStep(Step):
         self.learning = self.learnt = False
         self.tried = 0  # how often a learning was begun, of which some nodes may try something out
         self.problem = ""
+        self._asking = threading.Lock()
+        self._stopped = False
 
     def learn(self, command: Command) -> str:
         """Have every node learn; returns what is worth a sentence. Raises RhotError."""
@@ -71,6 +74,11 @@ class LearningStep(Step):
     def finish(self, problem: str = "", *, learnt: bool = True) -> None:
         """It has ended so."""
         self.learning, self.problem, self.learnt = False, problem, learnt or self.learnt
+
+    def stop(self) -> None:
+        """No node is asked to learn from now on; waits for an answer that is under way."""
+        with self._asking:
+            self._stopped = True
 
     @property
     def keeps(self) -> bool:
@@ -98,9 +106,11 @@ class EmptyStep(LearningStep):
         for name, node_id in self.nodes.items():
             known = foreground_of(command, node_id)
             self.before.setdefault(name, known)
-            ask_node(command, node_id, "learn_background", seconds=SECONDS, save=False)
+            with self._asking:
+                if not self._stopped:
+                    ask_node(command, node_id, "learn_background", seconds=SECONDS, save=False)
         self._until_s = time.monotonic() + SECONDS
-        while waiting := [name for name, node_id in self.nodes.items() if not self._has_learnt(command, node_id)]:
+        while not self._stopped and (waiting := [name for name, node_id in self.nodes.items() if not self._has_learnt(command, node_id)]):
             if time.monotonic() > self._until_s + _WAIT_S:
                 raise EngineError(f"{' and '.join(waiting)}: the background was not learnt in time. Look at the Nodes "
                                   "panel, then learn it again.")
@@ -153,11 +163,15 @@ class SkinStep(LearningStep):
 
     def learn(self, command: Command) -> str:
         """The next picture's skin of each camera."""
-        without = [name for name, node_id in self.nodes.items() if not ask_node(
-            command, node_id, "learn_skin", save=False).get("answer", {}).get("found")]
+        without = [name for name, node_id in self.nodes.items() if not self._finds_skin(command, node_id)]
         return "" if not without else (
             f"No skin was found in the picture of {' and '.join(without)}, so the colours of any skin are used there. "
             "Hold the hand into both pictures and learn it again.")
+
+    def _finds_skin(self, command: Command, node_id: int) -> bool:
+        with self._asking:
+            return not self._stopped and bool(
+                ask_node(command, node_id, "learn_skin", save=False).get("answer", {}).get("found"))
 
     def see(self, pictures: Pictures) -> dict[str, Mask]:
         """What each node takes for the hand now."""
