@@ -18,9 +18,10 @@ from rhot_app.hand.motion.hand_process import BIAS, MOTION
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.contours import finder as finder_module
-from rhot_app.tracking.contours.evidence import asked, matched
 from rhot_app.tracking.contours.finder import Finder
-from rhot_app.tracking.contours.markers import BesideContours, MarkersOfHand
+from rhot_app.tracking.contours.markers import MarkersOfHand
+from rhot_app.tracking.contours.requests import asked, matched
+from rhot_app.tracking.contours.sized_markers import BesideContours
 from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations

@@ -1,23 +1,29 @@
-"""Slices that are asked for, contours on slices that were recorded, and joints on foreground."""
+"""Whether the cameras show the hand that is followed: its contour found, its joints on foreground, and nothing that
+contradicts it."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
-from rhot_app.barehand.contours import SILHOUETTE, STEP_M, ContourPoints
+from rhot_app.barehand.contours import SILHOUETTE
 from rhot_app.barehand.joints import place_joints
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.motion.hand_process import MOTION
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.state import SeenContour
-from rhot_node.detect.edges import Edges
-from rhot_node.wire.slices import pack_slices, unpack_slices
+from rhot_app.tracking.contours.requests import NEVER, CameraFrames
+from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
 
 Array = NDArray[np.float64]
+
+MOST = 0.5
+"""Part above which more speaks for a hand than against it: of the contour that is found, of joints on foreground."""
 
 CONFUSED_M = 0.02
 """Mean distance of two hands' joints, m, from which fingers are taken for each other: neighbouring knuckles are so far
@@ -29,50 +35,80 @@ APART_M = 0.1
 NEAR_SD = 3.0
 """Standard deviations from the contour within which an edge is shown as the hand's."""
 
-ALIKE = 0.9
-"""Cosine of the largest angle between a recorded slice and the normal of the contour on it, 26 degrees."""
 
-BESIDE_PX = 2.0
-"""px: a recorded slice crosses the contour if one of its points is no farther beyond the slice's end: the points are
-2 mm apart, which is about as many pixels."""
+@dataclass(slots=True)
+class _Shown:
+    """What one camera has shown. `searched_ns`, `mapped_ns`: its newest frame whose edges and whose foreground came;
+    `supported_ns`, `covered_ns`: the newest of these that showed the contour of the hand where it is estimated, and
+    foreground there; `whole`: most of the hand lies in its image.
+    """
 
+    supported_ns: int = NEVER
+    covered_ns: int = NEVER
+    searched_ns: int = NEVER
+    mapped_ns: int = NEVER
+    whole: bool = False
 
-def asked(hand: BareHandTracker, camera: int, state: Array, covariance: Array, step_m: float) -> ContourFrame:
-    """The slices across the contours of a hand in `state`, whose centres lie in the image, rounded as they are sent."""
-    frame, model = hand.expected(camera, state, covariance, step_m), hand.cameras[camera]
-    x, y = frame.slices[:, 0], frame.slices[:, 1]
-    kept = (x >= 0.0) & (y >= 0.0) & (x <= model.width - 1) & (y <= model.height - 1)
-    return _on(hand, camera, frame, np.flatnonzero(kept), unpack_slices(pack_slices(frame.slices[kept])))
+    @property
+    def seen_ns(self) -> int:
+        """When it last showed the hand. Edges and foreground of one frame come apart."""
+        return min(self.supported_ns, self.covered_ns)
 
-
-def matched(hand: BareHandTracker, frame: EdgeFrame, state: Array, covariance: Array) -> ContourFrame | None:
-    """The contour of a hand in `state` on the slices of a recorded request that cross it, with their edges; the frame
-    stays as it is. None without any."""
-    expected, slices = hand.expected(frame.camera, state, covariance, 0.5 * STEP_M), frame.request.slices
-    if not len(expected.slices) or not len(slices):
-        return None
-    apart = slices[:, None, :2] - expected.pixel[None]
-    distance = np.hypot(*apart.transpose(2, 0, 1))
-    distance += np.where(slices[:, 2:4] @ expected.normal.T < ALIKE, 1e6, 0.0)
-    nearest = np.argmin(distance, axis=1)
-    order = np.argsort(expected.points.capsule[nearest], kind="stable")
-    reach = distance[np.arange(len(slices)), nearest]
-    order = order[(reach < slices[:, 4] + BESIDE_PX)[order]]
-    if not len(order):
-        return None
-    contour = _on(hand, frame.camera, expected, nearest[order], slices[order])
-    contour.observe(Edges(*(column[order] for column in frame.edges)))
-    return contour
+    @property
+    def judged_ns(self) -> int:
+        """Until when it could have shown the hand."""
+        return min(self.searched_ns, self.mapped_ns)
 
 
-def _on(hand: BareHandTracker, camera: int, frame: ContourFrame, chosen: NDArray[np.int64],
-        slices: Array) -> ContourFrame:
-    """The frame with the chosen points on other slices."""
-    p = frame.points
-    points = ContourPoints(p.capsule[chosen], p.kind[chosen], p.along[chosen], p.behind[chosen], p.pixel[chosen],
-                           p.normal[chosen], p.scale[chosen])
-    return ContourFrame(hand.surface, points, frame.pose, frame.intrinsics, slices, frame.expected_sd[chosen],
-                        frame.late_s[chosen], MOTION, frame.repeated)
+class Evidence:
+    """What the cameras show of one hand. `seen_ns`: when all in whose images most of it lies last showed it, master
+    ns."""
+
+    def __init__(self, hand: BareHandTracker, cameras: Sequence[CameraFrames]) -> None:
+        self._hand, self._cameras = hand, cameras
+        self.begin(NEVER)
+
+    def begin(self, t_ns: int) -> None:
+        """The hand was found at `t_ns`."""
+        self._shown = [_Shown() for _ in self._cameras]
+        self.seen_ns, self._judged_ns = t_ns, NEVER
+
+    def take_edges(self, weighed: Iterable[tuple[EdgeFrame, ContourFrame]]) -> None:
+        """The edges of some frames have been weighed."""
+        for frame, contour in weighed:
+            camera, seen = self._shown[frame.camera], contour.seen.sum(axis=0)
+            camera.searched_ns = frame.t_row0_master_ns
+            if seen[0] > MOST * seen[1]:
+                camera.supported_ns = frame.t_row0_master_ns
+        self._note()
+
+    def take_map(self, frame: ForegroundFrame) -> None:
+        """See whether the hand lies on foreground in one frame."""
+        camera = self._shown[frame.camera]
+        inside, share = on_foreground(self._hand, frame, self._hand.filter.newest.state)
+        camera.whole = inside > MOST
+        camera.mapped_ns = frame.t_row0_master_ns
+        if share > MOST:
+            camera.covered_ns = frame.t_row0_master_ns
+        self._note()
+
+    def lost(self, t_ns: int, *, confirmed: bool) -> bool:
+        """Whether no camera has shown the hand for too long, or the images of one contradict it. One that is not
+        `confirmed` is given more time."""
+        period_ns = min(camera.period_ns for camera in self._cameras)
+        silent_ns = max(LOST_AFTER_NS, 2 * LOST_AFTER_PERIODS * period_ns)
+        wrong_ns = max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns) if confirmed else silent_ns
+        return bool(t_ns - self.seen_ns > silent_ns + 2 * period_ns or self._judged_ns - self.seen_ns > wrong_ns)
+
+    def _note(self) -> None:
+        """Note when all cameras in whose images most of the hand lies last showed it, and until when they could have.
+        The others say nothing: it may be there or not."""
+        newest_ns = max(max(one.searched_ns, one.mapped_ns) for one in self._shown)
+        judging = [one for one, camera in zip(self._shown, self._cameras, strict=True)
+                   if one.whole and camera.delivers(newest_ns)]
+        if judging:
+            self.seen_ns = max(self.seen_ns, min(one.seen_ns for one in judging))
+        self._judged_ns = min((one.judged_ns for one in judging), default=NEVER)
 
 
 def on_foreground(hand: BareHandTracker, frame: ForegroundFrame, state: Array) -> tuple[float, float]:

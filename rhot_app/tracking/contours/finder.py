@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.silhouette import Silhouettes, search, silhouettes
+from rhot_app.barehand.observations import ForegroundFrame
+from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, search, silhouettes
 from rhot_app.barehand.start import STEP, find_in_maps
 from rhot_app.barehand.surface import SHAPE
-from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.barehand.tracker import COVER_DROP, COVER_SHARE, RELOCATION_LOG_ODDS, BareHandTracker
 from rhot_app.hand.skeleton import HandPose
+from rhot_app.tracking.contours.requests import CameraFrames
 
 Array = NDArray[np.float64]
 
@@ -23,6 +25,12 @@ log = logging.getLogger(__name__)
 
 MOVED_M, TURNED = 0.05, 0.4
 """m and rad: how far a hand that is being looked for moves while it is, at most: it is held still, more or less."""
+
+LEAST_GAIN = RELOCATION_LOG_ODDS * CORRELATED
+"""Log odds of pixels by which another pose must cover the foreground better (`barehand.tracker`)."""
+
+SAME_MAPS_NS = 100_000_000
+"""ns: maps of different cameras farther apart are of different moments."""
 
 _ROUNDS = 60  # of the search about what was found, in the newest maps: half of `start.LAST_ROUNDS`, for it is near
 
@@ -39,6 +47,25 @@ class Maps:
         used = [c for c, one in enumerate(self.probabilities) if one is not None]
         return silhouettes([one for one in self.probabilities if one is not None], STEP, [hand.poses[c] for c in used],
                            [hand.cameras[c].intrinsics for c in used])
+
+
+class NewestMaps:
+    """The newest foreground map of each camera."""
+
+    def __init__(self, cameras: Sequence[CameraFrames]) -> None:
+        self._cameras = cameras
+        self._maps: list[ForegroundFrame | None] = [None] * len(cameras)
+
+    def take(self, frame: ForegroundFrame) -> Maps | None:
+        """Take one in. The maps of all cameras that deliver frames, of about its moment; None while one is missing."""
+        self._maps[frame.camera], t_ns = frame, frame.t_row0_master_ns
+        maps: list[ForegroundFrame | None] = []
+        for camera, one in zip(self._cameras, self._maps, strict=True):
+            fresh = one is not None and abs(t_ns - one.t_row0_master_ns) < SAME_MAPS_NS
+            if camera.delivers(t_ns) and not fresh:
+                return None
+            maps.append(one if fresh else None)
+        return Maps(t_ns, [None if one is None else one.probability for one in maps])
 
 
 class Finder:
@@ -67,6 +94,22 @@ class Finder:
     def relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float) -> None:
         """See whether a hand in `state` may have gone elsewhere in `dt_s` (`BareHandTracker.relocate`)."""
         self._begin(self._relocate, maps, state.copy(), covariance.copy(), dt_s, self._run)
+
+    def follow(self, maps: Maps, dt_s: float) -> bool:
+        """Move the hand to where it covers the foreground better, if it has come to cover it worse than of late; it is
+        then looked for as far as hands go in `dt_s`. What was found is compared in the newest maps. Whether it was
+        moved."""
+        hand, knot = self._hand, self._hand.filter.newest
+        seen, moved = maps.silhouettes(hand), self.moved()
+        covered = hand.covered(seen, knot.state)
+        worse = hand.cover != 0.0 and covered < hand.cover - COVER_DROP
+        if worse and moved is not None and hand.score_of(seen, moved) > hand.score_of(seen, knot.state) + LEAST_GAIN:
+            hand.restart(knot.t_s, moved)
+            return True
+        if worse:
+            self.relocate(maps, knot.state, knot.covariance, dt_s)
+        hand.cover += (COVER_SHARE if hand.cover else 1.0) * (covered - hand.cover)
+        return False
 
     def found(self) -> tuple[HandPose, int] | None:
         """A pose and its time, master ns, if one was found since it was asked for last."""

@@ -1,50 +1,44 @@
-"""Markers or landmarks beside the contours of one hand: residuals of the same state, and a start where they are enough.
-
-The state of a bare hand has its size behind the motion; the lasting errors of the markers follow.
-"""
+"""Markers or landmarks beside the contours of one hand: which frames are weighed with which edges, and whether the
+markers or the contours are right where they contradict each other. Enough of them start the track."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.joints import add_lengths
-from rhot_app.barehand.surface import FINGERS, LENGTH, RADIUS, SHAPE, WHOLE, sized_table
-from rhot_app.barehand.tracker import BareHandTracker
-from rhot_app.estimation.filter import IteratedFilter, Knot
-from rhot_app.estimation.residual import Rows
-from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.barehand.contour_residual import SAME_TIME_S, ContourFrame, Contours
+from rhot_app.barehand.observations import EdgeFrame
+from rhot_app.barehand.surface import SHAPE
+from rhot_app.barehand.tracker import CONFUSED_PX, PASSES, RELOCATION_LOG_ODDS, BareHandTracker
+from rhot_app.estimation.filter import IteratedFilter, Knot, update
+from rhot_app.estimation.residual import Residual
 from rhot_app.hand.landmarks import LASTING_M, LASTING_S
-from rhot_app.hand.motion.hand_process import (
-    ANGLES,
-    BIAS,
-    BIAS_S,
-    FASTEST,
-    MOTION,
-    PALM_SPREAD,
-    VELOCITY,
-    HandProcess,
-)
+from rhot_app.hand.motion.hand_process import BIAS_S, FASTEST, MOTION, PALM_SPREAD, POSE, HandProcess
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.association import GATE, MarkerAssociation
+from rhot_app.tracking.contours.requests import NEVER, CameraFrames
+from rhot_app.tracking.contours.sized_markers import (
+    BesideContours,
+    sized,
+    with_errors_of,
+    without_errors,
+    without_size,
+)
 from rhot_app.tracking.markers.acquisition import Starter
-from rhot_app.tracking.markers.estimator import Rejections, associate, distances_of
+from rhot_app.tracking.markers.estimator import Rejections
 from rhot_app.tracking.markers.estimator_state import RecentObservations
-from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
+from rhot_app.tracking.markers.marker_model import LASTING_PX, compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+Estimate = tuple[Array, Array]
 
-LENGTHS = np.concatenate([[WHOLE, FINGERS], np.arange(LENGTH, RADIUS)])
-"""Of a shape: what moves joints and markers."""
+_SAME_FRAME_NS = round(1e9 * SAME_TIME_S)  # markers and edges of one frame come apart, and their times are rounded
 
 
 class MarkersOfHand:
@@ -61,7 +55,7 @@ class MarkersOfHand:
             PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.concatenate([self._shape, np.zeros((count, 3, 3))]),
             np.concatenate([hand.shape_s, lasting]))
         hand.process, hand.filter = self._process, IteratedFilter(self._process)
-        self._bone, self._observations = hand.surface.bone, RecentObservations(arrays, self._markers)
+        self._hand, self._observations = hand, RecentObservations(arrays, self._markers)
         self.reset()
 
     def reset(self) -> None:
@@ -72,6 +66,12 @@ class MarkersOfHand:
         cameras = len(self._observations.newest)
         self._rejections = Rejections(cameras, self._markers)
         self._wrong: list[list[tuple[slice, float]]] = [[] for _ in range(cameras)]  # of each camera's last frame
+        self._epoch_ns = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget the frames whose edges have not come."""
+        self._waiting: list[CameraObservations] = []
 
     def locate(self, frame: CameraObservations) -> tuple[HandPose, int] | None:
         """The pose of a hand that the markers of the last frames show alone, and its time, master ns."""
@@ -80,37 +80,77 @@ class MarkersOfHand:
         pose = None if located is None else self._starter.pose_of(located.positions)
         return None if located is None or pose is None else (pose, located.t_ns)
 
-    def begin(self, hand: BareHandTracker) -> None:
-        """The tracker has started: the markers' lasting errors are those at its pose."""
-        self._note(hand, hand.filter.newest.state)
-        knot = hand.filter.newest
+    def begin(self, epoch_ns: int) -> None:
+        """The hand has been found at `epoch_ns`: the markers' lasting errors are those at its pose."""
+        knot = self._hand.filter.newest
+        self._note(knot.state)
         own = slice(MOTION + SHAPE, None)
         knot.covariance[own, own] = self._process.stationary[own, own]
         self.reset()
+        self._epoch_ns = epoch_ns
 
-    def weigh(self, frame: CameraObservations, hand: BareHandTracker, epoch_ns: int) -> bool:
+    def take(self, frame: CameraObservations, cameras: Sequence[CameraFrames]) -> bool:
+        """Keep one frame's markers until the edges of the same frame come, so that both are weighed at once; weigh
+        those alone whose edges do not come. Whether these showed anything. Raises LinAlgError."""
+        frames = [*self._waiting, frame]
+        self._waiting = [one for one in frames if _awaited(one, cameras[one.camera])]
+        return self._weigh_all([one for one in frames if not _awaited(one, cameras[one.camera])])
+
+    def beside(self, edges_ns: Mapping[int, int]) -> list[CameraObservations]:
+        """The markers of the frames whose edges are weighed next, of which the times are given by camera. Those of
+        earlier frames are weighed alone. Raises LinAlgError."""
+        late = [(one, one.t_row0_master_ns - edges_ns.get(one.camera, NEVER)) for one in self._waiting]
+        self._waiting = [one for one, late_ns in late if late_ns > _SAME_FRAME_NS]
+        self._weigh_all([one for one, late_ns in late if late_ns < -_SAME_FRAME_NS])
+        return [one for one, late_ns in late if abs(late_ns) <= _SAME_FRAME_NS]
+
+    def _weigh_all(self, frames: Sequence[CameraObservations]) -> bool:
+        """Weigh the markers of some frames. Whether they showed anything. Raises LinAlgError."""
+        return bool(sum(self.weigh(one) for one in frames))
+
+    def weigh(self, frame: CameraObservations) -> bool:
         """Weigh the markers of one frame alone; False when it shows none. Raises LinAlgError when they contradict
         all."""
-        t_s = 1e-9 * (MarkerFrame(self._markers, frame).t_ns - epoch_ns)
+        hand, t_s = self._hand, 1e-9 * (MarkerFrame(self._markers, frame).t_ns - self._epoch_ns)
         if t_s < hand.filter.knots[0].t_s:
             return False
         hand.take((), t_s)
         prediction = hand.filter.predict(t_s)
-        found = self.residuals([frame], hand, prediction, epoch_ns + round(1e9 * t_s))
+        found = self._residuals([frame], prediction, self._epoch_ns + round(1e9 * t_s))
         if found:
             self.judge(found, hand.filter.add(t_s, [*found, hand.limits], prediction))
         return bool(found)
 
-    def residuals(self, frames: Sequence[CameraObservations], hand: BareHandTracker, prediction: tuple[Array, Array],
-                  t_ns: int) -> list[BesideContours]:
+    def choose(self, frames: Sequence[CameraObservations], contours: Contours, predicted: Estimate,
+               t_s: float) -> tuple[Estimate, list[BesideContours], Array]:
+        """The prediction, what the markers of these frames say of it, and where the contours are looked for: where it
+        has the hand, or, after markers have contradicted it, where these would show a less certain hand, whichever
+        explains both best."""
+        hand, t_ns = self._hand, self._epoch_ns + round(1e9 * t_s)
+        found, wide = self._residuals(frames, predicted, t_ns), self.widened(*predicted)
+        if not found or wide is None:
+            return predicted, found, predicted[0]
+        again, stationary = self._residuals(frames, wide, t_ns), hand.process.stationary
+        residuals: list[Residual] = [*again, hand.limits]
+        state = update(hand.process, t_s, wide, residuals, None, hand.filter.partial).state
+        state = update(hand.process, t_s, wide, [*residuals, contours], state, hand.filter.partial).state
+        away = hand.process.difference(state, predicted[0])[:POSE]
+        cost = (2.0 * RELOCATION_LOG_ODDS + float(away @ np.linalg.solve(wide[1][:POSE, :POSE], away))
+                + _cost(again, contours, state, stationary))
+        if cost < _cost(found, contours, predicted[0], stationary):
+            return wide, again, state
+        return predicted, found, predicted[0]
+
+    def _residuals(self, frames: Sequence[CameraObservations], prediction: Estimate,
+                   t_ns: int) -> list[BesideContours]:
         """What the markers of some cameras' frames say of a hand that is predicted for master time `t_ns`, as far as
         they may be its markers; none of a frame that shows none."""
-        self._note(hand, prediction[0])
+        self._note(prediction[0])
         reported = [MarkerFrame(self._markers, frame) for frame in frames]
         for one in reported:
             if not one.seen.any():
                 self._wrong[one.camera] = []  # a marker that is not seen contradicts nothing
-        return [BesideContours(one, self._markers, hand.surface.bone, prediction, t_ns) for one in reported
+        return [BesideContours(one, self._markers, self._hand.surface.bone, prediction, t_ns) for one in reported
                 if one.seen.any()]
 
     def judge(self, found: list[BesideContours], knot: Knot) -> None:
@@ -141,98 +181,57 @@ class MarkersOfHand:
             self._process.inflate(covariance, slice(first, last), factor)
         return without_errors(state), covariance
 
-    def _note(self, hand: BareHandTracker, state: Array) -> None:
-        m = sized(self._markers, hand.surface.bone, state)
+    def _note(self, state: Array) -> None:
+        """Have the process know the lasting errors of the markers of a hand in `state`."""
+        m = sized(self._markers, self._hand.surface.bone, state)
         bias = np.empty((len(m.finger), 3, 3))
         triangulation_covariance(without_size(state), m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX,
                                  np.where(m.landmark, LASTING_M, 0.0), m.paint_variance, bias)
         self._process.set_bias(np.concatenate([self._shape, bias]))
 
 
-class BesideContours:
-    """Implements `Residual`: a `MarkerFrame` on a state that has the hand's shape before the markers' errors. The
-    lengths of the shape move the markers; `bone` (R,): the phalanx of each row of the table, as in `Surface`."""
-
-    def __init__(self, frame: MarkerFrame, markers: MarkerModel, bone: Indices, prediction: tuple[Array, Array],
-                 t_ns: int) -> None:
-        """Associates the frame with the hand as it is predicted for `t_ns`, master ns."""
-        self._markers, self._bone, self.frame = markers, bone, frame
-        frame.markers = sized(markers, bone, prediction[0])
-        frame.add_landmark_noise(without_size(prediction[0]))
-        frame.late_s, frame.t_ns = np.where(frame.seen, frame.late_s + 1e-9 * (frame.t_ns - t_ns), 0.0), t_ns
-        pixels, covariances = self._expected(*prediction)
-        self._reported = frame
-        self.frame = associate(frame, pixels, covariances, distances_of(frame, pixels, covariances))
-
-    def _expected(self, state: Array, covariance: Array) -> tuple[Array, Array]:
-        """See `MarkerFrame.predict_pixels`."""
-        self.frame.markers = sized(self._markers, self._bone, state)
-        lengths = lengths_jacobian(self.frame.markers.dh, self._bone, state)
-        return self.frame.predict_pixels(without_size(state), without_size_covariance(covariance, lengths))
-
-    def distances(self, state: Array, covariance: Array) -> Array:
-        """(M,) squared Mahalanobis distances of the markers that were reported from a hand in `state`, whose lasting
-        errors are not known."""
-        return distances_of(self._reported, *self._expected(without_errors(state), covariance))
-
-    def cost(self, state: Array, stationary: Array) -> float:
-        """-2 log of how probable a hand in `state` makes the markers that were reported; one that is none of its costs
-        GATE, as in `association.assign`. `stationary`: the process's covariance, of which that of the lasting errors
-        counts."""
-        distances = self.distances(state, with_errors_of(stationary, np.zeros_like(stationary)))
-        return float(np.minimum(distances[self._reported.seen], GATE).sum())
-
-    def linearise(self, state: Array) -> Rows:
-        """See `Residual`."""
-        self.frame.markers = sized(self._markers, self._bone, state)
-        rows = self.frame.linearise(without_size(state))
-        by_place = rows.jacobian[:, MOTION:]  # a lasting error moves its marker
-        jacobian = np.insert(rows.jacobian, [MOTION] * SHAPE, 0.0, axis=1)
-        jacobian[:, MOTION + LENGTHS] = by_place @ lengths_jacobian(self.frame.markers.dh, self._bone, state)
-        return replace(rows, jacobian=jacobian)
+def weigh(hand: BareHandTracker, markers: MarkersOfHand | None, waiting: Mapping[int, tuple[EdgeFrame, ContourFrame]],
+          epoch_ns: int) -> None:
+    """Estimate by the edges of some cameras, by number, with the markers of the same frames: PASSES times with the same
+    edges, and each time the contour is expected twice as near. Raises LinAlgError when they contradict the estimate."""
+    times_ns = [one.t_row0_master_ns + _middle_ns(one) for one, _ in waiting.values()]
+    t_s = max(1e-9 * (max(times_ns) - epoch_ns), hand.filter.knots[0].t_s)
+    contours = [contour for _, contour in waiting.values()]
+    for contour, t_ns in zip(contours, times_ns, strict=True):
+        contour.late_s = contour.late_s + (1e-9 * (t_ns - epoch_ns) - t_s)
+    edges_ns = {number: one.t_row0_master_ns for number, (one, _) in waiting.items()}
+    marked = [] if markers is None else markers.beside(edges_ns)
+    hand.take(waiting, t_s)
+    prediction, spreads = hand.filter.predict(t_s), [contour.expected_sd for contour in contours]
+    found: list[BesideContours] = []
+    initial = prediction[0]
+    if markers is not None:
+        prediction, found, initial = markers.choose(marked, Contours(contours), prediction, t_s)
+    residuals: list[Residual] = [*found, Contours(contours), hand.limits]
+    for number in range(PASSES):
+        for contour, spread in zip(contours, spreads, strict=True):
+            contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)
+        if number < PASSES - 1:
+            initial = update(hand.process, t_s, prediction, residuals, initial, hand.filter.partial).state
+    knot = hand.filter.add(t_s, residuals, prediction, initial)
+    if markers is not None:
+        markers.judge(found, knot)
 
 
-def sized(markers: MarkerModel, bone: Indices, state: Array) -> MarkerModel:
-    """The markers on a hand of the lengths that `state` has."""
-    dh, shape = markers.dh, np.ascontiguousarray(state[BIAS:BIAS + SHAPE])
-    a, d = np.empty(len(dh.a)), np.empty(len(dh.d))
-    sized_table(dh, bone, shape, a, d)
-    return replace(markers, dh=dh._replace(a=a, d=d, point_offset=np.exp(shape[WHOLE]) * dh.point_offset))
+def _middle_ns(frame: EdgeFrame) -> int:
+    """From the exposure of row 0 to that of the mean row of the slices, ns."""
+    slices = frame.request.slices
+    return round(float(slices[:, 1].mean()) * frame.row_time_ns) if len(slices) else 0
 
 
-def lengths_jacobian(dh: DhArrays, bone: Indices, state: Array) -> Array:
-    """(3 P, 17): how the points of a sized table follow the LENGTHS of a shape."""
-    world, frames, points = np.eye(4), empty_frames(dh), np.empty((len(dh.point_row), 3))
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    forward_arrays(dh, world, state[ANGLES:VELOCITY], frames, points)
-    out = np.zeros((len(points), 3, len(LENGTHS)))
-    add_lengths(dh, bone, world, frames, points, out)
-    return out.reshape(-1, len(LENGTHS))
+def _awaited(frame: CameraObservations, camera: CameraFrames) -> bool:
+    """Whether the edges of a frame may still come."""
+    assert camera.newest is not None
+    return (camera.newest.t_row0_master_ns - frame.t_row0_master_ns < 1.5 * camera.period_ns
+            and camera.answers(frame.t_row0_master_ns))
 
 
-def without_size_covariance(covariance: Array, lengths: Array) -> Array:
-    """The covariance of a state as `marker_residual` knows it: what the `lengths` (3 M, 17) move its markers by counts
-    as their lasting errors."""
-    size = len(covariance)
-    to = np.zeros((size - SHAPE, size))
-    to[:MOTION, :MOTION], to[MOTION:, MOTION + SHAPE:] = np.eye(MOTION), np.eye(size - SHAPE - MOTION)
-    to[MOTION:, MOTION + LENGTHS] = lengths
-    return np.asarray(to @ covariance @ to.T)
-
-
-def without_errors(state: Array) -> Array:
-    """The state with lasting errors of 0."""
-    return np.concatenate([state[:BIAS + SHAPE], np.zeros(len(state) - BIAS - SHAPE)])
-
-
-def with_errors_of(stationary: Array, covariance: Array) -> Array:
-    """The covariance with lasting errors as the `stationary` process has them."""
-    out, own = covariance.copy(), slice(MOTION + SHAPE, None)
-    out[own], out[:, own] = 0.0, 0.0
-    out[own, own] = stationary[own, own]
-    return out
-
-
-def without_size(state: Array) -> Array:
-    """The state as `marker_residual` knows it."""
-    return np.concatenate([state[:BIAS], state[BIAS + SHAPE:]])
+def _cost(markers: list[BesideContours], contours: Contours, state: Array, stationary: Array) -> float:
+    """-2 log of how probable a hand in `state` makes its markers and contours, but for a constant."""
+    cost = float(np.sum(contours.linearise(state).error ** 2))
+    return cost + sum(one.cost(state, stationary) for one in markers)

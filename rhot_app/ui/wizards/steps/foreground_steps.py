@@ -110,7 +110,10 @@ class EmptyStep(LearningStep):
                 if not self._stopped:
                     ask_node(command, node_id, "learn_background", seconds=SECONDS, save=False)
         self._until_s = time.monotonic() + SECONDS
-        while not self._stopped and (waiting := [name for name, node_id in self.nodes.items() if not self._has_learnt(command, node_id)]):
+        while not self._stopped:
+            waiting = [name for name, node_id in self.nodes.items() if not self._has_learnt(command, node_id)]
+            if not waiting:
+                break
             if time.monotonic() > self._until_s + _WAIT_S:
                 raise EngineError(f"{' and '.join(waiting)}: the background was not learnt in time. Look at the Nodes "
                                   "panel, then learn it again.")
