@@ -15,7 +15,8 @@ from rhot_app.handfit.session import HandFit
 from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.backend.feed import LiveFeed, StateFeed
 from rhot_app.ui.handfit.frame import Kept
-from rhot_app.ui.handfit.window import REASON, HandFitWindow, LiveCameras
+from rhot_app.ui.handfit.instants import LiveCameras
+from rhot_app.ui.handfit.window import REASON, HandFitWindow
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.proposal import RigChange
 from rhot_app.ui.wizards.framework.plan import Memory
