@@ -33,9 +33,9 @@ from pictures import picture, two_cameras, wall  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
 
 from rhot_app.barehand.contour_residual import Contours  # noqa: E402
-from rhot_app.barehand.surface import FINGERS, LENGTH, RADIUS, SHAPE, WHOLE, surface_of  # noqa: E402
+from rhot_app.barehand.surface import FINGER_SIZE, LENGTH, RADIUS, SHAPE, WHOLE, surface_of  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
-from rhot_app.estimation.filter import _solve  # noqa: E402
+from rhot_app.estimation.filter import gauss_newton_step  # noqa: E402
 from rhot_app.estimation.residual import stack  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.geometry.transforms import exp_so3, inverse  # noqa: E402
@@ -87,7 +87,7 @@ def iteration_ms(tracker: BareHandTracker, images: list[np.ndarray]) -> dict[str
              "edges": lambda: [frame.observe(find_edges(images[c], frame.slices, tracker.foreground[c],
                                                         tracker.noise[c])) for c, frame in frames.items()],
              "Jacobian": rows,
-             "solution": lambda: _solve(knot.covariance, jacobian, error, variances, here)}
+             "solution": lambda: gauss_newton_step(knot.covariance, jacobian, error, variances, here)}
     found = {}
     for name, part in parts.items():
         times = []
@@ -143,7 +143,7 @@ def run(case: str, motion: str, seed: int, frames: int) -> dict[str, float]:
     shape = tracker.filter.newest.state[BIAS:BIAS + SHAPE]
     true, file = (np.log([bone for finger in one.fingers.values() for bone in finger.bones_mm])
                   for one in (hand, believed))
-    left = true - file - shape[WHOLE] - shape[FINGERS] - shape[LENGTH:RADIUS]
+    left = true - file - shape[WHOLE] - shape[FINGER_SIZE] - shape[LENGTH:RADIUS]
     return {**iteration_ms(tracker, images),
             "lengths %": 100.0 * float(np.sqrt(np.mean(left**2))), "joint mm": float(np.mean(joints)),
             "p95 mm": float(np.percentile(joints, 95)),

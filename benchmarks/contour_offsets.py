@@ -3,9 +3,10 @@
     python benchmarks/contour_offsets.py [--data ../shared/data/bare_hand_stereo] [--unit-mm 38.5] [--json FILE]
 
 The pose and the bones are fitted to the recording's landmarks, so they know nothing of edges. From every point of the
-expected outline, the nearest edge between hand and background within 12 mm is taken. Positive: the hand is larger than
-the surface. The last columns are of the same surface without the little finger's ball, `surface.HYPOTHENAR`, whose
-measure they are. The recording's unit of length is unknown; `--unit-mm` makes its hand as large as the hand file's.
+expected outline, the nearest edge between hand and background within 12 mm or 28 px, whichever is less, is taken.
+Positive: the hand is larger than the surface. The last columns are of the same surface without the little finger's
+ball, `surface.HYPOTHENAR`, whose measure they are. The recording's unit of length is unknown; `--unit-mm` makes its
+hand as large as the hand file's.
 """
 
 from __future__ import annotations
@@ -135,7 +136,9 @@ def main() -> int:
              figures["without"][region]["sd_mm"]] for region, one in figures["with"].items()]
     publish(args, figures, table(["region", "points of the outline", "with an edge", "edge outside by, mm", "sd",
                                   "without the ball: points", "edge outside by, mm", "sd"], rows),
-            f"{len(list(poses)[::EVERY])} moments of two cameras.")
+            f"{len(list(poses)[::EVERY])} moments of two cameras. Of each point, edges are looked for within "
+            f"{1e3 * REACH_M:.0f} mm or {REACH_PX:.0f} px, whichever is less: an offset beyond is none, and counts as "
+            "without an edge.")
     return 0
 
 

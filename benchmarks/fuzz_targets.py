@@ -15,7 +15,7 @@ from rhot_app.sources.validation import OLDEST_FRAME_NS
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings
-from rhot_node.detect.edges import MOST, find_edges
+from rhot_node.detect.edges import EDGES_MAX, find_edges
 from rhot_node.detect.foreground import no_foreground
 from rhot_node.errors import WireError
 from rhot_node.foreground_store import ForegroundStore
@@ -187,8 +187,8 @@ def check_search(frame: EdgeFrame | ForegroundFrame) -> None:
         sound &= (shown.shape == (480 // frame.step, 640 // frame.step) and bool(np.isfinite(shown).all())
                   and bool(((shown >= 0.0) & (shown <= 1.0)).all()))
     else:
-        edges, valid = frame.edges, np.arange(MOST) < frame.edges.number[:, None]
-        sound &= (len(edges.number) == len(SLICES) and bool((edges.number <= MOST).all())
+        edges, valid = frame.edges, np.arange(EDGES_MAX) < frame.edges.number[:, None]
+        sound &= (len(edges.number) == len(SLICES) and bool((edges.number <= EDGES_MAX).all())
                   and all(bool(np.isfinite(one).all()) for one in edges[1:]) and bool((edges.sd[valid] > 0.0).all())
                   and all(bool(((one >= 0.0) & (one <= 1.0)).all()) for one in (edges.inside, edges.outside)))
     if not sound:

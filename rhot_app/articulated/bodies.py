@@ -31,7 +31,7 @@ FLESH = 2.0
 """Radii: where several bodies carry a link, what lies so near to its joint, beyond the plane, is the link's. Chosen: a
 knuckle's own radius, and as much of the flesh about it."""
 
-POSE = 6
+ROOT_POSE = 6
 """Columns of a tangent space before the angles: the root's translation, m, and rotation, rad, along world axes."""
 
 ANGLES = 12

@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.articulated.bodies import ANGLES, POSE, Bodies, Placed, place, root_of
+from rhot_app.articulated.bodies import ANGLES, ROOT_POSE, Bodies, Placed, place, root_of
 from rhot_app.articulated.outline import Outline
 from rhot_app.articulated.templates import Filtered, Kind, Template, noise_gain
 from rhot_app.articulated.visibility import NONE, front_layer
@@ -85,7 +85,7 @@ class LayeredFrame:
         """6 + A rows with the information of all points, and one with the rest of their cost."""
         count = len(self.bodies.dh.angle)
         angles = int(self.bodies.dh.angle.max()) + 1 if count else 0
-        pose_size = POSE + angles
+        pose_size = ROOT_POSE + angles
         placed = place(self.bodies, root_of(state), state[ANGLES:ANGLES + angles])
         information, pull = np.zeros((pose_size, pose_size)), np.zeros(pose_size)
         layers = len(self.bodies.layer_row)
@@ -109,7 +109,7 @@ class LayeredFrame:
         if self.outline is not None and shown:
             cost += self._boundary(placed, np.vstack(shown), offset, noise, information, pull)
         error, own = compressed(information, pull, cost, RIDGE)
-        jacobian = np.zeros((len(error), len(state) - ANGLES + POSE))
+        jacobian = np.zeros((len(error), len(state) - ANGLES + ROOT_POSE))
         jacobian[:, :pose_size] = own
         return Rows(error, jacobian, UNIT)
 
@@ -156,7 +156,7 @@ def point_row(bodies, placed, layer, px, py, pz, g, row):
             sign = bodies.dh.sign[at]
             ax, ay, az = sign * base[0, 2], sign * base[1, 2], sign * base[2, 2]
             rx, ry, rz = px - base[0, 3], py - base[1, 3], pz - base[2, 3]
-            row[POSE + bodies.dh.angle[at]] += (g[0] * (ay * rz - az * ry) + g[1] * (az * rx - ax * rz)
+            row[ROOT_POSE + bodies.dh.angle[at]] += (g[0] * (ay * rz - az * ry) + g[1] * (az * rx - ax * rz)
                                                 + g[2] * (ax * ry - ay * rx))
         at = parent
 

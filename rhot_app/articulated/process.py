@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.articulated.bodies import ANGLES, POSE, root_of
+from rhot_app.articulated.bodies import ANGLES, ROOT_POSE, root_of
 from rhot_app.hand.articulated_model import STATE_ROOT, ArticulatedModel, root_arrays
 from rhot_app.hand.kinematics import move, rotation_vector
 
@@ -41,7 +41,7 @@ class ConstantVelocity:
 
     def _each(self, values: tuple[float, float, float]) -> Array:
         """(6 + A,): values of translation, rotation and angles, 0 where nothing moves."""
-        return np.repeat(values, [3, 3, self.pose - POSE]) * self.free
+        return np.repeat(values, [3, 3, self.pose - ROOT_POSE]) * self.free
 
     def start(self, root: Array, angles: Array, sd: tuple[float, float, float] = START_SD) -> tuple[Array, Array]:
         """State and covariance at `root` (4, 4) and `angles` (A,), known to `sd`: m, rad and rad."""
@@ -50,7 +50,7 @@ class ConstantVelocity:
 
     def retract(self, state: Array, step: Array) -> Array:
         """See `Process`."""
-        count = self.pose - POSE
+        count = self.pose - ROOT_POSE
         out, root, angles = np.empty_like(state), np.empty((4, 4)), np.empty(count)
         root[3] = [0.0, 0.0, 0.0, 1.0]
         move(root_of(state), np.ascontiguousarray(state[ANGLES:ANGLES + count]), np.ascontiguousarray(step[:self.pose]),
@@ -70,7 +70,7 @@ class ConstantVelocity:
         if dt_s <= 0.0:
             return state.copy(), covariance.copy()
         step = np.zeros(self.size)
-        step[:self.pose] = dt_s * state[ANGLES + self.pose - POSE:]
+        step[:self.pose] = dt_s * state[ANGLES + self.pose - ROOT_POSE:]
         along = self.transition(state, dt_s)
         out = along @ covariance @ along.T
         pose, velocity = np.arange(self.pose), np.arange(self.pose, self.size)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.articulated.bodies import ANGLES, CAPSULE, POSE, Bodies, Placed, camera_rays, place, root_of
+from rhot_app.articulated.bodies import ANGLES, CAPSULE, ROOT_POSE, Bodies, Placed, camera_rays, place, root_of
 from rhot_app.articulated.layered import LayeredFrame, layer_covariance
 from rhot_app.articulated.outline import outline_of
 from rhot_app.articulated.templates import LEAST_POINTS, Filtered, Image, Kind, TemplateSet, filtered
@@ -64,7 +64,7 @@ class LayeredTracker:
             view.background = self.templates.images(background)
         self.filter = IteratedFilter(process)
         self._limits = JointLimits(limits)
-        self._pose, self._epoch_ns = POSE + len(limits), 0
+        self._pose, self._epoch_ns = ROOT_POSE + len(limits), 0
 
     def start(self, state: Array, covariance: Array, images: Mapping[int, Image], t_ns: int) -> None:
         """Begin in a state that is known with this covariance, and take the first templates of what `images` (H, W, 3)
@@ -114,7 +114,7 @@ class LayeredTracker:
         return view.frame
 
     def _placed(self, state: Array) -> Placed:
-        return place(self.bodies, root_of(state), state[ANGLES:ANGLES + self._pose - POSE])
+        return place(self.bodies, root_of(state), state[ANGLES:ANGLES + self._pose - ROOT_POSE])
 
     def _direction(self, view: View, placed: Placed, layer: int) -> Array:
         """(3,) unit, from the layer's frame to the camera, in that frame."""

@@ -92,7 +92,7 @@ class ContourFrame:
         return np.ascontiguousarray(state[first:first + SHAPE])
 
     def weights(self, state: Array) -> tuple[Array, Array]:
-        """(K, MOST) probabilities that each edge is the hand's, and (K,) px from the contour to their mean."""
+        """(K, EDGES_MAX) probabilities that each edge is the hand's, and (K,) px from the contour to their mean."""
         assert self.edges is not None
         offset, _, good = self.predict(state)
         found = np.zeros(self.edges.offset.shape)

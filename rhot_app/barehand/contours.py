@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.surface import (
-    FINGERS,
+    FINGER_SIZE,
     FOREARM,
     FOREARM_RADIUS,
     FOREARM_TURN,
@@ -360,11 +360,11 @@ def _point_row(surface, world, frames, k, axis, px, py, pz, g, size, row):
     while at >= 0:
         parent, bone = dh.parent[at], surface.bone[at]
         if bone >= 0:  # from its beginning to its end, or to the axis point
-            f, length = frames[at], dh.a[at] * math.exp(size[WHOLE] + size[FINGERS] + size[LENGTH + bone])
+            f, length = frames[at], dh.a[at] * math.exp(size[WHOLE] + size[FINGER_SIZE] + size[LENGTH + bone])
             for i in range(3):
                 way = axis[i] - (f[i, 3] - length * f[i, 0]) if first else length * f[i, 0]
                 row[POSE + LENGTH + bone] += g[i] * way
-                row[POSE + FINGERS] += g[i] * way
+                row[POSE + FINGER_SIZE] += g[i] * way
         first = False
         if dh.angle[at] >= 0:
             base = world if parent < 0 else frames[parent]

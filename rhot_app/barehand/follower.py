@@ -19,7 +19,7 @@ from rhot_node.detect.foreground import Foreground, foreground_at, gain_of, lear
 Image = NDArray[np.uint8]
 Points = NDArray[np.float64]
 
-MOST: Final = 0.5
+MAJORITY: Final = 0.5
 """Part above which more speaks for a hand than against it: of the contour that is found, of joints on foreground."""
 
 CONFUSED_M: Final = 0.02
@@ -99,24 +99,25 @@ class HandFollower:
         """Whether the cameras find the contour that the hand should have."""
         seen = np.sum([self.tracker.fit.seen[c].sum(axis=0) for c, image in enumerate(images) if image is not None],
                       axis=0)
-        return bool(seen[0] > MOST * seen[1])
+        return bool(seen[0] > MAJORITY * seen[1])
 
     def _on_foreground(self, images: Sequence[Image | None], state: HandState, whole: bool) -> bool:
         """Whether most joints lie on foreground in every camera that shows most of them, of which there must be one;
-        `whole`: every camera must show most of them. A camera without known foreground tells nothing of it."""
+        `whole`: every camera must show most of them. A camera that has learnt neither background nor skin says
+        nothing of it."""
         shown = []
-        for camera, image, known in zip(self.tracker.cameras, images, self.tracker.foreground, strict=True):
+        for camera, image, model in zip(self.tracker.cameras, images, self.tracker.foreground, strict=True):
             if image is None:
                 continue
             places = camera.project(state.joint_positions)
             with np.errstate(invalid="ignore"):
                 inside = np.all((places > -0.5) & (places < [camera.width - 0.5, camera.height - 0.5]), axis=1)
-            shown.append(bool(np.mean(inside) > MOST))
-            if shown[-1] and known.informative:
-                gain = gain_of(image, known)
-                ours = [foreground_at(image, row, column, known.hand, known.rest, known.mean, known.sd, gain)
+            shown.append(bool(np.mean(inside) > MAJORITY))
+            if shown[-1] and model.informative:
+                gain = gain_of(image, model)
+                ours = [foreground_at(image, row, column, model.hand, model.rest, model.mean, model.sd, gain)
                         for column, row in np.round(places[inside]).astype(int)]
-                if np.mean(np.array(ours) > 0.5) <= MOST:
+                if np.mean(np.array(ours) > 0.5) <= MAJORITY:
                     return False
         return all(shown) if whole else any(shown)
 

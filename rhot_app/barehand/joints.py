@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from rhot_app.barehand.surface import FINGERS, LENGTH, RADIUS, SHAPE, WHOLE, sized_table
+from rhot_app.barehand.surface import FINGER_SIZE, LENGTH, RADIUS, SHAPE, WHOLE, sized_table
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
@@ -22,7 +22,7 @@ def knowledge_of(sd: float, observed: bool, measured: float, inferred: float) ->
 
 @njit(cache=True)
 def add_lengths(table, bone, world, frames, points, out):
-    """Add to `out` (P, 3, 17) how the points of a sized table follow WHOLE, FINGERS and the 15 of LENGTH."""
+    """Add to `out` (P, 3, 17) how the points of a sized table follow WHOLE, FINGER_SIZE and the 15 of LENGTH."""
     for p in range(points.shape[0]):
         for i in range(3):
             out[p, i, 0] += points[p, i] - world[i, 3]
@@ -52,7 +52,7 @@ def place_joints(state, covariance, dh, bone, points, covariances, motion):
     jacobian_arrays(table, world, frames, points, jacobian)
     add_lengths(table, bone, world, frames, points, jacobian[:, :, POSE:])
     own = np.empty(POSE + 2 + lengths, np.int64)
-    own[POSE], own[POSE + 1] = MOTION + WHOLE, MOTION + FINGERS
+    own[POSE], own[POSE + 1] = MOTION + WHOLE, MOTION + FINGER_SIZE
     own[POSE + 2:] = MOTION + LENGTH + np.arange(lengths)
     for order in range(3):
         own[:POSE] = order * POSE + np.arange(POSE)

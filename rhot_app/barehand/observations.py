@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_node.detect.edges import MOST, Edges
+from rhot_node.detect.edges import EDGES_MAX, Edges
 
 Array = NDArray[np.float64]
 
@@ -57,12 +57,12 @@ ImageFrame = EdgeFrame | ForegroundFrame
 
 def edges_of(count: int, indices: NDArray[np.int64], values: Array) -> Edges:
     """The edges of `count` slices from those that were found on any: `indices` (K,) of their slices, `values` (K, 5)
-    offset px, sd px, strength, inside and outside. Of more than MOST on a slice, the first are kept."""
+    offset px, sd px, strength, inside and outside. Of more than EDGES_MAX on a slice, the first are kept."""
     order = np.argsort(indices, kind="stable")
     indices, values = indices[order], values[order]
     rank = np.arange(len(indices)) - np.searchsorted(indices, indices)
-    kept = rank < MOST
-    columns = [np.zeros((count, MOST)) for _ in range(5)]
+    kept = rank < EDGES_MAX
+    columns = [np.zeros((count, EDGES_MAX)) for _ in range(5)]
     for number, column in enumerate(columns):
         column[indices[kept], rank[kept]] = values[kept, number]
-    return Edges(np.minimum(np.bincount(indices, minlength=count), MOST), *columns)
+    return Edges(np.minimum(np.bincount(indices, minlength=count), EDGES_MAX), *columns)

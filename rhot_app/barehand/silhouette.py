@@ -21,8 +21,8 @@ from rhot_app.hand.kinematics import move
 
 Array = NDArray[np.float64]
 
-UNSURE = 0.05
-"""Probability that a foreground probability of 0 or 1 is wrong: shadows, sleeves, other skin."""
+MISLABELLED = 0.05
+"""Probability that a pixel of foreground probability 0 or 1 is of the other kind: shadows, sleeves, other skin."""
 
 CORRELATED = 8.0
 """Pixels that count as one observation: where the model's contour or the foreground is wrong, it is so along a finger's
@@ -48,6 +48,10 @@ START_STEP = 0.5
 """Step size of the first round, in standard deviations of what is expected. Chosen: with 1, fewer starts are good."""
 
 
+_U0, _V0, _U1, _V1, _R0, _R1, _DU, _DV, _PER_SQUARE = range(9)
+"""Of what a capsule covers of an image: places and radii at its ends, the way between them, and 1 / its square; px."""
+
+
 class Silhouettes(NamedTuple):
     """Log odds (C, h, w) of every `step`-th pixel of C images; `poses` (C, 3, 4), `intrinsics` (C, 9) of the cameras.
     Images of other sizes are padded with 0."""
@@ -64,26 +68,26 @@ def silhouettes(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequence[
     height, width = max(one.shape[0] for one in maps), max(one.shape[1] for one in maps)
     odds = np.zeros((len(maps), height, width))
     for camera, one in enumerate(maps):
-        sure = UNSURE + (1.0 - 2.0 * UNSURE) * np.asarray(one, dtype=np.float64)
+        sure = MISLABELLED + (1.0 - 2.0 * MISLABELLED) * np.asarray(one, dtype=np.float64)
         odds[camera, :one.shape[0], :one.shape[1]] = np.log(sure / (1.0 - sure))
     return Silhouettes(odds, step, np.array(poses), np.array(intrinsics))
 
 
 @njit(cache=True)
 def _outline(c0, c1, r0, r1, pose, intrinsics, step, a, b, slope, circles):
-    """Fill `circles` (9,) with what a capsule covers of an image, px of the map: places and radii at its ends, the
-    way between them, and 1 / its square. False where it is not in front of the camera."""
+    """Fill `circles` (9,) with what a capsule covers of an image, px of the map: its numbers are at _U0 and so on.
+    False where it is not in front of the camera."""
     if not (project(c0[0], c0[1], c0[2], pose, intrinsics, a, slope)):
         return False
     if not (project(c1[0], c1[1], c1[2], pose, intrinsics, b, slope)):
         return False
     z0 = pose[2, 3] + pose[2, 0] * c0[0] + pose[2, 1] * c0[1] + pose[2, 2] * c0[2]
     z1 = pose[2, 3] + pose[2, 0] * c1[0] + pose[2, 1] * c1[1] + pose[2, 2] * c1[2]
-    circles[0], circles[1] = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5
-    circles[2], circles[3] = (b[0] + 0.5) / step - 0.5, (b[1] + 0.5) / step - 0.5
-    circles[4], circles[5] = intrinsics[0] * r0 / z0 / step, intrinsics[0] * r1 / z1 / step
-    circles[6], circles[7] = circles[2] - circles[0], circles[3] - circles[1]
-    circles[8] = 1.0 / max(circles[6] * circles[6] + circles[7] * circles[7], 1e-9)
+    circles[_U0], circles[_V0] = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5
+    circles[_U1], circles[_V1] = (b[0] + 0.5) / step - 0.5, (b[1] + 0.5) / step - 0.5
+    circles[_R0], circles[_R1] = intrinsics[0] * r0 / z0 / step, intrinsics[0] * r1 / z1 / step
+    circles[_DU], circles[_DV] = circles[_U1] - circles[_U0], circles[_V1] - circles[_V0]
+    circles[_PER_SQUARE] = 1.0 / max(circles[_DU] * circles[_DU] + circles[_DV] * circles[_DV], 1e-9)
     return True
 
 
@@ -91,8 +95,8 @@ def _outline(c0, c1, r0, r1, pose, intrinsics, step, a, b, slope, circles):
 def _paint(circles, ring, ring_slope, mask, box):
     """Mark a capsule's pixels in `mask` (h, w) with 1, those in the ring about it, px wide at the first end and at the
     last, with 2 where no capsule is. `box`: first and last row and column marked so far."""
-    u0, v0, u1, v1, s0, s1 = circles[0], circles[1], circles[2], circles[3], circles[4], circles[5]
-    du, dv, inverse = circles[6], circles[7], circles[8]
+    u0, v0, u1, v1, s0, s1 = circles[_U0], circles[_V0], circles[_U1], circles[_V1], circles[_R0], circles[_R1]
+    du, dv, inverse = circles[_DU], circles[_DV], circles[_PER_SQUARE]
     wide0, wide1 = s0 + ring, s1 + ring + ring_slope
     left = max(int(min(u0 - wide0, u1 - wide1)), 0)
     right = min(int(max(u0 + wide0, u1 + wide1)) + 1, mask.shape[1] - 1)
@@ -116,9 +120,9 @@ def _paint(circles, ring, ring_slope, mask, box):
 @njit(cache=True)
 def _covers(circles, column, row):
     """Whether a pixel lies on a capsule (`_outline`)."""
-    x, y = column - circles[0], row - circles[1]
-    t = min(max((x * circles[6] + y * circles[7]) * circles[8], 0.0), 1.0)
-    x, y, r = x - t * circles[6], y - t * circles[7], circles[4] + t * (circles[5] - circles[4])
+    x, y = column - circles[_U0], row - circles[_V0]
+    t = min(max((x * circles[_DU] + y * circles[_DV]) * circles[_PER_SQUARE], 0.0), 1.0)
+    x, y, r = x - t * circles[_DU], y - t * circles[_DV], circles[_R0] + t * (circles[_R1] - circles[_R0])
     return x * x + y * y <= r * r
 
 
@@ -129,7 +133,7 @@ def _arm(world, wrist, thick, bend, odds, step, pose, intrinsics, mask, a, b, sl
     x, y, z = -np.cos(bend[0]) * np.cos(bend[1]), -np.sin(bend[1]), np.sin(bend[0])
     for i in range(3):
         along[i] = world[i, 0] * x + world[i, 1] * y + world[i, 2] * z
-    total, known, count = 0.0, False, 16
+    total, begun, count = 0.0, False, 16
     for k in range(count + 1):
         s = FOREARM_M * k / count
         depth = pose[2, 3]
@@ -139,7 +143,7 @@ def _arm(world, wrist, thick, bend, odds, step, pose, intrinsics, mask, a, b, sl
         if not project(p[0], p[1], p[2], pose, intrinsics, a, slope):
             break
         u, v = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5
-        if known:
+        if begun:
             du, dv = u - b[0], v - b[1]
             length = np.sqrt(du * du + dv * dv)
             wide = intrinsics[0] * (thick + s * FOREARM_SPREAD) / depth / step
@@ -148,7 +152,7 @@ def _arm(world, wrist, thick, bend, odds, step, pose, intrinsics, mask, a, b, sl
                 row, column = int(np.floor(v + across * du + 0.5)), int(np.floor(u - across * dv + 0.5))
                 if 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1] and mask[row, column] != 1:
                     total += 0.4 * wide * length * odds[row, column]
-        b[0], b[1], known = u, v, True
+        b[0], b[1], begun = u, v, True
     return total
 
 
@@ -173,7 +177,7 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
         for k in range(count):
             if surface.group[k] != FOREARM and _outline(centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1], pose,
                                                         lens, step, a, b, slope, circles):
-                first, last = circles[4] * RING_M / radii[k, 0], circles[5] * RING_M / radii[k, 1]
+                first, last = circles[_R0] * RING_M / radii[k, 0], circles[_R1] * RING_M / radii[k, 1]
                 _paint(circles, first, last - first, mask, box)
         # the arm ends at the camera's housing at the latest
         end, depth0, depth1 = 1.0, 0.0, 0.0

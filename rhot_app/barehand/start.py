@@ -1,4 +1,4 @@
-"""Finds a hand of which nothing is known, in the foreground of one image of each camera.
+"""Finds a hand anywhere and in any pose, in the foreground of one image of each camera.
 
 Places where the foreground is as thick as a palm are candidates. At each, many rotations of a relaxed hand are scored
 by how well they cover the foreground (`silhouette`), and the best of them with other shapes of the hand. A short search
@@ -43,13 +43,14 @@ REFINED, LAST_ROUNDS = 4, 120
 """Poses, the best of those found, about which is searched again, and its rounds. Chosen: more of either cost more time
 than they found better starts (drawn hands: 16 mm off in the median, with 5 and 200 15 mm)."""
 
-PALMS = 6
-"""Candidates of each camera."""
+PALMS, PEAKS = 6, 24
+"""Places of a palm that are tried, the best of all cameras together, and thick places of each camera's foreground of
+which they are made. Chosen: a scene has fewer."""
 
 _CURLS_DEG = ((5.0, 10.0, 5.0), (20.0, 30.0, 20.0), (65.0, 80.0, 45.0))  # MCP, PIP, DIP: open, relaxed, closed
 _ASIDE = 0.5  # rad to either side of a relaxed thumb: a third of its range
 _SPREAD = 0.03, 0.35, 0.35  # m, rad, rad between the poses tried
-_PALM_RADIUS = 0.6, 1.7  # of half the palm's breadth: thinner or thicker foreground is none
+_PALM_RADIUS = 0.36, 1.7  # of half the palm's breadth; seen from the side, it is half as thick as broad
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +66,8 @@ def find_hand(images: Sequence[NDArray[np.uint8] | None], cameras: Sequence[Came
               rng: np.random.Generator, most: int = 3) -> list[Found]:
     """The most probable hands in images (H, W, 3) RGB of some cameras, best first, at most `most`; none without
     foreground as thick as a palm."""
-    maps = [None if image is None else foreground_map(image, known, STEP)
-            for image, known in zip(images, foreground, strict=True)]
+    maps = [None if image is None else foreground_map(image, learnt, STEP)
+            for image, learnt in zip(images, foreground, strict=True)]
     return find_in_maps(maps, cameras, model, surface, size, rng, most)
 
 
@@ -203,11 +204,11 @@ def _unlike(camera: CameraModel, place: Array, radius: float, breadth: float) ->
     if not depth > 0.05:
         return np.inf
     ratio = radius * depth / (camera.intrinsics[0] * breadth)
-    return abs(float(np.log(ratio))) if _PALM_RADIUS[0] * 0.6 < ratio < _PALM_RADIUS[1] else np.inf
+    return abs(float(np.log(ratio))) if _PALM_RADIUS[0] < ratio < _PALM_RADIUS[1] else np.inf
 
 
 def _thick(probability: NDArray[np.float32]) -> list[Array]:
-    """(3,) px centres x, y and radii of the largest discs of foreground, thickest first, that do not touch."""
+    """(3,) px centres x, y and radii of the largest discs of foreground, thickest first, whose centres lie apart."""
     solid = (probability > 0.5).astype(np.uint8)
     distance = cv2.distanceTransform(cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_REPLICATE), cv2.DIST_L2, 5)
     distance = distance[1:-1, 1:-1].copy()
@@ -220,6 +221,6 @@ def _thick(probability: NDArray[np.float32]) -> list[Array]:
         place = np.array([(columns[k] + 0.5) * STEP - 0.5, (rows[k] + 0.5) * STEP - 0.5, radius * STEP])
         if all(np.linalg.norm(place[:2] - other[:2]) > 0.7 * other[2] for other in out):
             out.append(place)
-            if len(out) == 4 * PALMS:
+            if len(out) == PEAKS:
                 break
     return out

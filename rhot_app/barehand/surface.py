@@ -26,7 +26,7 @@ Indices = NDArray[np.int64]
 PALM, FOREARM = 5, 6
 """Groups beyond the fingers 0..4."""
 
-WHOLE, FINGERS, THICKNESS, LENGTH, RADIUS, FOREARM_RADIUS, FOREARM_TURN, SHAPE = 0, 1, 2, 3, 18, 33, 34, 36
+WHOLE, FINGER_SIZE, THICKNESS, LENGTH, RADIUS, FOREARM_RADIUS, FOREARM_TURN, SHAPE = 0, 1, 2, 3, 18, 33, 34, 36
 """Where a shape's numbers begin, and how many it has: logarithms of the hand's size, of all phalanges' lengths and of
 all radii but the forearm's, relative to the hand file's at that size; of the 15 phalanges' own lengths and radii beyond
 these; of the forearm's radius; and the forearm's flexion and deviation, a rotation vector (0, y, z) rad about the wrist
@@ -113,7 +113,7 @@ def sized_table(dh, bone, shape, a, d):
     """Fill `a` (R,) and `d` (R,), the lengths of a table for a hand of `shape` (SHAPE,)."""
     whole = np.exp(shape[WHOLE])
     for row in range(a.shape[0]):
-        a[row] = dh.a[row] * whole * (np.exp(shape[FINGERS] + shape[LENGTH + bone[row]]) if bone[row] >= 0 else 1.0)
+        a[row] = dh.a[row] * whole * (np.exp(shape[FINGER_SIZE] + shape[LENGTH + bone[row]]) if bone[row] >= 0 else 1.0)
         d[row] = dh.d[row] * whole
 
 
@@ -135,7 +135,7 @@ def place_capsules(surface, world, angles, shape, frames, centres, radii):
         longer = 1.0
         if row >= 0:
             thick *= np.exp(shape[RADIUS + surface.bone[row]])
-            longer = np.exp(shape[FINGERS] + shape[LENGTH + surface.bone[row]])
+            longer = np.exp(shape[FINGER_SIZE] + shape[LENGTH + surface.bone[row]])
         base = world if row < 0 else frames[row]
         for end in range(2):
             radii[k, end] = surface.radii[k, end] * whole * thick

@@ -128,7 +128,7 @@ def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: 
             state, away, distance = process.retract(last[0], 0.5 * last[1]), away - 0.5 * last[1], 0.5 * distance
             continue
         before = cost + distance
-        cross, root, reached, distance, moved = _solve(covariance, jacobian, error, variances, away)
+        cross, root, reached, distance, moved = gauss_newton_step(covariance, jacobian, error, variances, away)
         reached[partial.columns] *= partial.share
         last = (state, reached - away)
         state, away = process.retract(state, reached - away), reached
@@ -141,7 +141,7 @@ def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: 
 
 
 @njit(cache=True)
-def _solve(covariance: Array, jacobian: Array, error: Array, variances: Array, step: Array) \
+def gauss_newton_step(covariance: Array, jacobian: Array, error: Array, variances: Array, step: Array) \
         -> tuple[Array, Array, Array, float, float]:
     """One Gauss-Newton step from `step` (n,), the present state relative to the prior.
 

@@ -12,7 +12,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contours import STEP_M
+from rhot_app.barehand.contour_residual import MISSED
+from rhot_app.barehand.contours import SILHOUETTE, STEP_M
 from rhot_app.barehand.surface import FOREARM_TURN, SHAPE
 from rhot_app.barehand.tracker import START_PASSES, START_SD, BareHandTracker
 from rhot_app.errors import CalibrationError
@@ -31,8 +32,8 @@ Array = NDArray[np.float64]
 SEARCHES = 8
 """Random searches at most; one in three finds an open hand in drawn pictures without a background (chosen: 30 s)."""
 
-FOUND = 0.9
-"""Part of the contour of a hand that is where it is believed to be: what `contour_residual.MISSED` leaves."""
+FOUND = 1.0 - float(MISSED[SILHOUETTE])
+"""Part of the contour that is found of a hand that is where it is estimated."""
 
 
 def fit_to_contours(solver: Solver, rig: Rig, state: FitState, instants: Sequence[int], freedom: Freedom,
@@ -43,14 +44,14 @@ def fit_to_contours(solver: Solver, rig: Rig, state: FitState, instants: Sequenc
     evidence = Evidence(reference, START_SD[:2], anchor_sd_px)
     free = free_numbers(state, instants, freedom, surface=True)
     contours: list[Contour | None] = [None] * len(state.instants)
-    known = {k: [(learn_skin(image), noise_of(image)) for _, image in sorted(state.instants[k].images.items())]
-             for k in instants}
+    learnt = {k: [(learn_skin(image), noise_of(image)) for _, image in sorted(state.instants[k].images.items())]
+              for k in instants}
     spread = solver.covariance(state, evidence) * np.outer(free, free)
     for number in range(START_PASSES):
         step_m = STEP_M if number == START_PASSES - 1 else 2.0 * STEP_M
         surface = solver.shapes.anatomy(state.shape)
         for k in instants:
-            contours[k] = _search(surface, rig, state, k, 0.25**number * spread, step_m, known[k])
+            contours[k] = _search(surface, rig, state, k, 0.25**number * spread, step_m, learnt[k])
         state = solver.solve(state, replace(evidence, contours=contours), free)
     for k in instants:
         contour = contours[k]
@@ -62,7 +63,7 @@ def fit_to_contours(solver: Solver, rig: Rig, state: FitState, instants: Sequenc
 
 
 def find_hand(rig: Rig, hand: HandAnatomy, instant: Instant, progress: Progress) -> HandPose:
-    """The pose of a hand of which nothing is known: of some random searches by the colours of skin, the one whose
+    """The pose of a hand that may be anywhere: of some random searches by the colours of skin, the one whose
     contour is found best. Raises CalibrationError when there is nothing of a hand's size and colour."""
     tracker = _tracker(rig, hand, instant)
     images = [image for _, image in sorted(instant.images.items())]
@@ -96,9 +97,9 @@ def _tracker(rig: Rig, hand: HandAnatomy, instant: Instant) -> BareHandTracker:
 
 
 def _search(hand: HandAnatomy, rig: Rig, state: FitState, k: int, spread: Array, step_m: float,
-            known: Sequence[tuple[Foreground, float]]) -> Contour:
-    """The edges near the contours of the hand at one instant; `spread` (n, n): the state's covariance; `known`: of each
-    picture, the colours of skin and the noise."""
+            learnt: Sequence[tuple[Foreground, float]]) -> Contour:
+    """The edges near the contours of the hand at one instant; `spread` (n, n): the state's covariance; `learnt`: of
+    each picture, the colours of skin and the noise."""
     instant = state.instants[k]
     tracker = _tracker(rig, hand, instant)
     bare, covariance = np.zeros(BIAS + SHAPE), np.zeros((MOTION + SHAPE, MOTION + SHAPE))
@@ -111,6 +112,6 @@ def _search(hand: HandAnatomy, rig: Rig, state: FitState, k: int, spread: Array,
     frames = []
     for number, (_, image) in enumerate(sorted(instant.images.items())):
         frame = tracker.expected(number, bare, covariance, step_m)
-        frame.observe(find_edges(image, frame.slices, *known[number]))
+        frame.observe(find_edges(image, frame.slices, *learnt[number]))
         frames.append(frame)
     return Contour(state.shape, tuple(frames))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.surface import (
-    FINGERS,
+    FINGER_SIZE,
     FOREARM_RADIUS,
     FOREARM_TURN,
     LENGTH,
@@ -27,7 +27,7 @@ from rhot_app.barehand.tracker import FOREARM_SD, LENGTH_SD, RADIUS_SD, SIZE_SD
 from rhot_app.calibration.hand.marker_places import BASE_SD_M
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel, build_model
-from rhot_app.hand.skeleton import FINGERS as FINGER_NAMES
+from rhot_app.hand.skeleton import FINGERS
 
 Array = NDArray[np.float64]
 
@@ -53,9 +53,9 @@ def anatomy_of(base: HandAnatomy, shape: Array) -> HandAnatomy:
     """
     whole, thick = np.exp(shape[WHOLE]), np.exp(shape[THICKNESS])
     fingers = {}
-    for k, name in enumerate(FINGER_NAMES):
+    for k, name in enumerate(FINGERS):
         old, own = base.fingers[name], slice(3 * k, 3 * k + 3)
-        bones = np.array(old.bones_mm) * whole * np.exp(shape[FINGERS] + shape[LENGTH:RADIUS][own])
+        bones = np.array(old.bones_mm) * whole * np.exp(shape[FINGER_SIZE] + shape[LENGTH:RADIUS][own])
         radii = np.array(old.radii_mm) * whole * thick * np.exp(shape[RADIUS:FOREARM_RADIUS][own])
         place = (np.array(old.base_mm) + 1e3 * shape[ROOTS:][own]) * whole
         fingers[name] = msgspec.structs.replace(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rhot_app.barehand.surface import (
-    FINGERS,
+    FINGER_SIZE,
     FOREARM_RADIUS,
     LENGTH,
     RADIUS,
@@ -21,15 +21,14 @@ from rhot_app.barehand.surface import (
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.motion.hand_process import POSE
-from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, BONES, HandPose
-from rhot_app.hand.skeleton import FINGERS as FINGER_NAMES
+from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, BONES, FINGERS, HandPose
 from rhot_app.handfit.hand_shape import ROOTS, SHAPE_LIMIT
 from rhot_app.handfit.state import BEND_LIMIT, FitState
 
 Array = NDArray[np.float64]
 Kind = Literal["place", "turn", "angle", "bend", "size", "length", "radius", "root"]
 
-GROUPS: tuple[str, ...] = ("Palm", *(name.capitalize() for name in FINGER_NAMES), "Forearm", "Sizes", "Lengths",
+GROUPS: tuple[str, ...] = ("Palm", *(name.capitalize() for name in FINGERS), "Forearm", "Sizes", "Lengths",
                            "Radii", "Finger roots")
 """In the order of the screen. Those of the pose come first."""
 
@@ -64,7 +63,7 @@ def numbers_of(base: HandAnatomy) -> tuple[Number, ...]:
     found += [Number("Palm", name, "°", -low, low, "turn", k, "The palm turns about its axes, z first, then y, then x.")
               for k, (name, low) in enumerate((("turn about z", 180.0), ("turn about y", 90.0),
                                                ("turn about x", 180.0)))]
-    for finger, own in zip(FINGER_NAMES, ANGLE_SLICES, strict=True):
+    for finger, own in zip(FINGERS, ANGLE_SLICES, strict=True):
         limits = np.array(base.fingers[finger].limits_deg)
         found += [Number(finger.capitalize(), _words(ANGLES[k], finger), "°", low, high, "angle", k,
                          "Within the limits of the hand file.")
@@ -72,7 +71,7 @@ def numbers_of(base: HandAnatomy) -> tuple[Number, ...]:
     found += [Number("Forearm", name, "°", -limit, limit, "bend", k, "Of the forearm behind the wrist.")
               for k, (name, limit) in enumerate(zip(("flexion", "deviation"), np.degrees(BEND_LIMIT), strict=True))]
     for name, index, meaning in (("whole hand", WHOLE, "every length"),
-                                 ("fingers", FINGERS, "all phalanges, beside the size of the whole hand"),
+                                 ("fingers", FINGER_SIZE, "all phalanges, beside the size of the whole hand"),
                                  ("thickness", THICKNESS, "all radii but the forearm's, and the palm's thickness"),
                                  ("forearm", FOREARM_RADIUS, "the forearm's thickness")):
         most = float(SHAPE_LIMIT[index])
@@ -80,7 +79,7 @@ def numbers_of(base: HandAnatomy) -> tuple[Number, ...]:
                             f"Relative to the hand of the beginning: {meaning}."))
     found += [_phalanx(base, "length", k) for k in range(15)] + [_phalanx(base, "radius", k) for k in range(15)]
     for k in range(15):
-        finger, value = FINGER_NAMES[k // 3], base.fingers[FINGER_NAMES[k // 3]].base_mm[k % 3]
+        finger, value = FINGERS[k // 3], base.fingers[FINGERS[k // 3]].base_mm[k % 3]
         reach = 1e3 * float(SHAPE_LIMIT[ROOTS + k])
         found.append(Number("Finger roots", f"{finger} {('distal', 'radial', 'dorsal')[k % 3]}", "mm", value - reach,
                             value + reach, "root", k, "Where the finger begins, from the wrist joint: towards the "
@@ -90,7 +89,7 @@ def numbers_of(base: HandAnatomy) -> tuple[Number, ...]:
 
 def _phalanx(base: HandAnatomy, kind: Literal["length", "radius"], k: int) -> Number:
     """The range is that of a phalanx's own length or radius; the sizes of the whole hand may bring it beyond."""
-    finger = FINGER_NAMES[k // 3]
+    finger = FINGERS[k // 3]
     name, own = f"{finger} {BONES[k // 3][k % 3]}", base.fingers[finger]
     if kind == "length":
         group, value, most = "Lengths", own.bones_mm[k % 3], float(SHAPE_LIMIT[LENGTH + k])
@@ -121,11 +120,11 @@ def value_of(state: FitState, instant: int, hand: HandAnatomy, number: Number) -
         case "size":
             return 100.0 * math.exp(state.shape[k])
         case "length":
-            return hand.fingers[FINGER_NAMES[k // 3]].bones_mm[k % 3]
+            return hand.fingers[FINGERS[k // 3]].bones_mm[k % 3]
         case "radius":
-            return hand.fingers[FINGER_NAMES[k // 3]].radii_mm[k % 3]
+            return hand.fingers[FINGERS[k // 3]].radii_mm[k % 3]
         case "root":
-            return hand.fingers[FINGER_NAMES[k // 3]].base_mm[k % 3]
+            return hand.fingers[FINGERS[k // 3]].base_mm[k % 3]
 
 
 def with_value(state: FitState, instant: int, hand: HandAnatomy, number: Number, value: float) -> FitState:
@@ -173,7 +172,7 @@ def sd_of(state: FitState, instant: int, hand: HandAnatomy, number: Number, cova
         case "size":
             row[k] = value_of(state, instant, hand, number)
         case "length":
-            row[[WHOLE, FINGERS, LENGTH + k]] = value_of(state, instant, hand, number)
+            row[[WHOLE, FINGER_SIZE, LENGTH + k]] = value_of(state, instant, hand, number)
         case "radius":
             row[[WHOLE, THICKNESS, RADIUS + k]] = value_of(state, instant, hand, number)
         case "root":

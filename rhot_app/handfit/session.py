@@ -306,7 +306,7 @@ class HandFit:
                            for one in state.instants[k].anchors):
                     first = state.own(k).start + 6
                     free[first + angles.start:first + angles.stop] = False
-        return self.solver.solve(state, Evidence(self.solver.natural(state), FREE_SD, self.anchor_sd_px), free)
+        return self.solver.solve(state, Evidence(self.solver.with_mean_angles(state), FREE_SD, self.anchor_sd_px), free)
 
     def fitted_to_contours(self) -> FitState:
         """The state fitted to the edges in the pictures; with lengths free, of all instants. Raises CalibrationError,

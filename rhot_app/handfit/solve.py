@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.barehand.contour_residual import COLUMNS, compressed
 from rhot_app.barehand.contours import NEAREST_M, STEP_M, project
 from rhot_app.barehand.joints import add_lengths
-from rhot_app.barehand.surface import FINGERS, FOREARM_TURN, LENGTH, RADIUS, SHAPE, WHOLE
+from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, LENGTH, RADIUS, SHAPE, WHOLE
 from rhot_app.barehand.tracker import FOREARM_SD, START_SD
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import Dense, minimise
@@ -83,8 +83,8 @@ class Solver:
         self._placed: list[tuple[Array, Instant, tuple[Array, Array]]] = []
         self._root = np.linalg.cholesky(model.pose_prior.information).T
 
-    def natural(self, state: FitState) -> FitState:
-        """The state with the angles at the mean of `pose_prior`: where it is centred when nothing else is known."""
+    def with_mean_angles(self, state: FitState) -> FitState:
+        """The state with the angles at the mean of `pose_prior`: where it is centred when nothing shows them."""
         mean = self.shapes.model(np.zeros(SIZE)).pose_prior.mean
         return replace(state, instants=tuple(
             replace(one, pose=HandPose(one.pose.world_from_palm, mean)) for one in state.instants))
@@ -206,7 +206,8 @@ def joint_places(model: HandModel, bone: NDArray[np.int64], shape: Array, instan
     out[:, :, SIZE:SIZE + POSE] = moves[:count]
     lengths = np.zeros((count, 3, 2 + RADIUS - LENGTH))
     add_lengths(dh, bone, pose.world_from_palm, frames, points[:count], lengths)
-    out[:, :, WHOLE], out[:, :, FINGERS], out[:, :, LENGTH:RADIUS] = lengths[..., 0], lengths[..., 1], lengths[..., 2:]
+    out[:, :, WHOLE], out[:, :, FINGER_SIZE] = lengths[..., 0], lengths[..., 1]
+    out[:, :, LENGTH:RADIUS] = lengths[..., 2:]
     roots = np.exp(shape[WHOLE]) * pose.world_from_palm[:3, :3] * np.array([1.0, model.mirror, 1.0])
     for joint in range(1, count):
         finger = (joint - 1) // 4
@@ -242,7 +243,7 @@ def free_numbers(state: FitState, instants: Sequence[int], freedom: Freedom, *, 
         free[own.stop - 2:own.stop] = surface
     if freedom != "pose":
         free[LENGTH:RADIUS] = True
-        free[[WHOLE, FINGERS]] = not own_lengths
+        free[[WHOLE, FINGER_SIZE]] = not own_lengths
         if surface:
             free[:ROOTS] = True
     if freedom == "roots" and not surface:

@@ -18,7 +18,7 @@ from rhot_node.detect.foreground import Foreground, foreground_at, gain_of
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
-MOST = 6
+EDGES_MAX = 6
 """Edges reported of one slice, the strongest."""
 
 SIGNIFICANT = 4.0
@@ -46,7 +46,7 @@ _LEAST_SD, _MOST_SD = 0.05, 3.0  # px
 
 
 class Edges(NamedTuple):
-    """Edges of N slices. `number` (N,); the others (N, MOST), the first `number` of each row are valid.
+    """Edges of N slices. `number` (N,); the others (N, EDGES_MAX), the first `number` of each row are valid.
 
     `offset` px along the slice's normal from its centre, `sd` px; `strength` of 255 per px: positive where it gets
     brighter along the normal; `inside`, `outside`: foreground probability before and behind the edge.
@@ -66,7 +66,7 @@ def find_edges(image: Image, slices: Array, foreground: Foreground, noise: float
     `noise`: standard deviation of a pixel's value, of 255 (`noise_of`).
     """
     n = len(slices)
-    edges = Edges(np.zeros(n, np.int64), *(np.zeros((n, MOST)) for _ in range(5)))
+    edges = Edges(np.zeros(n, np.int64), *(np.zeros((n, EDGES_MAX)) for _ in range(5)))
     longest = 2 * math.ceil(slices[:, 4].max()) + 1 + 2 * BEYOND if n else 1
     _find(image, slices, foreground.hand, foreground.rest, foreground.mean, foreground.sd,
           gain_of(image, foreground), noise, np.empty((longest, 4)), np.empty(longest), np.empty(longest), *edges)
@@ -133,9 +133,9 @@ def _find(image, slices, hand, rest, mean, sd, gain, noise, profile, ours, slope
             if slope[i] < SIGNIFICANT * noise_slope or slope[i] < slope[i - 1] or slope[i] <= slope[i + 1]:
                 continue
             place = found
-            if found == MOST:  # in place of the weakest, if that is weaker
+            if found == EDGES_MAX:  # in place of the weakest, if that is weaker
                 place = 0
-                for k in range(1, MOST):
+                for k in range(1, EDGES_MAX):
                     if abs(strength[s, k]) < abs(strength[s, place]):
                         place = k
                 if abs(strength[s, place]) >= slope[i]:

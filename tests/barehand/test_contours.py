@@ -13,7 +13,7 @@ from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.surface import FOREARM_TURN, SHAPE, Surface
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.motion.hand_process import BIAS, FASTEST, MOTION, PALM_SPREAD, POSE, HandProcess
-from rhot_node.detect.edges import MOST, Edges, find_edges, noise_of
+from rhot_node.detect.edges import EDGES_MAX, Edges, find_edges, noise_of
 from rhot_node.detect.foreground import learn_background, skin_foreground
 
 
@@ -88,7 +88,7 @@ def test_contours_of_a_later_image_follow_the_velocity() -> None:
     _, surface = model_and_surface()
     process, camera, state = process_of(), two_cameras()[1], state_of(poses("grasp", (0.9,))[0])
     frame = frame_of(surface, state, camera)
-    empty = np.zeros((len(frame.slices), MOST))
+    empty = np.zeros((len(frame.slices), EDGES_MAX))
     edges = Edges(np.ones(len(empty), np.int64), *(empty.copy() for _ in range(5)))
     frame.expected_sd[:] = 0.0
     edges.offset[:, 0], edges.sd[:, 0], edges.strength[:, 0], edges.inside[:, 0] = 0.3, 0.5, 5.0, 1.0
@@ -118,7 +118,7 @@ def test_a_slice_without_edges_changes_nothing() -> None:
     _, surface = model_and_surface()
     camera, state = two_cameras()[0], state_of(poses("grasp", (0.9,))[0])
     frame = frame_of(surface, state, camera)
-    empty = np.zeros((len(frame.slices), MOST))
+    empty = np.zeros((len(frame.slices), EDGES_MAX))
     frame.observe(Edges(np.zeros(len(empty), np.int64), *(empty.copy() for _ in range(5))))
     rows = frame.linearise(state)
     assert np.abs(rows.jacobian.T @ rows.error).max() < 1e-9

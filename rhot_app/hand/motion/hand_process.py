@@ -51,7 +51,7 @@ class HandProcess:
     """Implements `estimation.residual.Process`; M markers.
 
     `dh` has a point for each marker; without points there is no null-space reset. `limits` (21, 2) rad.
-    `mean` (21,) rad and `covariance` (21, 21) of the natural pose. `spread` (2,): standard deviations of the palm's
+    `mean` (21,) rad and `covariance` (21, 21) of the pose prior. `spread` (2,): standard deviations of the palm's
     translation, m, and rotation, rad, over one correlation time.
     `slowest` (3,) and `fastest` 1/s: limits of the rates of translation, rotation and angles. `bias` (M, 3, 3) m^2:
     covariances of the paint biases, and `bias_s`, one for all or (M,), their correlation times.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import SILHOUETTE
+from rhot_app.barehand.follower import CONFUSED_M, MAJORITY
 from rhot_app.barehand.joints import place_joints
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.barehand.tracker import BareHandTracker
@@ -21,13 +22,6 @@ from rhot_app.tracking.contours.requests import NEVER, CameraFrames
 from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
 
 Array = NDArray[np.float64]
-
-MOST = 0.5
-"""Part above which more speaks for a hand than against it: of the contour that is found, of joints on foreground."""
-
-CONFUSED_M = 0.02
-"""Mean distance of two hands' joints, m, from which fingers are taken for each other: neighbouring knuckles are so far
-apart in the hand files."""
 
 APART_M = 0.1
 """m: farther apart are two hands: a hand's breadth."""
@@ -78,7 +72,7 @@ class Evidence:
         for frame, contour in weighed:
             camera, seen = self._shown[frame.camera], contour.seen.sum(axis=0)
             camera.searched_ns = frame.t_row0_master_ns
-            if seen[0] > MOST * seen[1]:
+            if seen[0] > MAJORITY * seen[1]:
                 camera.supported_ns = frame.t_row0_master_ns
         self._note()
 
@@ -86,9 +80,9 @@ class Evidence:
         """See whether the hand lies on foreground in one frame."""
         camera = self._shown[frame.camera]
         inside, share = on_foreground(self._hand, frame, self._hand.filter.newest.state)
-        camera.whole = inside > MOST
+        camera.whole = inside > MAJORITY
         camera.mapped_ns = frame.t_row0_master_ns
-        if share > MOST:
+        if share > MAJORITY:
             camera.covered_ns = frame.t_row0_master_ns
         self._note()
 

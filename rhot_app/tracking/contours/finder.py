@@ -148,9 +148,8 @@ class Finder:
         """The pose in later maps, near to where it was."""
         hand = self._hand
         seen = maps.silhouettes(hand)
-        natural = np.linalg.inv(hand.model.pose_prior.information + np.eye(21) / TURNED**2)
         covariance = np.diag(np.repeat(np.square([MOVED_M, TURNED, TURNED]), (3, 3, 21)))
-        covariance[6:, 6:] = natural
+        covariance[6:, 6:] = np.linalg.inv(hand.model.pose_prior.information + np.eye(21) / TURNED**2)
         world, angles, _ = search(hand.surface, pose.world_from_palm, pose.angles, covariance, hand.model.limits,
                                   np.zeros(SHAPE), seen, self._rng, _ROUNDS)
         return HandPose(world, angles)
