@@ -55,15 +55,16 @@ class _Shown:
 
 
 class Evidence:
-    """What the cameras show of one hand. `seen_ns`: when all in whose images most of it lies last showed it, master
-    ns."""
+    """What the cameras show of one hand. `confirmed`: it was found twice; `seen_ns`: when all cameras that should show
+    it last did, master ns. Until it is confirmed, all should; then those in whose images most of it lies."""
 
     def __init__(self, hand: BareHandTracker, cameras: Sequence[CameraFrames]) -> None:
         self._hand, self._cameras = hand, cameras
         self.begin(NEVER)
 
     def begin(self, t_ns: int) -> None:
-        """The hand was found at `t_ns`."""
+        """A hand was found at `t_ns`."""
+        self.confirmed = False
         self._shown = [_Shown() for _ in self._cameras]
         self.seen_ns, self._judged_ns = t_ns, NEVER
 
@@ -82,25 +83,25 @@ class Evidence:
         inside, share = on_foreground(self._hand, frame, self._hand.filter.newest.state)
         camera.whole = inside > MAJORITY
         camera.mapped_ns = frame.t_row0_master_ns
-        if share > MAJORITY:
+        if share > MAJORITY and (self.confirmed or camera.whole):
             camera.covered_ns = frame.t_row0_master_ns
         self._note()
 
-    def lost(self, t_ns: int, *, confirmed: bool) -> bool:
+    def lost(self, t_ns: int) -> bool:
         """Whether no camera has shown the hand for too long, or the images of one contradict it. One that is not
-        `confirmed` is given more time."""
+        confirmed is given more time."""
         period_ns = min(camera.period_ns for camera in self._cameras)
         silent_ns = max(LOST_AFTER_NS, 2 * LOST_AFTER_PERIODS * period_ns)
-        wrong_ns = max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns) if confirmed else silent_ns
+        wrong_ns = max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns) if self.confirmed else silent_ns
         return bool(t_ns - self.seen_ns > silent_ns + 2 * period_ns or self._judged_ns - self.seen_ns > wrong_ns)
 
     def _note(self) -> None:
-        """Note when all cameras in whose images most of the hand lies last showed it, and until when they could have.
-        The others say nothing: it may be there or not."""
+        """Note when all cameras that should show the hand last did, and until when they could have. The others say
+        nothing: it may be there or not."""
         newest_ns = max(max(one.searched_ns, one.mapped_ns) for one in self._shown)
         judging = [one for one, camera in zip(self._shown, self._cameras, strict=True)
-                   if one.whole and camera.delivers(newest_ns)]
-        if judging:
+                   if (one.whole or not self.confirmed) and camera.delivers(newest_ns)]
+        if any(one.whole for one in judging):
             self.seen_ns = max(self.seen_ns, min(one.seen_ns for one in judging))
         self._judged_ns = min((one.judged_ns for one in judging), default=NEVER)
 

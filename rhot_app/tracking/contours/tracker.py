@@ -65,7 +65,7 @@ class ContourEstimator:
         self._waiting: dict[int, tuple[EdgeFrame, ContourFrame]] = {}
         self._epoch_ns = 0
         self._maps_ns = self._agreed_ns = NEVER
-        self._tracking = self._confirmed = self._ever = False
+        self._tracking = self._ever = False
         self._latest: CameraObservations | EdgeFrame | None = None
 
     # -- Tracker and ImageTracking -------------------------------------------------------------------------------------
@@ -84,7 +84,7 @@ class ContourEstimator:
 
     def seen(self) -> list[SeenContour]:
         """See `ShowsContours`."""
-        if not (self._tracking and self._confirmed):
+        if not (self._tracking and self._evidence.confirmed):
             return []
         state, found = self._hand.filter.newest.state, []
         for name, camera, frame in zip(self._names, self._cameras, list(self._hand.frames), strict=True):
@@ -153,14 +153,14 @@ class ContourEstimator:
         self._hand.row_s[frame.camera] = 1e-9 * frame.row_time_ns
         t_ns = frame.t_row0_master_ns
         if self._tracking and (abs(t_ns - self._time_ns()) > JUMP_NS
-                               or self._evidence.lost(t_ns, confirmed=self._confirmed)):
+                               or self._evidence.lost(t_ns)):
             self._give_up()
         marked = self._markers is not None and self._take_markers(frame, self._markers)
         if not self._tracking:
             self._requests.look(frame)
         elif camera.overdue(t_ns):
             self._requests.ask(frame.camera, t_ns)
-        if marked or not (self._tracking and self._confirmed):
+        if marked or not (self._tracking and self._evidence.confirmed):
             self._latest = frame
             return True
         return False
@@ -188,7 +188,7 @@ class ContourEstimator:
             self._hand.frames[number] = contour
             self._requests.ask(number, one.t_row0_master_ns)
         self._evidence.take_edges(waiting.values())
-        if not self._confirmed:
+        if not self._evidence.confirmed:
             return False
         self._latest = frame
         return True
@@ -203,7 +203,7 @@ class ContourEstimator:
         if maps is None or maps.t_ns == self._maps_ns or self._waiting:
             return
         self._maps_ns = maps.t_ns
-        if not self._confirmed and self._evidence.seen_ns > max(self._epoch_ns, maps.t_ns - SAME_MAPS_NS):
+        if not self._evidence.confirmed and self._evidence.seen_ns > max(self._epoch_ns, maps.t_ns - SAME_MAPS_NS):
             self._confirm(maps)
         if self._finder.follow(maps, 1e-9 * self._cameras[0].period_ns):
             self._requests.renew()
@@ -212,7 +212,7 @@ class ContourEstimator:
         """Have the hand looked for once more: two random searches agree on a wrong hand less often than one errs.
         Markers that show the same hand are as good."""
         if maps.t_ns - self._agreed_ns < SAME_MAPS_NS:
-            self._confirmed = self._ever = True
+            self._evidence.confirmed = self._ever = True
             return
         found = self._finder.found()
         if found is None:
@@ -223,7 +223,7 @@ class ContourEstimator:
         other, _ = self._hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
         other[BIAS:], seen = state[BIAS:], maps.silhouettes(self._hand)
         if same_hand(self._hand, state, pose):
-            self._confirmed = self._ever = True
+            self._evidence.confirmed = self._ever = True
         elif self._hand.score_of(seen, other) > self._hand.score_of(seen, state):
             self._start(pose, t_ns)
         else:
@@ -246,12 +246,12 @@ class ContourEstimator:
         if self._markers is not None:
             self._markers.begin(t_ns)
         self._epoch_ns, self._maps_ns, self._agreed_ns = t_ns, NEVER, NEVER
-        self._tracking, self._confirmed = True, False
+        self._tracking = True
         self._evidence.begin(t_ns)
         self._requests.begin(t_ns)
 
     def _give_up(self) -> None:
-        self._tracking = self._confirmed = False
+        self._tracking = False
         self._hand.tracking = False
         self._hand.frames = [None] * len(self._names)
         self._finder.reset()
@@ -262,7 +262,7 @@ class ContourEstimator:
 
     def _take_markers(self, frame: CameraObservations, markers: MarkersOfHand) -> bool:
         """Begin with one frame's markers, or weigh them. Whether they, or some that waited, showed anything."""
-        if not (self._tracking and self._confirmed):
+        if not (self._tracking and self._evidence.confirmed):
             self._locate(frame, markers)
         if not self._tracking:
             return False
@@ -297,7 +297,7 @@ class ContourEstimator:
     def _state(self, frame: CameraObservations | EdgeFrame, begun: float) -> HandState:
         newest = self._hand.filter.newest if self._tracking else None
         wide = self._markers.widened(newest.state, newest.covariance) if self._markers and newest else None
-        hand = self._hand.state(begun, wide and wide[1]) if self._tracking and self._confirmed else no_hand(
+        hand = self._hand.state(begun, wide and wide[1]) if self._tracking and self._evidence.confirmed else no_hand(
             frame.t_row0_master_ns, Condition.LOST if self._ever else Condition.SEARCHING)
         return _published(hand, self._sequence - 1, frame, self.newest_frames(), self._rig.markers.ids, self._names,
                          time.perf_counter() - begun)
