@@ -6,6 +6,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +78,13 @@ class CameraFrames:
         return t_ns - self.target_ns > 1.5 * self.period_ns
 
 
+class _Expected(NamedTuple):
+    """The contour that a request is about, of the hand where it was found or moved to as `place`."""
+
+    place: object
+    contour: ContourFrame
+
+
 class Requests:
     """Requests about one hand; `cameras`: when the frames of each come."""
 
@@ -85,6 +93,7 @@ class Requests:
         self.cameras = [CameraFrames() for _ in hand.cameras]
         self._hand, self._predict = hand, predict
         self._requests: list[SliceRequest] = []
+        self._place = object()
 
     def take(self) -> list[SliceRequest]:
         """The requests since the last call, the newest of each camera."""
@@ -100,13 +109,15 @@ class Requests:
 
     def begin(self, t_ns: int) -> None:
         """The hand was found at `t_ns`: have all nodes search from now on, and wait for all of them."""
+        self._place = object()
         for number, camera in enumerate(self.cameras):
             if camera.newest is not None:
                 camera.answered_ns = camera.newest.t_row0_master_ns
                 self.ask(number, max(camera.newest.t_row0_master_ns, t_ns))
 
     def renew(self) -> None:
-        """Have all nodes search where the hand is expected now."""
+        """The hand was moved: have all nodes search there."""
+        self._place = object()
         for number, camera in enumerate(self.cameras):
             if camera.newest is not None:
                 self.ask(number, camera.newest.t_row0_master_ns)
@@ -126,11 +137,15 @@ class Requests:
             contour = asked(self._hand, number, state, covariance, STEP_M * len(contour.slices) / SLICES_MAX)
         camera.searched = len(contour.slices) > 0
         self._requests = [one for one in self._requests if one.camera != number]
-        self._requests.append(SliceRequest(number, contour.slices[:SLICES_MAX], STEP, contour))
+        self._requests.append(SliceRequest(number, contour.slices[:SLICES_MAX], STEP, _Expected(self._place, contour)))
 
     def contour(self, frame: EdgeFrame) -> ContourFrame | None:
         """The contour on the slices that were searched, with their edges: as it was expected, or in a log as it is now.
-        None without any; the camera is then not waited for."""
+        None without any; the camera is then not waited for. None, too, when they were asked for before the hand was
+        found or moved: where it was not, other edges would be taken for its."""
+        expected = frame.request.expected
+        if isinstance(expected, _Expected) and expected.place is not self._place:
+            return None
         camera, contour = self.cameras[frame.camera], self._searched(frame)
         camera.searched = contour is not None
         if contour is not None:
@@ -139,10 +154,10 @@ class Requests:
 
     def _searched(self, frame: EdgeFrame) -> ContourFrame | None:
         expected = frame.request.expected
-        if isinstance(expected, ContourFrame) and expected.surface is self._hand.surface:
-            if len(expected.slices) != len(frame.request.slices):
+        if isinstance(expected, _Expected):
+            if len(expected.contour.slices) != len(frame.request.slices):
                 return None
-            contour = copy.copy(expected)  # for this frame
+            contour = copy.copy(expected.contour)  # for this frame
             contour.observe(frame.edges)
             return contour
         return matched(self._hand, frame, *self._predict(frame.t_row0_master_ns + self._middle_ns(frame.camera)))

@@ -246,7 +246,7 @@ class ContourEstimator:
         if self._markers is not None:
             self._markers.begin(t_ns)
         self._epoch_ns, self._maps_ns, self._agreed_ns = t_ns, NEVER, NEVER
-        self._tracking = True
+        self._tracking, self._waiting = True, {}
         self._evidence.begin(t_ns)
         self._requests.begin(t_ns)
 
