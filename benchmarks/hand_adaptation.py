@@ -1,4 +1,4 @@
-"""A bare hand whose file is wrong, tracked for ten seconds: what adapting the file to the key frames leaves of the errors.
+"""A bare hand with a wrong file, tracked for ten seconds: what adapting the file to it leaves of the errors.
 
     python benchmarks/hand_adaptation.py [--seconds 10] [--seeds 3]
 

@@ -115,6 +115,13 @@ class KeyFrames:
             del self.kept[int(np.argmax(left))]
 
     @property
+    def tell_enough(self) -> bool:
+        """Whether a solution would be more certain of the phalanges, rms, than a hand file that is not this person's.
+        """
+        return all(float(np.sqrt(np.mean(sd**2))) < most
+                   for sd, most in zip(phalanx_sd(self.covariance), (LENGTH_SD, RADIUS_SD), strict=True))
+
+    @property
     def _information(self) -> Array:
         return np.asarray(self._prior + sum(one.told for one in self.kept))
 

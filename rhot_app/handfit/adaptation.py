@@ -9,23 +9,28 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import SILHOUETTE
 from rhot_app.barehand.key_frames import OWN, SHAPE_SD, SHARED, KeyFrame, normal_equations, phalanx_sd
-from rhot_app.barehand.surface import FOREARM_TURN, SHAPE
+from rhot_app.barehand.surface import FINGERS as FINGER_SIZE
+from rhot_app.barehand.surface import FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
 from rhot_app.estimation.least_squares import minimise
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.kinematics import move
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, POSE, VELOCITY
+from rhot_app.hand.skeleton import FINGERS
 from rhot_app.handfit.hand_shape import SHAPE_LIMIT, SIZE, Shapes
 
 Array = NDArray[np.float64]
+
+REASON = "hand adapted while it was tracked"
+"""In the history of a hand file or a rig."""
 
 ROUNDS = 3
 """Solutions, each with the surface of the hand file that the one before led to: two phalanges meet with one radius, to
@@ -35,14 +40,15 @@ EDGE_SD_PX = 4.0, 2.0, 1.0
 """px: how far from the contour an edge is expected in each round. 5 % of a phalanx are 2 px; halved as the solution
 gets better, as in a tracker's passes."""
 
+_DIGITS = 4  # of mm
 _STEPS, _LEAST_GAIN = 20, 1e-2  # of a cost in which one standard deviation costs 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Adapted:
-    """`hand`: the hand file by the key frames. `length_sd`, `radius_sd` (15,): standard deviations of its phalanges'
-    lengths and radii, relative. `states` (F, n): the hand at each key frame. `shape` (SIZE,), relative to the file
-    before, as in `hand_shape`; `covariance` (FOREARM_TURN, FOREARM_TURN) of it, without the finger roots."""
+    """`hand`: the hand file by the key frames, with standard deviations. `length_sd`, `radius_sd` (15,): those of its
+    phalanges' lengths and radii, relative. `states` (F, n): the hand at each key frame. `shape` (SIZE,), relative to
+    the file before, as in `hand_shape`; `covariance` (FOREARM_TURN, FOREARM_TURN) of it, without the finger roots."""
 
     hand: HandAnatomy
     length_sd: Array
@@ -50,6 +56,16 @@ class Adapted:
     states: Array
     shape: Array
     covariance: Array
+
+    def document(self) -> dict[str, float]:
+        """By how much lengths and radii changed and how well they are known, rms over the phalanges."""
+        sizes, own = self.shape[:THICKNESS + 1], self.shape
+        lengths = own[LENGTH:RADIUS] + sizes[WHOLE] + sizes[FINGER_SIZE]
+        radii = own[RADIUS:RADIUS + 15] + sizes[WHOLE] + sizes[THICKNESS]
+        return {"key_frames": len(self.states)} | {
+            f"{name}_percent": 100.0 * float(np.sqrt(np.mean(values**2)))
+            for name, values in (("lengths", lengths), ("lengths_sd", self.length_sd), ("radii", radii),
+                                 ("radii_sd", self.radius_sd))}
 
 
 def adapt(base: HandAnatomy, key_frames: Sequence[KeyFrame],
@@ -68,7 +84,22 @@ def adapt(base: HandAnatomy, key_frames: Sequence[KeyFrame],
         states = found.states
     assert found is not None
     covariance = np.asarray(np.linalg.inv(found.reduced(0.0)[0]))
-    return Adapted(shapes.anatomy(shape), *phalanx_sd(covariance), np.array(states), shape, covariance)
+    length_sd, radius_sd = phalanx_sd(covariance)
+    hand = _with_sd(shapes.anatomy(shape), length_sd.reshape(5, 3), radius_sd.reshape(5, 3))
+    return Adapted(hand, length_sd, radius_sd, np.array(states), shape, covariance)
+
+
+def _with_sd(hand: HandAnatomy, length_sd: Array, radius_sd: Array) -> HandAnatomy:
+    """The hand with standard deviations (5, 3) of lengths and radii, relative."""
+    fingers = {}
+    for k, name in enumerate(FINGERS):
+        one = hand.fingers[name]
+        bones, radii = ([round(value * part, _DIGITS) for value, part in zip(values, parts, strict=True)]
+                        for values, parts in ((one.bones_mm, length_sd[k].tolist()),
+                                              (one.radii_mm, radius_sd[k].tolist())))
+        fingers[name] = msgspec.structs.replace(one, bones_sd_mm=(bones[0], bones[1], bones[2]),
+                                                radii_sd_mm=(radii[0], radii[1], radii[2]))
+    return msgspec.structs.replace(hand, fingers=fingers)
 
 
 def _expected(frame: ContourFrame, sd_px: float, shapes: Shapes, shape: Array) -> ContourFrame:

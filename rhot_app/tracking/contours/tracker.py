@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame, Contours
 from rhot_app.barehand.contours import STEP_M
+from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
 from rhot_app.barehand.silhouette import CORRELATED
 from rhot_app.barehand.start import STEP
@@ -107,12 +108,14 @@ class ContourEstimator:
         self._markers = MarkersOfHand(rig, self._hand) if rig.tracker.observe != "contours" else None
         self._finder = Finder(self._hand)
         self._names = tuple(node.name for node in rig.nodes)
+        self.key_frames = KeyFrames(self._hand.model)
         self._sequence = 0
         self.reset()
 
     def reset(self) -> None:
         """Forget everything but the count of states."""
         self._finder.reset()
+        self.key_frames.clear()
         if self._markers is not None:
             self._markers.reset()
         self._hand.frames, self._hand.cover = [None] * len(self._names), 0.0
@@ -256,6 +259,7 @@ class ContourEstimator:
         self._note_seen()
         if not self._confirmed:
             return False
+        self.key_frames.offer(self._hand)
         self._latest = frame
         return True
 
@@ -353,6 +357,7 @@ class ContourEstimator:
         self._hand.start(pose, t_ns)
         self._hand.cover = 0.0
         self._finder.reset()
+        self.key_frames.clear()
         if self._markers is not None:
             self._markers.begin(self._hand)
         self._epoch_ns, self._seen_ns, self._marked = t_ns, t_ns, []
