@@ -139,7 +139,8 @@ class HandWatch:
         change = found.document()
         verdict = judge(f"by {len(found.states)} poses; lengths are known to {change['lengths_sd_percent']:.1f} %, "
                         f"radii to {change['radii_sd_percent']:.1f} %.",
-                        [Finding("adapted", Grade.GOOD, f"Lengths change by {change['lengths_percent']:.1f} %, radii by "
+                        [Finding("adapted", Grade.GOOD,
+                                 f"Lengths change by {change['lengths_percent']:.1f} %, radii by "
                                  f"{change['radii_percent']:.1f} %, rms.")])
         return {"known": True, **verdict.to_json(), "rows": _hand_rows(self._rig.hand, found.hand),
                 "document": msgspec.to_builtins(msgspec.structs.replace(self._rig, hand=found.hand))}
