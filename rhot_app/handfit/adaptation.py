@@ -32,13 +32,14 @@ Array = NDArray[np.float64]
 REASON = "hand adapted while it was tracked"
 """In the history of a hand file or a rig."""
 
-ROUNDS = 3
-"""Solutions, each with the surface of the hand file that the one before led to: two phalanges meet with one radius, to
-which the first surface is an approximation."""
-
 EDGE_SD_PX = 4.0, 2.0, 1.0
-"""px: how far from the contour an edge is expected in each round. 5 % of a phalanx are 2 px; halved as the solution
-gets better, as in a tracker's passes."""
+"""px: how far from the contour an edge is expected at most, in each of three solutions. 5 % of a phalanx are 2 px. Each
+solution has the surface of the hand file that the one before led to: two phalanges meet with one radius, to which the
+first surface is an approximation."""
+
+EDGE_BIAS_PX = 0.12
+"""px: by how much the edges along a phalanx are off in all images alike, before a learnt background: rms over the sides
+of drawn hands. More key frames do not lessen it."""
 
 _DIGITS = 4  # of mm
 _STEPS, _LEAST_GAIN = 20, 1e-2  # of a cost in which one standard deviation costs 1
@@ -75,7 +76,7 @@ def adapt(base: HandAnatomy, key_frames: Sequence[KeyFrame],
     states = [one.state for one in key_frames]
     found: _Iterate | None = None
     for number, sd_px in enumerate(EDGE_SD_PX):
-        progress(number / ROUNDS)
+        progress(number / len(EDGE_SD_PX))
         problem = _Problem(shapes, shape, [[_expected(frame, sd_px, shapes, shape) for frame in one.frames]
                                            for one in key_frames])
         found, _ = minimise(_Iterate(problem, np.zeros(FOREARM_TURN), states), _STEPS, _LEAST_GAIN)
@@ -84,6 +85,9 @@ def adapt(base: HandAnatomy, key_frames: Sequence[KeyFrame],
         states = found.states
     assert found is not None
     covariance = np.asarray(np.linalg.inv(found.reduced(0.0)[0]))
+    scale = float(np.median(np.concatenate([frame.points.scale for one in key_frames for frame in one.frames])))
+    own = range(RADIUS, RADIUS + 15)
+    covariance[own, own] += (EDGE_BIAS_PX / scale / shapes.model(shape).radii.ravel()) ** 2
     length_sd, radius_sd = phalanx_sd(covariance)
     hand = _with_sd(shapes.anatomy(shape), length_sd.reshape(5, 3), radius_sd.reshape(5, 3))
     return Adapted(hand, length_sd, radius_sd, np.array(states), shape, covariance)

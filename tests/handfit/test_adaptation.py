@@ -93,6 +93,7 @@ def test_a_wrong_hand_file_is_mended_by_ten_poses() -> None:
     assert rms(errors(found.hand, "bones_mm")) < 0.045 < rms(errors(believed, "bones_mm"))
     # as certain as it says
     assert np.mean((errors(found.hand, "bones_mm") / found.length_sd) ** 2) < 3.0
+    assert np.mean((errors(found.hand, "radii_mm") / found.radius_sd) ** 2) < 3.0
     thumb = found.hand.fingers["thumb"]
     assert thumb.bones_sd_mm is not None
     assert thumb.bones_sd_mm[1] == pytest.approx(found.length_sd[1] * thumb.bones_mm[1], rel=1e-3)
@@ -103,7 +104,7 @@ def test_key_frames_foretell_how_certain_the_hand_will_be() -> None:
     foretold = phalanx_sd(key_frames.covariance)
     found = adapt(tracked()[0], key_frames.kept)
     assert rms(foretold[0]) == pytest.approx(rms(found.length_sd), rel=0.3)
-    assert rms(foretold[1]) == pytest.approx(rms(found.radius_sd), rel=0.3)
+    assert 0.5 * rms(found.radius_sd) < rms(foretold[1]) < rms(found.radius_sd)  # edges err alike in all of them
     assert key_frames.tell_enough
     assert not KeyFrames(build_model(right_hand())).tell_enough
 

@@ -32,7 +32,8 @@ class RefiningAsker(FakeRigAsker):
     answer: dict
 
     def command(self, name, timeout_s=5.0, **arguments):
-        return self.answer if name in ("refined", "adapted") else super().command(name, timeout_s=timeout_s, **arguments)
+        known = name in ("refined", "adapted")
+        return self.answer if known else super().command(name, timeout_s=timeout_s, **arguments)
 
 
 def answer_of(rig, *, grade=Grade.GOOD, stale=True):
