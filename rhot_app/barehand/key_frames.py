@@ -46,13 +46,13 @@ _PALM_INFORMATION = 1e-3  # 1/m^2 and 1/rad^2, as good as nothing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeyFrame:
-    """The edges of all cameras at `t_s`, about a hand in `state` (n,). `told` (FOREARM_TURN, FOREARM_TURN): its
-    information on the shape."""
+    """The edges of all cameras at `t_s`, about a hand in `state` (n,). `information`
+    (FOREARM_TURN, FOREARM_TURN): on the shape."""
 
     t_s: float
     state: Array
     frames: tuple[ContourFrame, ...]
-    told: Array
+    information: Array
 
 
 def normal_equations(frames: Sequence[ContourFrame], state: Array, model: HandModel) -> tuple[Array, Array, float]:
@@ -106,17 +106,17 @@ class KeyFrames:
             return
         self._last_s = knot.t_s
         try:
-            told = marginal(normal_equations(frames, knot.state, self._model)[0])
+            information = marginal(normal_equations(frames, knot.state, self._model)[0])
         except np.linalg.LinAlgError:
             return
-        self.kept.append(KeyFrame(knot.t_s, knot.state.copy(), frames, told))
+        self.kept.append(KeyFrame(knot.t_s, knot.state.copy(), frames, information))
         if len(self.kept) > KEPT:
             total = self._information
-            left = np.linalg.slogdet(total - np.array([one.told for one in self.kept]))[1]
+            left = np.linalg.slogdet(total - np.array([one.information for one in self.kept]))[1]
             del self.kept[int(np.argmax(left))]
 
     @property
-    def tell_enough(self) -> bool:
+    def sufficient(self) -> bool:
         """Whether a solution would be more certain of the phalanges, rms, than a hand file that is not this person's.
         """
         return all(float(np.sqrt(np.mean(sd**2))) < most
@@ -124,7 +124,7 @@ class KeyFrames:
 
     @property
     def _information(self) -> Array:
-        return np.asarray(self._prior + sum(one.told for one in list(self.kept)))
+        return np.asarray(self._prior + sum(one.information for one in list(self.kept)))
 
     @property
     def covariance(self) -> Array:

@@ -152,7 +152,7 @@ class HandWatch:
 def _kept(tracker: Tracker) -> list[KeyFrame]:
     """The tracker's key frames, none while they tell too little."""
     found = tracker.key_frames if isinstance(tracker, KeepsKeyFrames) else None
-    return list(found.kept) if found is not None and found.tell_enough else []
+    return list(found.kept) if found is not None and found.sufficient else []
 
 
 def _stated(hand: HandAnatomy) -> tuple[float, float, float] | None:

@@ -133,7 +133,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
 
 def adapted_hand(run: HandFollower, base: HandAnatomy) -> Adapted:
     """The hand `base` adapted to the one that was tracked. Raises TrackingError where too little was seen of it."""
-    if not run.key_frames.tell_enough:
+    if not run.key_frames.sufficient:
         raise TrackingError("The hand was not adapted: the videos tell too little of its lengths. Show it from all "
                             "sides, and bend and spread every finger; a hand that is hardly tracked tells nothing.")
     return adapt(base, run.key_frames.kept)

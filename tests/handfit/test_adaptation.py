@@ -1,4 +1,4 @@
-"""A hand file that is adapted to a tracked bare hand: what is kept, what is told, and what becomes of the file."""
+"""A hand file that is adapted to a tracked bare hand: what is kept, what is information, and what becomes of the file."""
 
 from __future__ import annotations
 
@@ -105,8 +105,8 @@ def test_key_frames_foretell_how_certain_the_hand_will_be() -> None:
     found = adapt(tracked()[0], key_frames.kept)
     assert rms(foretold[0]) == pytest.approx(rms(found.length_sd), rel=0.3)
     assert 0.5 * rms(found.radius_sd) < rms(foretold[1]) < rms(found.radius_sd)  # edges err alike in all of them
-    assert key_frames.tell_enough
-    assert not KeyFrames(build_model(right_hand())).tell_enough
+    assert key_frames.sufficient
+    assert not KeyFrames(build_model(right_hand())).sufficient
 
 
 def test_what_tells_least_goes_first() -> None:
