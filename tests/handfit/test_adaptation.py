@@ -1,4 +1,4 @@
-"""A hand file that is adapted to a tracked bare hand: what is kept, what is information, and what becomes of the file."""
+"""A hand file that is adapted to a tracked bare hand: key frames, what they determine, and what becomes of it."""
 
 from __future__ import annotations
 
