@@ -69,6 +69,7 @@ SECTIONS = {
     "bare-hand": Section("python benchmarks/bare_hand.py --only feature,matched --seeds 2 --frames 30", 3.0),
     "thesis-speeds": Section("python benchmarks/thesis_speeds.py --seeds 2", 20.0),
     "contour-offsets": Section("python benchmarks/contour_offsets.py", 3.0),
+    "hand-adaptation": Section("python benchmarks/hand_adaptation.py", 15.0),
     "mouse": Section("python benchmarks/mouse.py", 30.0),
     "alignment": Section("python benchmarks/alignment.py", 1.0),
     "contact": Section("python benchmarks/contact.py", 0.2),

@@ -1,17 +1,19 @@
-"""Earlier versions of a rig file: kept when a calibration is accepted, so that what was there can be brought back.
+"""Earlier versions of a rig or hand file: kept when another is accepted, so that what was there can be brought back.
 
-They lie beside the rig in ``NAME.history/``, one whole rig file per version, oldest first by name.
+They lie beside the file in ``NAME.history/``, one whole file per version, oldest first by name.
 """
 
 from __future__ import annotations
 
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from rhot_app.errors import RigError
+from rhot_app.hand.anatomy import HandAnatomy, load_hand, save_hand
 from rhot_app.project import Rig, load_rig, save_rig
 from rhot_node.files import require_replaceable
 
@@ -36,15 +38,24 @@ def accept(path: Path, rig: Rig, reason: str) -> Version | None:
     Returns the kept version, None when `path` did not exist or already said the same. Raises RigError when the folder
     cannot be written; the rig file is then as it was.
     """
+    return _accept(path, reason, lambda: load_rig(path) == rig, lambda: save_rig(path, rig))
+
+
+def accept_hand(path: Path, hand: HandAnatomy, reason: str) -> Version | None:
+    """The same of a hand file."""
+    return _accept(path, reason, lambda: load_hand(path) == hand, lambda: save_hand(path, hand))
+
+
+def _accept(path: Path, reason: str, same: Callable[[], bool], save: Callable[[], None]) -> Version | None:
     try:
         require_replaceable(path)
         if not path.exists():
-            save_rig(path, rig)
+            save()
             return None
-        if _same(path, rig):
+        if _holds(same):
             return None
         kept = _keep(path, reason)
-        save_rig(path, rig)
+        save()
     except OSError as exc:
         raise RigError(f"{path}: cannot be written ({exc.strerror}); nothing was changed.") from exc
     return kept
@@ -80,9 +91,9 @@ def _folder(path: Path) -> Path:
     return path.with_name(f"{path.name}.history")
 
 
-def _same(path: Path, rig: Rig) -> bool:
+def _holds(same: Callable[[], bool]) -> bool:
     try:
-        return load_rig(path) == rig
+        return same()
     except RigError:
         return False  # what a person broke by hand is worth keeping too
 

@@ -41,6 +41,9 @@ STEP_M = 4e-3
 BESIDE_M = 1e-3
 """m: distance outside of the capsule at which a ray tests what is behind a contour."""
 
+GRAZE_M = 1e-4
+"""m: the same, for a neighbouring phalanx that hides a contour and stands out by less than BESIDE_M beyond it."""
+
 JUMP_M = 6e-3
 """m: a smaller step in depth is none: flesh fills it."""
 
@@ -210,8 +213,10 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
                 if not (_MARGIN_PX < pixel[0] < width - 1 - _MARGIN_PX
                         and _MARGIN_PX < pixel[1] < height - 1 - _MARGIN_PX):
                     continue
-                behind = link_behind(surface, centres, radii, o, px, py, pz, n)
+                behind = link_behind(surface, centres, radii, o, px, py, pz, n, BESIDE_M)
                 if behind < 0 or used == ints.shape[0]:
+                    continue
+                if link_behind(surface, centres, radii, o, px, py, pz, n, GRAZE_M) < 0:
                     continue
                 far = math.sqrt((px - o[0]) ** 2 + (py - o[1]) ** 2 + (pz - o[2]) ** 2)
                 if not straight:
@@ -253,9 +258,10 @@ def _square_to(u, e1, e2):
 
 
 @njit(cache=True)
-def link_behind(surface, centres, radii, o, px, py, pz, n):
-    """What a camera sees beside a contour point: SILHOUETTE, INNER, or -1 where the point is hidden or no edge."""
-    px, py, pz = px + BESIDE_M * n[0], py + BESIDE_M * n[1], pz + BESIDE_M * n[2]
+def link_behind(surface, centres, radii, o, px, py, pz, n, beside):
+    """What a camera sees `beside` m outside of a contour point: SILHOUETTE, INNER, or -1 where the point is hidden or
+    no edge."""
+    px, py, pz = px + beside * n[0], py + beside * n[1], pz + beside * n[2]
     ux, uy, uz = px - o[0], py - o[1], pz - o[2]
     far = math.sqrt(ux * ux + uy * uy + uz * uz)
     ux, uy, uz = ux / far, uy / far, uz / far

@@ -15,6 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import (
+    BESIDE_M,
     END_BALL,
     ContourPoints,
     camera_centre,
@@ -85,7 +86,7 @@ def _features(surface, state, size, pose, intrinsics, width, height, ints, float
                 continue
             if not (0.0 < pixel[0] < width - 1.0 and 0.0 < pixel[1] < height - 1.0):
                 continue
-            behind = link_behind(surface, centres, radii, o, u[0], u[1], u[2], n)
+            behind = link_behind(surface, centres, radii, o, u[0], u[1], u[2], n, BESIDE_M)
             if behind < 0:
                 continue
             for i in range(3):

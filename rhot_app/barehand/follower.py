@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
@@ -41,6 +42,7 @@ class HandFollower:
         """`foreground`: of each camera; None: the colours of skin are learnt while the hand is looked for.
         `empty_until_ns`: no hand is looked for before."""
         self.tracker = BareHandTracker(rig, known_size=known_size, foreground=foreground)
+        self.key_frames = KeyFrames(self.tracker.model)
         self.starts = 0
         self.step_s: list[float] = []
         self._skin, self._empty_until_ns = foreground is None, empty_until_ns
@@ -82,6 +84,7 @@ class HandFollower:
             return self._none(min(t_ns), begun)
         if following:
             self.step_s.append(time.perf_counter() - begun)
+            self.key_frames.offer(self.tracker)
         else:
             self.starts += 1
             self._proposed = None

@@ -26,6 +26,7 @@ from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
 from rhot_app.estimation.residual import Residual
 from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import build_model
 from rhot_app.hand.motion.hand_process import (
     ACCELERATION,
@@ -38,7 +39,7 @@ from rhot_app.hand.motion.hand_process import (
     VELOCITY,
     HandProcess,
 )
-from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, HandPose
+from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS, JOINT_SLICES, HandPose
 from rhot_app.project import Rig
 from rhot_app.state import (
     INFERRED_M,
@@ -132,7 +133,8 @@ class BareHandTracker:
     def __init__(self, rig: Rig, *, mode: Literal["contour", "feature"] = "contour", known_size: bool = True,
                  foreground: Sequence[Foreground] | None = None, row_s: Sequence[float] | None = None) -> None:
         """`mode`: slices across the visible contour, or across the links' axes (`features`). `known_size`:
-        the hand is as the rig's hand file says; otherwise its size is estimated from there. `foreground`: what each
+        the hand is as the rig's hand file says, to the standard deviations there; otherwise its size is estimated from
+        there. `foreground`: what each
         camera's node has learnt of hand and background; nothing by default. `row_s`: each camera's time between two
         rows, s; 0 by default."""
         self.mode = mode
@@ -144,8 +146,9 @@ class BareHandTracker:
         self.row_s = [0.0] * len(self.cameras) if row_s is None else list(row_s)
         self.foreground = list(foreground) if foreground else [no_foreground() for _ in self.cameras]
         prior = self.model.pose_prior
-        size = (0.0, 0.0, SIZE_SD[2]) if known_size else SIZE_SD
-        phalanges = np.repeat((MEASURED_SD if known_size else LENGTH_SD, RADIUS_SD), 15)
+        stated = _stated_sd(rig.hand) if known_size else None
+        size = SIZE_SD if not known_size else (0.0, 0.0, SIZE_SD[2] if stated is None else 0.0)
+        phalanges = np.repeat((MEASURED_SD if known_size else LENGTH_SD, RADIUS_SD), 15) if stated is None else stated
         spread = np.concatenate([size, phalanges, FOREARM_SD]).reshape(-1, 3)
         self.shape_covariance = np.square(spread)[:, :, None] * np.eye(3)
         self.shape_s = np.append(np.full(len(spread) - 1, SHAPE_S), TURN_S)
@@ -392,3 +395,15 @@ class BareHandTracker:
                 "joint_velocity_sd": motion[0], "joint_acceleration_sd": motion[1],
                 "hand_scale": float(np.exp(state[BIAS])), "hand_scale_sd": float(deviation[MOTION])},
             latency_s={"filter": time.perf_counter() - begun})
+
+
+def _stated_sd(hand: HandAnatomy) -> Array | None:
+    """(30,) relative standard deviations of lengths and radii that a hand file states; None where it does not."""
+    found = []
+    for field in ("bones", "radii"):
+        for name in FINGERS:
+            sd = getattr(hand.fingers[name], f"{field}_sd_mm")
+            if sd is None:
+                return None
+            found += [one / value for one, value in zip(sd, getattr(hand.fingers[name], f"{field}_mm"), strict=True)]
+    return np.array(found)

@@ -217,6 +217,11 @@ class Engine:
         with self._lock:
             return self._observer.rig_watch.refined(self.rig)
 
+    def adapted(self) -> dict[str, Any]:
+        """What a bare hand that moves says of its shape (`HandWatch.adapted`)."""
+        with self._lock:
+            return self._observer.hand_watch.adapted(self._pipeline.work.tracker, time.monotonic_ns())
+
     def close(self) -> None:
         """Stop the nodes, finish the log, close all ports. May be called twice."""
         with self._lock:

@@ -14,7 +14,7 @@ from rhot_app.calibration.verdict import Grade
 from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice
 from rhot_app.engine.node_meter import NodeMeter, most_urgent_first
 from rhot_app.engine.pipeline import Pipeline
-from rhot_app.engine.rig_watch import RigWatch
+from rhot_app.engine.rig_watch import HandWatch, RigWatch
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus
 from rhot_app.project import Rig
 from rhot_app.recording.recorder import Recorder
@@ -45,13 +45,14 @@ class Observer:
         self._summarised_ns = 0
         self._ever_tracked = False
         self._health = HealthWatch(rig)
-        self.rig_watch = RigWatch(rig)
+        self.rig_watch, self.hand_watch = RigWatch(rig), HandWatch(rig)
 
     def restart(self) -> None:
         """A new run begins."""
         self._ever_tracked = False
         self._health.restart()
         self.rig_watch.restart()
+        self.hand_watch.restart()
 
     def status(self, rig_path: str, session: int, running: bool, recorder: Recorder | None,
                message: NodeMessage, extra: list[Advice],
@@ -96,6 +97,7 @@ class Observer:
             self.rig_watch.take(self._pipeline.recent)
             stale = self.rig_watch.advice(now_ns)
             health = self._health.advice(self._pipeline.last_state, self._pipeline.work.tracker, now_ns)
+            found += self.hand_watch.advice(self._pipeline.work.tracker, now_ns)
             found += [*stale, *(one for one in health if not (stale and one.mender == "stereo"))]
         if self._pipeline.failure:
             found.append(Advice("error", self._pipeline.failure))

@@ -1,4 +1,4 @@
-"""Refines the rig beside a running pipeline, outside the frames' own thread, and says when its calibration is stale.
+"""Refines the rig and adapts the hand beside a running pipeline, outside the frames' own thread.
 
 Costs 2 ms of processor time per second of 80 frames for what is kept of them, and 20 ms every ten seconds in a
 thread of its own (`benchmarks/self_calibration.py`).
@@ -12,7 +12,11 @@ from typing import Any
 
 import msgspec
 
+from rhot_app.barehand.key_frames import KeyFrame
+from rhot_app.calibration.verdict import Finding, Grade, judge
 from rhot_app.engine.status import Advice
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.handfit.adaptation import Adapted, adapt
 from rhot_app.project import Rig
 from rhot_app.tracking.refinement.refined_rig import (
     Refinement,
@@ -23,12 +27,15 @@ from rhot_app.tracking.refinement.refined_rig import (
     verdict_of,
 )
 from rhot_app.tracking.refinement.rig_refinement import Gathered, RigRefiner
-from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.tracker import CameraObservations, KeepsKeyFrames, Tracker
 
 JUDGE_NS = 10_000_000_000
 
 MENDER = "refined"
 """The wizard that shows and uses what was refined."""
+
+HAND_MENDER = "adapted"
+"""The wizard that shows and uses the adapted hand."""
 
 
 class RigWatch:
@@ -88,3 +95,77 @@ class RigWatch:
         found = self._refiner.refine(gathered)
         if run == self._run:
             self._newest = found
+
+
+class HandWatch:
+    """Says when a bare hand has shown enough of its shape, and adapts the hand's file to it on demand, in a thread: a
+    second of processor time."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._newest: Adapted | None = None
+        self._judged_ns = self._solved_ns = -JUDGE_NS
+        self._enough = False
+        self._thread: threading.Thread | None = None
+
+    def restart(self) -> None:
+        """A new run begins."""
+        self._newest, self._enough = None, False
+
+    def advice(self, tracker: Tracker, now_ns: int) -> list[Advice]:
+        """Judge anew every ten seconds. A hand file that states how well it is known is not offered again."""
+        if now_ns - self._judged_ns >= JUDGE_NS:
+            self._judged_ns = now_ns
+            self._enough = _stated(self._rig.hand) is None and bool(_kept(tracker))
+        sentence = "The bare hand has shown how long and how thick its fingers are: its file can be adapted to it."
+        return [Advice("info", sentence, HAND_MENDER)] if self._enough else []
+
+    def wait(self, timeout_s: float | None = None) -> None:
+        """Until what is being solved is solved."""
+        if self._thread is not None:
+            self._thread.join(timeout_s)
+
+    def adapted(self, tracker: Tracker, now_ns: int) -> dict[str, Any]:
+        """The answer to the command `adapted`: `known`, whether there is a solution yet; the verdict's fields; `rows`
+        of (what, before, after); `document`, the rig with the adapted hand. Solved anew every ten seconds."""
+        kept = _kept(tracker)
+        if kept and now_ns - self._solved_ns >= JUDGE_NS and (self._thread is None or not self._thread.is_alive()):
+            self._solved_ns = now_ns
+            self._thread = threading.Thread(target=self._solve, args=(kept,), name="adapting the hand", daemon=True)
+            self._thread.start()
+        found = self._newest
+        if found is None:
+            return {"known": False}
+        change = found.document()
+        verdict = judge(f"by {len(found.states)} poses; lengths are known to {change['lengths_sd_percent']:.1f} %, "
+                        f"radii to {change['radii_sd_percent']:.1f} %.",
+                        [Finding("adapted", Grade.GOOD,
+                                 f"Lengths change by {change['lengths_percent']:.1f} %, radii by "
+                                 f"{change['radii_percent']:.1f} %, rms.")])
+        return {"known": True, **verdict.to_json(), "rows": _hand_rows(self._rig.hand, found.hand),
+                "document": msgspec.to_builtins(msgspec.structs.replace(self._rig, hand=found.hand))}
+
+    def _solve(self, kept: list[KeyFrame]) -> None:
+        self._newest = adapt(self._rig.hand, kept)
+
+
+def _kept(tracker: Tracker) -> list[KeyFrame]:
+    """The tracker's key frames, none while they tell too little."""
+    found = tracker.key_frames if isinstance(tracker, KeepsKeyFrames) else None
+    return list(found.kept) if found is not None and found.sufficient else []
+
+
+def _stated(hand: HandAnatomy) -> tuple[float, float, float] | None:
+    return next(iter(hand.fingers.values())).bones_sd_mm
+
+
+def _hand_rows(before: HandAnatomy, after: HandAnatomy) -> list[tuple[str, str, str]]:
+    """Lengths and radii of each finger, mm, and how well they are known."""
+    rows = []
+    for name, new in after.fingers.items():
+        old = before.fingers[name]
+        for what, values, then, sd in (("bones", old.bones_mm, new.bones_mm, new.bones_sd_mm),
+                                       ("radii", old.radii_mm, new.radii_mm, new.radii_sd_mm)):
+            shown = ", ".join(f"{value:.1f} ± {one:.1f}" for value, one in zip(then, sd or (), strict=True))
+            rows.append((f"{name} {what}", ", ".join(f"{value:.1f}" for value in values) + " mm", f"{shown} mm"))
+    return rows

@@ -15,16 +15,20 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.follower import HandFollower
 from rhot_app.barehand.overlay import overlay
-from rhot_app.errors import ExportError, RecordingError
+from rhot_app.errors import ExportError, RecordingError, TrackingError
 from rhot_app.export.export import check_place, format_of, make_writer, whole_file
 from rhot_app.export.pictures import check_pictures, whole_pictures
 from rhot_app.export.plan import Plan
 from rhot_app.export.states import BLOCK, states_of
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.handfit.adaptation import REASON, Adapted, adapt
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
+from rhot_app.rig_history import accept_hand
 from rhot_app.sources.frame_sets import CameraVideo, FrameSet, frame_sets, frames_left_out, overlap
 from rhot_app.state import HandState
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
+from rhot_node.files import require_replaceable, why
 
 Image = NDArray[np.uint8]
 
@@ -39,7 +43,8 @@ _TEXT_RGB: Final = (255, 255, 255)
 class BareHandSummary:
     """What came of a run. `frame_sets`: states, one after every set of frames; `tracked` of them show the hand;
     `starts`: how often it was found; `lost`: intervals without a hand, s from the first state. `step_s` (K,): times
-    that the tracked steps took. `left_out`: frames outside the time that all videos show."""
+    that the tracked steps took. `left_out`: frames outside the time that all videos show. `adapted`: the hand that was
+    written, None where none was asked for."""
 
     frame_sets: int
     tracked: int
@@ -47,6 +52,7 @@ class BareHandSummary:
     lost: tuple[tuple[float, float], ...]
     step_s: NDArray[np.float64]
     left_out: int
+    adapted: Adapted | None = None
 
     def document(self) -> dict[str, Any]:
         """The same for JSON."""
@@ -55,7 +61,8 @@ class BareHandSummary:
                 "rate_hz": None if not steps[0] else 1.0 / steps[0],
                 "step_p50_ms": None if steps[0] is None else 1e3 * steps[0],
                 "step_p99_ms": None if steps[1] is None else 1e3 * steps[1],
-                "lost_s": [list(one) for one in self.lost], "frames_left_out": self.left_out}
+                "lost_s": [list(one) for one in self.lost], "frames_left_out": self.left_out,
+                "adapted": None if self.adapted is None else self.adapted.document()}
 
 
 def learn_backgrounds(videos: Sequence[CameraVideo], seconds: float | None = None) -> list[Foreground]:
@@ -79,18 +86,26 @@ def learn_backgrounds(videos: Sequence[CameraVideo], seconds: float | None = Non
 
 def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[Foreground] | None, *,
                  known_size: bool = True, empty_s: float = 0.0, out: Path | None = None, pictures: Path | None = None,
-                 again: bool = False, progress: Progress = silent) -> BareHandSummary:
+                 again: bool = False, hand_file: Path | None = None, progress: Progress = silent) -> BareHandSummary:
     """Track the bare hand of `rig`, whose nodes are the videos' cameras in their order.
 
     `foreground`: as learnt of each camera's background, or None. `empty_s`: so long no hand is looked for. `out`: a
     table of the states (docs/export.md). `pictures`: an .avi or .mp4 file, or a folder of PNG files, with what was
-    found. Files appear when they are whole. Raises RecordingError, ExportError, TrackingError.
+    found. `hand_file`: where the rig's hand, adapted to this one, is written; what was there is kept beside it. Files
+    appear when they are whole. Raises RecordingError, ExportError, TrackingError.
     """
     for video in videos:
         if out is not None:
             check_table(video.path, out, again)
         if pictures is not None:
             check_pictures(video.path, pictures, again)
+    if hand_file is not None:
+        try:
+            require_replaceable(hand_file)
+        except OSError as exc:
+            raise ExportError(f"--adapt {hand_file}: cannot be written ({why(exc)}).") from exc
+        if not hand_file.absolute().parent.is_dir():
+            raise ExportError(f"--adapt {hand_file}: the folder {hand_file.parent} does not exist; create it first.")
     first, last = overlap(videos)
     run = HandFollower(rig, foreground, known_size=known_size,
                        empty_until_ns=first + round(1e9 * empty_s) if empty_s else first)
@@ -109,8 +124,19 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
                 drawn.add(side_by_side(run, frames, state))
         if table is not None:
             table.finish()
+    adapted = None if hand_file is None else adapted_hand(run, rig.hand)
+    if hand_file is not None and adapted is not None:
+        accept_hand(hand_file, adapted.hand, REASON)
     return BareHandSummary(len(spent), sum(tracked for _, tracked in spent), run.starts, lost_intervals(spent),
-                           np.array(run.step_s), frames_left_out(videos))
+                           np.array(run.step_s), frames_left_out(videos), adapted)
+
+
+def adapted_hand(run: HandFollower, base: HandAnatomy) -> Adapted:
+    """The hand `base` adapted to the one that was tracked. Raises TrackingError where too little was seen of it."""
+    if not run.key_frames.sufficient:
+        raise TrackingError("The hand was not adapted: the videos tell too little of its lengths. Show it from all "
+                            "sides, and bend and spread every finger; a hand that is hardly tracked tells nothing.")
+    return adapt(base, run.key_frames.kept)
 
 
 def lost_intervals(spent: Sequence[tuple[int, bool]]) -> tuple[tuple[float, float], ...]:

@@ -34,6 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the states as .csv, .parquet or .npz")
     parser.add_argument("--overlay", type=Path, metavar="PLACE",
                         help="draw what was found: a film (.avi, .mp4), or a new folder for PNG files")
+    parser.add_argument("--adapt", type=Path, metavar="FILE",
+                        help="adapt the rig's hand to the one in the videos and write it as a hand file; what FILE was "
+                             "before is kept in FILE.history")
     parser.add_argument("--again", action="store_true", help="write over files that exist")
     parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
 
@@ -71,9 +74,10 @@ def run(args: argparse.Namespace) -> int:
     announce_compilation()
     line = ProgressLine("tracking")
     summary = track_videos(rig, videos, foreground, known_size=not args.unknown_size, empty_s=empty_s, out=args.out,
-                           pictures=args.overlay, again=args.again, progress=line.report)
+                           pictures=args.overlay, again=args.again, hand_file=args.adapt, progress=line.report)
     line.finish()
-    document = summary.document() | {"out": args.out and str(args.out), "overlay": args.overlay and str(args.overlay)}
+    document = summary.document() | {"out": args.out and str(args.out), "overlay": args.overlay and str(args.overlay),
+                                     "hand_file": args.adapt and str(args.adapt)}
     print(json.dumps(document) if args.json else "\n".join(sentences(document)))
     return 0
 
@@ -124,5 +128,10 @@ def sentences(document: dict[str, Any]) -> list[str]:
     if document["lost_s"] and tracked:
         intervals = ", ".join(f"{begin:.2f} to {end:.2f}" for begin, end in document["lost_s"] if not math.isnan(end))
         out.append(f"No hand at {intervals} s.")
-    out += [f"Written: {document[key]}" for key in ("out", "overlay") if document[key]]
+    if document["adapted"]:
+        one = document["adapted"]
+        out.append(f"Hand adapted by {one['key_frames']} key frames: lengths by {one['lengths_percent']:.1f} ± "
+                   f"{one['lengths_sd_percent']:.1f} %, radii by {one['radii_percent']:.1f} ± "
+                   f"{one['radii_sd_percent']:.1f} % (rms).")
+    out += [f"Written: {document[key]}" for key in ("out", "overlay", "hand_file") if document[key]]
     return out

@@ -67,7 +67,7 @@ Place = Annotated[float, Meta(ge=-400, le=400)]
 LimitDeg = tuple[Degrees, Degrees]
 
 
-class FingerAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class FingerAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """One finger. Its base joint (MCP; the thumb's CMC) sits at `base_mm` in the palm frame of a right hand.
 
     `base_rotation_deg` are the angles (about z, then y, then x; intrinsic) that turn the palm frame into the
@@ -76,6 +76,7 @@ class FingerAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     end of the soft tip. `radii_mm`: of the three segments. `limits_deg`: (low, high) for the finger's angles in the
     order of `skeleton.ANGLES`: five for the thumb, four for the others.
     `marker_mm`: distance of the painted marker's centre from the last joint, along the distal bone.
+    `bones_sd_mm`, `radii_sd_mm`: their standard deviations where they were estimated, else None.
     """
 
     base_mm: tuple[Place, Place, Place]
@@ -84,6 +85,8 @@ class FingerAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     limits_deg: tuple[LimitDeg, ...]
     marker_mm: Millimetres
     base_rotation_deg: tuple[Degrees, Degrees, Degrees] = (0.0, 0.0, 0.0)
+    bones_sd_mm: tuple[Millimetres, Millimetres, Millimetres] | None = None
+    radii_sd_mm: tuple[Millimetres, Millimetres, Millimetres] | None = None
 
 
 class HandAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -77,7 +77,8 @@ def _resized(finger: FingerAnatomy, factor: float, palm: float, bones: list[floa
     radii = [_mm(factor * radius) for radius in finger.radii_mm]
     return msgspec.structs.replace(
         finger, base_mm=(_mm(palm * x), _mm(factor * y), _mm(factor * z)), bones_mm=(first, second, last),
-        radii_mm=(radii[0], radii[1], radii[2]), marker_mm=min(_mm(last * finger.marker_mm / finger.bones_mm[2]), last))
+        radii_mm=(radii[0], radii[1], radii[2]), marker_mm=min(_mm(last * finger.marker_mm / finger.bones_mm[2]), last),
+        bones_sd_mm=None, radii_sd_mm=None)
 
 
 def _with_palm(anatomy: HandAnatomy, fingers: dict[str, FingerAnatomy], factor: float) -> HandAnatomy:

@@ -59,7 +59,8 @@ def anatomy_of(base: HandAnatomy, shape: Array) -> HandAnatomy:
         radii = np.array(old.radii_mm) * whole * thick * np.exp(shape[RADIUS:FOREARM_RADIUS][own])
         place = (np.array(old.base_mm) + 1e3 * shape[ROOTS:][own]) * whole
         fingers[name] = msgspec.structs.replace(
-            old, base_mm=_three(place), bones_mm=_three(bones), radii_mm=_three(radii),
+            old, base_mm=_three(place), bones_mm=_three(bones), radii_mm=_three(radii), bones_sd_mm=None,
+            radii_sd_mm=None,
             marker_mm=min(round(float(old.marker_mm * bones[2] / old.bones_mm[2]), _DIGITS), _three(bones)[2]))
     flat = base.wrist_thickness_mm * whole * np.exp(shape[FOREARM_RADIUS])
     side = max(base.wrist_breadth_mm - base.wrist_thickness_mm, 0.0) * whole

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import ImageFrame, SliceRequest
 from rhot_app.estimation.filter import AHEAD_S, FilteredState, smooth
 from rhot_app.geometry.camera import CameraModel
@@ -27,7 +28,7 @@ from rhot_app.objects.track import LOST_AFTER_NS, PREDICTED_AFTER_NS, ObjectTrac
 from rhot_app.project import Rig
 from rhot_app.state import HandState, Knowledge, SeenContour
 from rhot_app.tracking.markers.marker_model import scaled_table
-from rhot_app.tracking.tracker import CameraObservations, ImageTracking, ShowsContours, Tracker
+from rhot_app.tracking.tracker import CameraObservations, ImageTracking, KeepsKeyFrames, ShowsContours, Tracker
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -148,6 +149,11 @@ class WithObjects:
     def seen(self) -> list[SeenContour]:
         """What the hand's tracker has seen of a bare hand."""
         return self._hand.seen() if isinstance(self._hand, ShowsContours) else []
+
+    @property
+    def key_frames(self) -> KeyFrames | None:
+        """See `KeepsKeyFrames`."""
+        return self._hand.key_frames if isinstance(self._hand, KeepsKeyFrames) else None
 
     def requests(self) -> list[SliceRequest]:
         """What the nodes shall search for the hand."""

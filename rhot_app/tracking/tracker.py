@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ImageFrame, SliceRequest
 from rhot_app.objects.observations import ObjectFrame
 from rhot_app.state import HandState, SeenContour
@@ -88,6 +89,16 @@ class ShowsContours(Protocol):
 
     def seen(self) -> list[SeenContour]:
         """The newest image of each camera; none while there is no hand. Any thread may ask."""
+        ...
+
+
+@runtime_checkable
+class KeepsKeyFrames(Protocol):
+    """A tracker that keeps what tells most of a bare hand's shape."""
+
+    @property
+    def key_frames(self) -> KeyFrames | None:
+        """The key frames, None while no bare hand is tracked by its contours. Any thread may read them."""
         ...
 
 

@@ -16,7 +16,7 @@ MODELS = ("rhot_app.geometry", "rhot_app.filters", "rhot_app.estimation")
 SOLVERS = ("rhot_app.calibration", "rhot_app.hand", "rhot_app.objects")
 ENGINE_SIDE = ("rhot_app.recording", "rhot_app.sources", "rhot_app.outputs", "rhot_app.simulator")
 BELOW_ENGINE = (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.state", "rhot_app.tracking", "rhot_app.barehand",
-                "rhot_app.articulated", *ENGINE_SIDE)
+                "rhot_app.articulated", "rhot_app.handfit", *ENGINE_SIDE)
 
 MAY_IMPORT: dict[str, tuple[str, ...]] = {
     # the node
@@ -31,7 +31,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.errors": (),
     "rhot_app.progress": (),
     "rhot_app.keys": ("rhot_node",),
-    "rhot_app.rig_history": ("rhot_node", "rhot_app.errors", "rhot_app.project"),
+    "rhot_app.rig_history": ("rhot_node", "rhot_app.errors", "rhot_app.project", "rhot_app.hand.anatomy"),
     "rhot_app.project": ("rhot_node", "resources", "rhot_app.errors", "rhot_app.hand.anatomy",
                          "rhot_app.objects.object_file"),
     "rhot_app.objects.object_file": ("rhot_node", "rhot_app.errors", "rhot_app.geometry.transforms"),
@@ -63,8 +63,8 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.api": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.export"),
     "rhot_app.mouse": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.evaluation"),
     "rhot_app.ui": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.evaluation", "rhot_app.export",
-                    "rhot_app.certificate", "rhot_app.mouse", "rhot_app.handfit"),
-    "rhot_app.warm": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.handfit"),
+                    "rhot_app.certificate", "rhot_app.mouse"),
+    "rhot_app.warm": (*BELOW_ENGINE, "rhot_app.engine"),
     "rhot_app": ("rhot_app",),  # __init__
     "rhot_app.__main__": ("rhot_node", "rhot_app", "resources"),
 }

@@ -247,7 +247,7 @@ def _with_lengths(base: HandAnatomy, lengths_mm: Mapping[str, float]) -> HandAna
         bones = tuple(float(lengths_mm.get(bone_name(finger, k), length)) for k, length in enumerate(old.bones_mm))
         marker = old.marker_mm / old.bones_mm[2] * bones[2]
         fingers[name] = msgspec.structs.replace(old, bones_mm=(bones[0], bones[1], bones[2]),
-                                                marker_mm=round(marker, 2))
+                                                marker_mm=round(marker, 2), bones_sd_mm=None, radii_sd_mm=None)
     return msgspec.structs.replace(base, fingers=fingers)
 
 

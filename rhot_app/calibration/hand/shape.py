@@ -113,7 +113,7 @@ class HandUnknowns:
             fingers[finger] = msgspec.structs.replace(
                 old, base_mm=_numbers(1e3 * shape.roots[k], digits), bones_mm=bones,
                 radii_mm=_numbers(np.array(old.radii_mm) * thicker[k], digits),
-                base_rotation_deg=_numbers(degrees[k], digits),
+                base_rotation_deg=_numbers(degrees[k], digits), bones_sd_mm=None, radii_sd_mm=None,
                 marker_mm=float(np.clip(round(1e3 * along[k], digits), 0.1, bones[2])))
         return msgspec.structs.replace(self._base, fingers=fingers)
 

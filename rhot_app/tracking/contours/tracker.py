@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import STEP_M
+from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
 from rhot_app.barehand.tracker import START_SD, BareHandTracker
 from rhot_app.hand.motion.hand_process import BIAS
@@ -45,6 +46,7 @@ class ContourEstimator:
         self._finder = Finder(self._hand)
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._names = tuple(node.name for node in rig.nodes)
+        self.key_frames = KeyFrames(self._hand.model)
         self._sequence = 0
         self.reset()
 
@@ -56,6 +58,7 @@ class ContourEstimator:
     def _begin_again(self) -> None:
         """Forget what was taken in."""
         self._finder.reset()
+        self.key_frames.clear()
         if self._markers is not None:
             self._markers.reset()
         self._hand.frames, self._hand.cover = [None] * len(self._names), 0.0
@@ -190,6 +193,7 @@ class ContourEstimator:
         self._evidence.take_edges(waiting.values())
         if not self._evidence.confirmed:
             return False
+        self.key_frames.offer(self._hand)
         self._latest = frame
         return True
 
@@ -243,6 +247,7 @@ class ContourEstimator:
         self._hand.start(pose, t_ns)
         self._hand.cover = 0.0
         self._finder.reset()
+        self.key_frames.clear()
         if self._markers is not None:
             self._markers.begin(t_ns)
         self._epoch_ns, self._maps_ns, self._agreed_ns = t_ns, NEVER, NEVER

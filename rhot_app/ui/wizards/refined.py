@@ -5,8 +5,8 @@ from __future__ import annotations
 from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.step import AcceptStep
-from rhot_app.ui.wizards.steps.refined_steps import MoveStep, RefinedFeed, propose
+from rhot_app.ui.wizards.models.step import AcceptStep, Step
+from rhot_app.ui.wizards.steps.refined_steps import EngineFeed, MoveStep, propose
 
 TITLE = "Use refined calibration"
 
@@ -14,7 +14,7 @@ TITLE = "Use refined calibration"
 class MovePage(Page):
     """The pictures stay; the sentence and the verdict are the window's."""
 
-    def __init__(self, step: MoveStep, feed: RefinedFeed) -> None:
+    def __init__(self, step: Step, feed: EngineFeed) -> None:
         super().__init__(step)
         self._feed = feed
         self.column.addStretch(1)
@@ -26,7 +26,7 @@ class MovePage(Page):
 
 def make_plan(kit: Kit) -> Plan:
     """Move, compare, use it."""
-    feed = RefinedFeed(kit.connect)
+    feed = EngineFeed(kit.connect, "refined")
     move = MoveStep(feed)
 
     def proposal() -> Proposal | None:

@@ -1,4 +1,7 @@
-"""The refined calibration in the window: shown before and after, used only when asked, kept with the way back."""
+"""What the engine learns from a moving hand, in the window: the refined calibration and the adapted hand.
+
+Both are shown before and after, used only when asked, and kept with the way back.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +19,10 @@ from rhot_app.project import load_rig, save_rig
 from rhot_app.rig_history import versions
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.status_words import _advice_notice
-from rhot_app.ui.wizards import refined
+from rhot_app.ui.wizards import adapted, refined
 from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD, Kit
 from rhot_app.ui.wizards.framework.window import WizardWindow
+from rhot_app.ui.wizards.steps.adapted_steps import propose as propose_hand
 from rhot_app.ui.wizards.steps.refined_steps import propose
 
 
@@ -28,7 +32,8 @@ class RefiningAsker(FakeRigAsker):
     answer: dict
 
     def command(self, name, timeout_s=5.0, **arguments):
-        return self.answer if name == "refined" else super().command(name, timeout_s=timeout_s, **arguments)
+        known = name in ("refined", "adapted")
+        return self.answer if known else super().command(name, timeout_s=timeout_s, **arguments)
 
 
 def answer_of(rig, *, grade=Grade.GOOD, stale=True):
@@ -39,14 +44,22 @@ def answer_of(rig, *, grade=Grade.GOOD, stale=True):
             "rows": [["rays miss each other by", "1.40 px", "0.02 px"]], "document": msgspec.to_builtins(after)}
 
 
-@pytest.fixture
-def hands(themed, tmp_path):
+def hand_answer(rig):
+    thicker = msgspec.structs.replace(rig.hand.fingers["index"], radii_mm=(9.0, 8.0, 7.0))
+    hand = msgspec.structs.replace(rig.hand, fingers={**rig.hand.fingers, "index": thicker})
+    verdict = judge("by 24 poses.", [Finding("adapted", Grade.GOOD, "Radii change by 2 %.")])
+    return {"known": True, **verdict.to_json(), "rows": [["index radii", "8.5 mm", "9.0 ± 0.2 mm"]],
+            "document": msgspec.to_builtins(msgspec.structs.replace(rig, hand=hand))}
+
+
+@pytest.fixture(params=[refined])
+def hands(themed, tmp_path, request):
     rig, path = synthetic_rig(), tmp_path / "desk.json"
     save_rig(path, rig)
     asker = RefiningAsker(rig)
     asker.answer = {"known": False}
     kit = Kit(rig, path, asker.connect, DARK, FakeMemory(), {})
-    hands = Hands(WizardWindow(refined.make_plan(kit), kit))
+    hands = Hands(WizardWindow(request.param.make_plan(kit), kit))
     hands.path, hands.asker, hands.rig = path, asker, rig
     yield hands
     hands.window.end().wait(5.0)
@@ -89,3 +102,25 @@ def test_only_poses_are_proposed():
 def test_the_engines_sentence_has_the_button():
     notice = _advice_notice(Advice("warning", "The right camera has turned.", "refined"))
     assert notice.action == "Use refined calibration …" and notice.key == f"{OPEN_WIZARD}refined"
+
+
+@pytest.mark.parametrize("hands", [adapted], indirect=True)
+def test_an_adapted_hand_is_used_only_when_asked(hands):
+    assert not hands.window.frame.next_button.isEnabled()
+    hands.asker.answer = hand_answer(hands.rig)
+    hands.until(lambda: hands.window.frame.next_button.isEnabled())
+    hands.next()
+    assert load_rig(hands.path) == hands.rig, "nothing was changed yet"
+    hands.click(hands.window.frame.next_button)
+    hands.until(lambda: hands.window.step.state == "used")
+    assert load_rig(hands.path).hand.fingers["index"].radii_mm == (9.0, 8.0, 7.0)
+    assert [one.replaced_by for one in versions(hands.path)] == ["hand adapted while it was tracked"]
+
+
+def test_only_the_hand_is_proposed():
+    rig = synthetic_rig()
+    edited = msgspec.structs.replace(rig, name="edited since")
+    proposal = propose_hand(hand_answer(rig), edited, None)
+    assert proposal is not None and proposal.rig is not None
+    assert proposal.rig.name == "edited since" and proposal.rig.nodes == rig.nodes and proposal.rig.hand != rig.hand
+    assert propose_hand({"known": False}, rig, None) is None

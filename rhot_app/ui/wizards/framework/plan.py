@@ -97,6 +97,8 @@ WIZARDS: tuple[Wizard, ...] = (
            "colour calibration"),
     Wizard("foreground", "Background and skin", "What the empty scene and your skin look like, so that a bare hand can "
            "be tracked.", "background and skin"),
+    Wizard("adapted", "Adapt the hand's shape", "How long and how thick the fingers are, from a bare hand that moves "
+           "while it is tracked.", "hand adapted while it was tracked"),
     Wizard("time", "Time of the cameras", "When each camera sees, from a hand that waves.", "time calibration"),
     Wizard("depth", "Depth without a board", "Distance from disparity, from a marker at measured distances.",
            "depth calibration"),

@@ -24,12 +24,11 @@ ASK_S = 1.0
 Answer = dict[str, Any]
 
 
-class RefinedFeed:
-    """Asks the engine again and again for its refined calibration. A thread; `start` may be called again, `stop` ends
-    it for good."""
+class EngineFeed:
+    """Asks the engine one `command` again and again. A thread; `start` may be called again, `stop` ends it for good."""
 
-    def __init__(self, connect: Callable[[], Asker]) -> None:
-        self._connect = connect
+    def __init__(self, connect: Callable[[], Asker], command: str) -> None:
+        self._connect, self._command = connect, command
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
         self.answer: Answer = {"known": False}
@@ -38,7 +37,7 @@ class RefinedFeed:
     def start(self) -> None:
         """Begin to ask, unless it does already."""
         if self._thread is None and not self._ending.is_set():
-            self._thread = threading.Thread(target=self._run, name="asking for the refined rig", daemon=True)
+            self._thread = threading.Thread(target=self._run, name=f"asking for {self._command}", daemon=True)
             self._thread.start()
 
     def stop(self, timeout_s: float = 2.0) -> None:
@@ -50,7 +49,7 @@ class RefinedFeed:
     def step(self, asker: Asker) -> None:
         """Ask once; a failure becomes the problem."""
         try:
-            self.answer, self.problem = asker.command("refined"), ""
+            self.answer, self.problem = asker.command(self._command), ""
         except RhotError as exc:
             self.problem = str(exc)
 
@@ -69,7 +68,7 @@ class MoveStep(Step):
 
     title = "Move the hand"
 
-    def __init__(self, feed: RefinedFeed, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, feed: EngineFeed, clock: Callable[[], float] = time.monotonic) -> None:
         self._feed = feed
         self._clock = clock
         self._begun_s = clock()
@@ -104,7 +103,7 @@ def verdict_from(answer: Answer) -> Verdict:
                          for one in answer["findings"])
         return Verdict(answer["verdict"], findings)
     except (KeyError, TypeError, ValueError) as exc:
-        raise EngineError(f"the engine's refined calibration cannot be read ({exc}); is it of another version? Restart "
+        raise EngineError(f"the engine's answer cannot be read ({exc}); is it of another version? Restart "
                           "engine and app.") from exc
 
 

@@ -1,0 +1,142 @@
+"""Key frames of a tracked hand: the few that together tell most of its shape.
+
+A key frame keeps the edges that were found, not the images. What it tells of the shape is what is left when its own
+pose is unknown (Schur complement). So a pose that shows a joint bent counts, and the same pose again hardly does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.barehand.contour_residual import COLUMNS, ContourFrame, JointLimits
+from rhot_app.barehand.contours import STEP_M
+from rhot_app.barehand.surface import FINGERS, FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
+from rhot_app.barehand.tracker import FOREARM_SD, LENGTH_SD, RADIUS_SD, SIZE_SD, BareHandTracker
+from rhot_app.hand.model import HandModel
+from rhot_app.hand.motion.hand_process import ANGLES, BIAS, POSE, VELOCITY
+
+Array = NDArray[np.float64]
+
+KEPT = 48
+"""Key frames (chosen): the standard deviations of lengths fall by a sixth from 20 to 40 of them. A solution takes a
+second."""
+
+APART_S = 0.1
+"""s: frames nearer in time show the same pose: a hand moves within 1/15 s (`hand_process.FASTEST`)."""
+
+TOGETHER = 0.025 / STEP_M
+"""Contour points that count as one observation: where the surface is wrong, it is so along a phalanx, 25 mm."""
+
+SHAPE_SD = np.concatenate([SIZE_SD, np.full(15, LENGTH_SD), np.full(15, RADIUS_SD), FOREARM_SD[:1]])
+"""(FOREARM_TURN,) standard deviations of the shape's numbers in adults, relative to a hand file."""
+
+OWN = np.r_[0:POSE, POSE + FOREARM_TURN:COLUMNS]
+"""A key frame's own numbers, its pose and the forearm's rotation, in a contour's columns."""
+
+SHARED = np.arange(POSE, POSE + FOREARM_TURN)
+"""The shape's numbers there."""
+
+_BEND_SD = np.array(FOREARM_SD[1:])
+_PALM_INFORMATION = 1e-3  # 1/m^2 and 1/rad^2, as good as nothing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeyFrame:
+    """The edges of all cameras at `t_s`, about a hand in `state` (n,). `information`
+    (FOREARM_TURN, FOREARM_TURN): on the shape."""
+
+    t_s: float
+    state: Array
+    frames: tuple[ContourFrame, ...]
+    information: Array
+
+
+def normal_equations(frames: Sequence[ContourFrame], state: Array, model: HandModel) -> tuple[Array, Array, float]:
+    """Information (COLUMNS, COLUMNS), gradient (COLUMNS,) and cost of a key frame's edges and of the priors of its own
+    numbers; nothing of the shape's prior."""
+    information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
+    cost = sum(frame.gather(state, information, pull) for frame in frames) / TOGETHER
+    information = (information + np.tril(information, -1).T) / TOGETHER
+    pull /= TOGETHER
+    angles, prior, bend = slice(6, POSE), model.pose_prior, state[BIAS + FOREARM_TURN:BIAS + SHAPE]
+    away = prior.mean - state[ANGLES:VELOCITY]
+    information[angles, angles] += prior.information
+    pull[angles] += prior.information @ away
+    limits = JointLimits(model.limits).linearise(state)
+    beyond = limits.jacobian[:, :POSE]
+    information[:POSE, :POSE] += beyond.T @ beyond
+    pull[:POSE] += beyond.T @ limits.error
+    information[range(6), range(6)] += _PALM_INFORMATION
+    last = np.arange(COLUMNS - 2, COLUMNS)
+    information[last, last] += 1.0 / _BEND_SD**2
+    pull[last] -= bend / _BEND_SD**2
+    cost += float(away @ prior.information @ away + limits.error @ limits.error + np.sum((bend / _BEND_SD) ** 2))
+    return information, pull, cost
+
+
+def marginal(information: Array) -> Array:
+    """(FOREARM_TURN, FOREARM_TURN) of the shape, the frame's own numbers unknown."""
+    coupled = information[np.ix_(OWN, SHARED)]
+    found = information[np.ix_(SHARED, SHARED)] - coupled.T @ np.linalg.solve(information[np.ix_(OWN, OWN)], coupled)
+    return np.asarray(0.5 * (found + found.T))
+
+
+class KeyFrames:
+    """The key frames of a hand that is tracked with one hand file. One thread."""
+
+    def __init__(self, model: HandModel) -> None:
+        self._model = model
+        self.kept: list[KeyFrame] = []
+        self._last_s = -np.inf
+        self._prior = np.diag(1.0 / SHAPE_SD**2)
+
+    def clear(self) -> None:
+        """Forget all: another hand, or other cameras."""
+        self.kept, self._last_s = [], -np.inf
+
+    def offer(self, tracker: BareHandTracker) -> None:
+        """Keep the tracker's newest frames if they tell more of the shape than one that is kept."""
+        knot = tracker.filter.newest
+        frames = tuple(frame for frame in tracker.frames if frame is not None)
+        if not frames or abs(knot.t_s - self._last_s) < APART_S:
+            return
+        self._last_s = knot.t_s
+        try:
+            information = marginal(normal_equations(frames, knot.state, self._model)[0])
+        except np.linalg.LinAlgError:
+            return
+        self.kept.append(KeyFrame(knot.t_s, knot.state.copy(), frames, information))
+        if len(self.kept) > KEPT:
+            total = self._information
+            left = np.linalg.slogdet(total - np.array([one.information for one in self.kept]))[1]
+            del self.kept[int(np.argmax(left))]
+
+    @property
+    def sufficient(self) -> bool:
+        """Whether a solution would be more certain of the phalanges, rms, than a hand file that is not this person's.
+        """
+        return all(float(np.sqrt(np.mean(sd**2))) < most
+                   for sd, most in zip(phalanx_sd(self.covariance), (LENGTH_SD, RADIUS_SD), strict=True))
+
+    @property
+    def _information(self) -> Array:
+        return np.asarray(self._prior + sum(one.information for one in list(self.kept)))
+
+    @property
+    def covariance(self) -> Array:
+        """(FOREARM_TURN, FOREARM_TURN) of the shape that a solution with these key frames would have."""
+        return np.asarray(np.linalg.inv(self._information))
+
+
+def phalanx_sd(covariance: Array) -> tuple[Array, Array]:
+    """(15,) and (15,) standard deviations of the logarithms of the phalanges' lengths and of their radii, sizes
+    included, from the shape's covariance."""
+    lengths, radii = np.zeros((15, FOREARM_TURN)), np.zeros((15, FOREARM_TURN))
+    lengths[:, [WHOLE, FINGERS]] = radii[:, [WHOLE, THICKNESS]] = 1.0
+    lengths[range(15), range(LENGTH, RADIUS)] = radii[range(15), range(RADIUS, RADIUS + 15)] = 1.0
+    return (np.sqrt(np.sum((lengths @ covariance) * lengths, axis=1)),
+            np.sqrt(np.sum((radii @ covariance) * radii, axis=1)))

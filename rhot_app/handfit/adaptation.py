@@ -1,0 +1,188 @@
+"""Adapts a hand file to a hand that was tracked with it: one shape and the pose of every key frame, together.
+
+The shape is what the key frames share. Each step eliminates the frames' own numbers (Schur complement), so that it
+costs no more than a camera's bundle adjustment of as many frames. Levenberg-Marquardt as everywhere.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.barehand.contour_residual import ContourFrame
+from rhot_app.barehand.contours import SILHOUETTE
+from rhot_app.barehand.key_frames import OWN, SHAPE_SD, SHARED, KeyFrame, normal_equations, phalanx_sd
+from rhot_app.barehand.surface import FINGERS as FINGER_SIZE
+from rhot_app.barehand.surface import FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
+from rhot_app.estimation.least_squares import minimise
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.kinematics import move
+from rhot_app.hand.model import HandModel
+from rhot_app.hand.motion.hand_process import ANGLES, BIAS, POSE, VELOCITY
+from rhot_app.hand.skeleton import FINGERS
+from rhot_app.handfit.hand_shape import SHAPE_LIMIT, SIZE, Shapes
+
+Array = NDArray[np.float64]
+
+REASON = "hand adapted while it was tracked"
+"""In the history of a hand file or a rig."""
+
+EDGE_SD_PX = 4.0, 2.0, 1.0
+"""px: how far from the contour an edge is expected at most, in each of three solutions. 5 % of a phalanx are 2 px. Each
+solution has the surface of the hand file that the one before led to: two phalanges meet with one radius, to which the
+first surface is an approximation."""
+
+EDGE_BIAS_PX = 0.12
+"""px: by how much the edges along a phalanx are off in all images alike, before a learnt background: rms over the sides
+of drawn hands. More key frames do not lessen it."""
+
+_DIGITS = 4  # of mm
+_STEPS, _LEAST_GAIN = 20, 1e-2  # of a cost in which one standard deviation costs 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Adapted:
+    """`hand`: the hand file by the key frames, with standard deviations. `length_sd`, `radius_sd` (15,): those of its
+    phalanges' lengths and radii, relative. `states` (F, n): the hand at each key frame. `shape` (SIZE,), relative to
+    the file before, as in `hand_shape`; `covariance` (FOREARM_TURN, FOREARM_TURN) of it, without the finger roots."""
+
+    hand: HandAnatomy
+    length_sd: Array
+    radius_sd: Array
+    states: Array
+    shape: Array
+    covariance: Array
+
+    def document(self) -> dict[str, float]:
+        """By how much lengths and radii changed and how well they are known, rms over the phalanges."""
+        sizes, own = self.shape[:THICKNESS + 1], self.shape
+        lengths = own[LENGTH:RADIUS] + sizes[WHOLE] + sizes[FINGER_SIZE]
+        radii = own[RADIUS:RADIUS + 15] + sizes[WHOLE] + sizes[THICKNESS]
+        return {"key_frames": len(self.states)} | {
+            f"{name}_percent": 100.0 * float(np.sqrt(np.mean(values**2)))
+            for name, values in (("lengths", lengths), ("lengths_sd", self.length_sd), ("radii", radii),
+                                 ("radii_sd", self.radius_sd))}
+
+
+def adapt(base: HandAnatomy, key_frames: Sequence[KeyFrame],
+          progress: Callable[[float], None] = lambda part: None) -> Adapted:
+    """The most probable hand by key frames that were tracked with the hand `base`, and people's hands."""
+    shapes, shape = Shapes(base), np.zeros(SIZE)
+    states = [one.state for one in key_frames]
+    found: _Iterate | None = None
+    for number, sd_px in enumerate(EDGE_SD_PX):
+        progress(number / len(EDGE_SD_PX))
+        problem = _Problem(shapes, shape, [[_expected(frame, sd_px, shapes, shape) for frame in one.frames]
+                                           for one in key_frames])
+        found, _ = minimise(_Iterate(problem, np.zeros(FOREARM_TURN), states), _STEPS, _LEAST_GAIN)
+        shape[:FOREARM_TURN] = np.clip(shape[:FOREARM_TURN] + found.step, -SHAPE_LIMIT[:FOREARM_TURN],
+                                       SHAPE_LIMIT[:FOREARM_TURN])
+        states = found.states
+    assert found is not None
+    covariance = np.asarray(np.linalg.inv(found.reduced(0.0)[0]))
+    scale = float(np.median(np.concatenate([frame.points.scale for one in key_frames for frame in one.frames])))
+    own = range(RADIUS, RADIUS + 15)
+    covariance[own, own] += (EDGE_BIAS_PX / scale / shapes.model(shape).radii.ravel()) ** 2
+    length_sd, radius_sd = phalanx_sd(covariance)
+    hand = _with_sd(shapes.anatomy(shape), length_sd.reshape(5, 3), radius_sd.reshape(5, 3))
+    return Adapted(hand, length_sd, radius_sd, np.array(states), shape, covariance)
+
+
+def _with_sd(hand: HandAnatomy, length_sd: Array, radius_sd: Array) -> HandAnatomy:
+    """The hand with standard deviations (5, 3) of lengths and radii, relative."""
+    fingers = {}
+    for k, name in enumerate(FINGERS):
+        one = hand.fingers[name]
+        bones, radii = ([round(value * part, _DIGITS) for value, part in zip(values, parts, strict=True)]
+                        for values, parts in ((one.bones_mm, length_sd[k].tolist()),
+                                              (one.radii_mm, radius_sd[k].tolist())))
+        fingers[name] = msgspec.structs.replace(one, bones_sd_mm=(bones[0], bones[1], bones[2]),
+                                                radii_sd_mm=(radii[0], radii[1], radii[2]))
+    return msgspec.structs.replace(hand, fingers=fingers)
+
+
+def _expected(frame: ContourFrame, sd_px: float, shapes: Shapes, shape: Array) -> ContourFrame:
+    """The same edges about the surface of another shape. A key frame is seen once, not `repeated` times.
+
+    An edge behind which the picture shows the hand is no silhouette here: in a gap between two fingers that is as
+    narrow as the lens' blur, edges are displaced by half a pixel.
+    """
+    out = copy.copy(frame)
+    assert frame.edges is not None, "a key frame has been searched"
+    gap = (frame.points.behind == SILHOUETTE)[:, None] & (frame.edges.outside > 0.5)
+    out.edges = frame.edges._replace(inside=np.where(gap, 0.0, frame.edges.inside))
+    out.surface = shapes.surface(shape)
+    out.expected_sd = np.minimum(frame.expected_sd, sd_px)
+    out.shape_variance = frame.shape_variance / frame.repeated
+    return out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Problem:
+    """`frames`: of each key frame, about the surface of `shape`."""
+
+    shapes: Shapes
+    shape: Array
+    frames: Sequence[Sequence[ContourFrame]]
+
+    @property
+    def model(self) -> HandModel:
+        return self.shapes.model(self.shape)
+
+
+class _Iterate:
+    """Implements `Iterate`: the shape, `step` (FOREARM_TURN,) from the problem's, and the states of the key frames."""
+
+    def __init__(self, problem: _Problem, step: Array, states: Sequence[Array]) -> None:
+        self._problem, self.step, self.states = problem, step, list(states)
+        self._systems = []
+        away = (problem.shape[:FOREARM_TURN] + step) / SHAPE_SD
+        self.cost = float(away @ away)
+        for frames, state in zip(problem.frames, self.states, strict=True):
+            there = state.copy()
+            there[BIAS:BIAS + FOREARM_TURN] = step
+            information, pull, cost = normal_equations(frames, there, problem.model)
+            self._systems.append((information, pull))
+            self.cost += cost
+
+    def reduced(self, damping: float) -> tuple[Array, Array, list[Array]]:
+        """Normal matrix and right side of the shape, and of each frame how its own numbers follow: a matrix
+        (own, FOREARM_TURN + 1), the last column without a step of the shape."""
+        away = self._problem.shape[:FOREARM_TURN] + self.step
+        matrix, right = np.diag(1.0 / SHAPE_SD**2), -away / SHAPE_SD**2
+        for information, pull in self._systems:
+            matrix += information[np.ix_(SHARED, SHARED)]
+            right = right + pull[SHARED]
+        matrix[np.diag_indices_from(matrix)] *= 1.0 + damping
+        followed = []
+        for information, pull in self._systems:
+            own, coupled = information[np.ix_(OWN, OWN)], information[np.ix_(OWN, SHARED)]
+            own[np.diag_indices_from(own)] *= 1.0 + damping
+            follows = np.linalg.solve(own, np.column_stack([coupled, pull[OWN]]))
+            matrix -= coupled.T @ follows[:, :-1]
+            right = right - coupled.T @ follows[:, -1]
+            followed.append(follows)
+        return matrix, right, followed
+
+    def moved(self, damping: float) -> _Iterate:
+        """The iterate after a damped step."""
+        matrix, right, followed = self.reduced(damping)
+        step = np.linalg.solve(matrix, right)
+        states = [_moved(state, follows[:, -1] - follows[:, :-1] @ step)
+                  for state, follows in zip(self.states, followed, strict=True)]
+        return _Iterate(self._problem, self.step + step, states)
+
+
+def _moved(state: Array, step: Array) -> Array:
+    """A state after a step of its pose and of the forearm."""
+    out, world, after, angles = state.copy(), np.eye(4), np.empty((4, 4)), np.empty(21)
+    world[:3] = state[:ANGLES].reshape(3, 4)
+    move(world, state[ANGLES:VELOCITY], step[:POSE], after, angles)
+    out[:ANGLES], out[ANGLES:VELOCITY] = after[:3].ravel(), angles
+    out[BIAS + FOREARM_TURN:BIAS + SHAPE] += step[POSE:]
+    return out

@@ -1,0 +1,173 @@
+"""A hand file that is adapted to a tracked bare hand: key frames, what they determine, and what becomes of it."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from bare_scenes import DISTANCE_M, rig_of, right_hand
+from pictures import picture, taken, two_cameras, wall
+
+from rhot_app.barehand.key_frames import APART_S, KEPT, SHAPE_SD, KeyFrame, KeyFrames, phalanx_sd
+from rhot_app.barehand.surface import surface_of
+from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.engine.rig_watch import JUDGE_NS, HandWatch
+from rhot_app.errors import TrackingError
+from rhot_app.export.bare_hand import adapted_hand
+from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy, load_hand, save_hand
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.model import build_model
+from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
+from rhot_app.hand.skeleton import HandPose
+from rhot_app.handfit.adaptation import adapt
+from rhot_app.rig_history import accept_hand, versions
+from rhot_app.simulator.scene.motion import load_motion
+from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground
+
+POSES = 10
+RIG_SEED = 4
+
+
+def wrong(hand: HandAnatomy) -> HandAnatomy:
+    """The hand with bones wrong by 5 % and radii by 8 %, each in its own direction."""
+    rng, fingers = np.random.default_rng(RIG_SEED), {}
+    for name, one in hand.fingers.items():
+        bones = np.array(one.bones_mm) * (1.0 + 0.05 * rng.choice([-1.0, 1.0], 3))
+        radii = np.array(one.radii_mm) * (1.0 + 0.08 * rng.choice([-1.0, 1.0], 3))
+        fingers[name] = msgspec.structs.replace(one, bones_mm=tuple(bones.tolist()), radii_mm=tuple(radii.tolist()),
+                                                marker_mm=min(one.marker_mm, float(bones[2])))
+    return msgspec.structs.replace(hand, fingers=fingers)
+
+
+@lru_cache
+def tracked() -> tuple[HandAnatomy, KeyFrames, list[HandPose], BareHandTracker]:
+    """The wrong hand file, the key frames of a spreading hand tracked with it, and the true poses."""
+    truth, cameras = right_hand(), two_cameras(distance=DISTANCE_M)
+    model = build_model(truth)
+    surface, believed = surface_of(model), wrong(truth)
+    walls = [wall(camera, 10 * k + 1, False) for k, camera in enumerate(cameras)]
+    moving = load_motion("spread", model, np.array([0.0, 0.0, DISTANCE_M]), 1)
+    poses = [moving.pose(0.37 * k) for k in range(POSES)]
+    tracker, key_frames = None, None
+    for k, pose in enumerate(poses):
+        images = [picture(surface, pose.world_from_palm, pose.angles, camera, walls[c], k)
+                  for c, camera in enumerate(cameras)]
+        if tracker is None:
+            known = [learn_skin(image, learn_background(skin_foreground(), [taken(empty, 90 + n) for n in range(3)]))
+                     for image, empty in zip(images, walls, strict=True)]
+            tracker = BareHandTracker(rig_of(cameras, believed), foreground=known, known_size=False)
+            key_frames = KeyFrames(tracker.model)
+        tracker.start(pose, 0)
+        tracker.step(images, [0, 0])
+        key_frames._last_s = -np.inf  # every picture is of another moment
+        key_frames.offer(tracker)
+    assert tracker is not None and key_frames is not None
+    return believed, key_frames, poses, tracker
+
+
+def errors(hand: HandAnatomy, field: str) -> np.ndarray:
+    """(15,) logarithms of the true values less the hand's."""
+    truth = right_hand()
+    return np.log([np.array(getattr(truth.fingers[name], field)) / np.array(getattr(hand.fingers[name], field))
+                   for name in truth.fingers]).ravel()
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def test_a_wrong_hand_file_is_mended_by_ten_poses() -> None:
+    believed, key_frames, poses, _ = tracked()
+    found = adapt(believed, key_frames.kept)
+    joints = []
+    for state, pose in zip(found.states, poses, strict=True):
+        world = np.eye(4)
+        world[:3] = state[:ANGLES].reshape(3, 4)
+        joints.append(forward(build_model(found.hand), HandPose(world, state[ANGLES:VELOCITY])).joints
+                      - forward(build_model(right_hand()), pose).joints)
+    assert np.mean(np.linalg.norm(joints, axis=2)) < 1.0e-3
+    assert rms(errors(found.hand, "radii_mm")) < 0.03 < rms(errors(believed, "radii_mm"))
+    assert rms(errors(found.hand, "bones_mm")) < 0.045 < rms(errors(believed, "bones_mm"))
+    # as certain as it says
+    assert np.mean((errors(found.hand, "bones_mm") / found.length_sd) ** 2) < 3.0
+    assert np.mean((errors(found.hand, "radii_mm") / found.radius_sd) ** 2) < 3.0
+    thumb = found.hand.fingers["thumb"]
+    assert thumb.bones_sd_mm is not None
+    assert thumb.bones_sd_mm[1] == pytest.approx(found.length_sd[1] * thumb.bones_mm[1], rel=1e-3)
+
+
+def test_key_frames_foretell_how_certain_the_hand_will_be() -> None:
+    _, key_frames, _, _ = tracked()
+    foretold = phalanx_sd(key_frames.covariance)
+    found = adapt(tracked()[0], key_frames.kept)
+    assert rms(foretold[0]) == pytest.approx(rms(found.length_sd), rel=0.3)
+    assert 0.5 * rms(found.radius_sd) < rms(foretold[1]) < rms(found.radius_sd)  # edges err alike in all of them
+    assert key_frames.sufficient
+    assert not KeyFrames(build_model(right_hand())).sufficient
+
+
+def test_what_tells_least_goes_first() -> None:
+    _, key_frames, _, tracker = tracked()
+    full = KeyFrames(tracker.model)
+    nothing = KeyFrame(0.0, tracker.filter.newest.state, (), np.zeros((len(SHAPE_SD),) * 2))
+    full.kept = [*key_frames.kept, *[nothing] * (KEPT - POSES)]
+    full.offer(tracker)
+    assert len(full.kept) == KEPT and sum(one is nothing for one in full.kept) == KEPT - POSES - 1
+    full.offer(tracker)  # the same moment again
+    assert sum(one is nothing for one in full.kept) == KEPT - POSES - 1 and APART_S > 0.0
+    full.clear()
+    assert not full.kept
+
+
+def test_the_tracker_believes_the_stated_standard_deviations() -> None:
+    believed, key_frames, _, tracker = tracked()
+    found = adapt(believed, key_frames.kept)
+    rig = rig_of(tracker.cameras, found.hand)
+    stated = np.sqrt(np.diagonal(BareHandTracker(rig).shape_covariance, axis1=1, axis2=2)).ravel()
+    np.testing.assert_allclose(stated[3:18], found.length_sd, rtol=1e-2)
+    np.testing.assert_allclose(stated[18:33], found.radius_sd, rtol=1e-2)
+
+
+def test_a_hand_file_keeps_what_it_was(tmp_path: Path) -> None:
+    path, hand = tmp_path / "me.json", right_hand()
+    thumb = msgspec.structs.replace(hand.fingers["thumb"], bones_sd_mm=(0.5, 0.4, 0.3), radii_sd_mm=(0.2, 0.2, 0.2))
+    adapted = msgspec.structs.replace(hand, fingers={**hand.fingers, "thumb": thumb})
+    save_hand(path, hand)
+    assert "sd_mm" not in path.read_text(), "what is not known is left out, so that earlier programs read the file"
+    kept = accept_hand(path, adapted, "hand adapted while it was tracked")
+    assert load_hand(path) == adapted
+    assert kept is not None and load_hand(kept.path) == hand
+    assert [one.replaced_by for one in versions(path)] == ["hand adapted while it was tracked"]
+    assert accept_hand(path, adapted, "again") is None
+    assert isinstance(load_hand(path).fingers["index"], FingerAnatomy)
+
+
+def test_too_little_is_said_and_nothing_written() -> None:
+    class Run:
+        key_frames = KeyFrames(build_model(right_hand()))
+
+    with pytest.raises(TrackingError, match="bend and spread every finger"):
+        adapted_hand(Run(), right_hand())  # type: ignore[arg-type]
+
+
+def test_the_engine_offers_the_hand_and_changes_nothing() -> None:
+    believed, found, _, tracker = tracked()
+
+    class Tracker:
+        key_frames = found
+
+    rig = rig_of(tracker.cameras, believed)
+    watch = HandWatch(rig)
+    assert [one.mender for one in watch.advice(Tracker(), JUDGE_NS)] == ["adapted"]  # type: ignore[arg-type]
+    assert not watch.adapted(Tracker(), JUDGE_NS)["known"]  # type: ignore[arg-type]
+    watch.wait()
+    answer = watch.adapted(Tracker(), JUDGE_NS + 1)  # type: ignore[arg-type]
+    assert answer["known"] and len(answer["rows"]) == 10 and "±" in answer["rows"][0][2]
+    after = msgspec.convert(answer["document"], type(rig))
+    assert rms(errors(after.hand, "radii_mm")) < 0.03
+    assert rig.hand == believed
+    again = HandWatch(after)
+    assert not again.advice(Tracker(), JUDGE_NS)  # type: ignore[arg-type]
