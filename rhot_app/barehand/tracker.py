@@ -238,8 +238,11 @@ class BareHandTracker:
         """Whether a prediction is too uncertain to tell fingers apart, covers the foreground worse than the hand did of
         late, or follows an image in which the contour of a finger was not found."""
         state, covariance = prediction
-        depth = self.poses[0][2] @ np.array([*state[[3, 7, 11]], 1.0])
-        wide = np.sqrt(np.trace(covariance[:3, :3]) / 3.0) * self.cameras[0].intrinsics[0] / depth
+        palm, wide = np.array([*state[[3, 7, 11]], 1.0]), 0.0
+        for pose, camera in zip(self.poses, self.cameras, strict=True):
+            x, y, depth = pose @ palm
+            across = camera.intrinsics[:2, None] / depth * (pose[:2, :3] - np.outer((x, y), pose[2, :3]) / depth)
+            wide = max(wide, float(np.sqrt(np.trace(across @ covariance[:3, :3] @ across.T) / 2.0)))
         unfound = float(np.min(np.nan_to_num(self.fit.support, nan=1.0))) < LEAST_SUPPORT
         return bool(wide > CONFUSED_PX or unfound or self.covered(seen, state) < self.cover - COVER_DROP)
 
