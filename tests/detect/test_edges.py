@@ -109,3 +109,26 @@ def test_skin_is_learnt_from_one_image() -> None:
     probability = foreground_map(image, learn_skin(image), 4)
     assert probability[:, :18].mean() > 0.9
     assert probability[:, 22:].mean() < 0.1
+
+
+def test_shading_does_not_displace_an_edge_before_a_learnt_background() -> None:
+    """A finger gets darker towards its limb, until it is hardly brighter than the wall."""
+    wall = np.full((120, 160, 3), [110.0, 105.0, 100.0])
+    rng = np.random.default_rng(5)
+    empty = [np.clip(wall + rng.normal(0.0, 2.0, wall.shape) + 0.5, 0, 255).astype(np.uint8) for _ in range(8)]
+    learnt = learn_background(skin_foreground(), empty)
+    errors: dict[bool, list[float]] = {True: [], False: []}
+    for edge in np.linspace(-2.0, 2.0, 9):
+        along = np.mgrid[0:120, 0:160][1] - 80.0 - edge
+        shade = np.clip(0.6 - along / 15.0, 0.6, 1.0)[..., None]
+        share = np.clip(0.5 - along, 0.0, 1.0)[..., None]
+        image = cv2.GaussianBlur(share * shade * SKIN + (1.0 - share) * wall, (0, 0), 1.0)
+        image = np.clip(image + rng.normal(0.0, 2.0, image.shape) + 0.5, 0, 255).astype(np.uint8)
+        slices = np.array([[80.0, y, 1.0, 0.0, 6.0] for y in range(10, 110, 5)])
+        for known, foreground in ((True, learnt), (False, skin_foreground())):
+            edges = find_edges(image, slices, foreground, 2.0)
+            good = (np.arange(edges.offset.shape[1]) < edges.number[:, None]) & (edges.outside < 0.5)
+            errors[known] += list(edges.offset[good] - edge)
+    assert abs(np.median(errors[True])) < 0.1
+    assert np.percentile(np.abs(errors[True]), 90) < 0.3
+    assert abs(np.median(errors[False])) > 0.3
