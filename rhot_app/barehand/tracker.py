@@ -235,16 +235,10 @@ class BareHandTracker:
         return knot
 
     def _doubtful(self, seen: Silhouettes, prediction: tuple[Array, Array]) -> bool:
-        """Whether a prediction is too uncertain to tell fingers apart, covers the foreground worse than the hand did of
-        late, or follows an image in which the contour of a finger was not found."""
-        state, covariance = prediction
-        palm, wide = np.array([*state[[3, 7, 11]], 1.0]), 0.0
-        for pose, camera in zip(self.poses, self.cameras, strict=True):
-            x, y, depth = pose @ palm
-            across = camera.intrinsics[:2, None] / depth * (pose[:2, :3] - np.outer((x, y), pose[2, :3]) / depth)
-            wide = max(wide, float(np.sqrt(np.trace(across @ covariance[:3, :3] @ across.T) / 2.0)))
+        """Whether a prediction covers the foreground worse than the hand did of late, or follows an image in which the
+        contour of a finger was not found."""
         unfound = float(np.min(np.nan_to_num(self.fit.support, nan=1.0))) < LEAST_SUPPORT
-        return bool(wide > CONFUSED_PX or unfound or self.covered(seen, state) < self.cover - COVER_DROP)
+        return bool(unfound or self.covered(seen, prediction[0]) < self.cover - COVER_DROP)
 
     def take(self, cameras: Iterable[int], t_s: float) -> None:
         """Note that images of `cameras` at `t_s`, s since the start, are weighed next. Without cameras the phalanges'
