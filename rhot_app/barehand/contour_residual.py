@@ -59,9 +59,6 @@ _LEAST_CLUTTER = 1e-3  # edges per px
 SIDES = 4
 """Kinds of contour points of a capsule (`contours.SIDE` and the others)."""
 
-ASIDE_STEPS = 2
-"""Steps to the offsets of the sides."""
-
 _RIDGE = 1e-3  # 1/m^2 and 1/rad^2, as good as nothing
 
 
@@ -131,13 +128,16 @@ class ContourFrame:
         """COLUMNS rows with the information of all slices, and one with the rest of their cost."""
         return Contours([self]).linearise(state)
 
-    def lean(self, predicted: Predicted, aside: Array, sides: Array) -> None:
+    def lean(self, state: Array, sides: Array) -> Predicted:
         """Add to the last two columns of `sides` (S, COLUMNS + 2) what the slices say of the surface's offset along
-        each side, which is `aside` (S,) standard deviations: gradient about 0, and information."""
+        each side, in standard deviations: gradient and information. Returns where the contours are (`predict`)."""
         assert self.edges is not None, "the edges of the slices have not been observed"
-        p, e = self.points, self.edges
-        _lean(predicted[0], predicted[2], p.capsule, p.kind, p.behind, self.shape_variance, self.side_sd, e.number,
-              e.offset, e.sd, e.inside, e.outside, self.expected_sd, self.clutter, aside, sides)
+        count, p, e = len(self.slices), self.points, self.edges
+        offset, rows, good = np.zeros(count), np.zeros((count, COLUMNS)), np.zeros(count, np.bool_)
+        _lean(self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule, p.kind,
+              p.along, p.behind, self.shape_variance, self.side_sd, self.pixel, self.normal, e.number, e.offset, e.sd,
+              e.inside, e.outside, self.expected_sd, self.clutter, offset, rows, good, sides)
+        return offset, rows, good
 
     def gather(self, predicted: Predicted, aside: Array, information: Array, pull: Array, sides: Array) -> float:
         """Add the lower triangle of the slices' information (COLUMNS, COLUMNS), their gradient (COLUMNS,), and to
@@ -167,14 +167,9 @@ class Contours:
         found = []
         for late_s, frames in by_time.items():
             information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
-            predicted = [frame.predict(state) for frame in frames]
             sides = np.zeros((SIDES * len(frames[0].surface.row), COLUMNS + 2))
-            aside = np.zeros(len(sides))
-            for _ in range(ASIDE_STEPS):
-                sides[:] = 0.0
-                for frame, at in zip(frames, predicted, strict=True):
-                    frame.lean(at, aside, sides)
-                aside = sides[:, COLUMNS] / (1.0 + sides[:, COLUMNS + 1])
+            predicted = [frame.lean(state, sides) for frame in frames]
+            aside = sides[:, COLUMNS] / (1.0 + sides[:, COLUMNS + 1])
             sides[:] = 0.0
             cost = float(aside @ aside) + sum(frame.gather(at, aside, information, pull, sides)
                                               for frame, at in zip(frames, predicted, strict=True))
@@ -270,17 +265,18 @@ def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance,
 
 
 @njit(cache=True)
-def _lean(offset, good, capsule, kind, behind, shape_variance, side_sd, count, offsets, sds, inside, outside,
-          expected_sd, clutter, aside, sides):
-    """Add to `sides` (S, COLUMNS + 2) gradient and information of the surface's offset along each side."""
+def _lean(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, shape_variance, side_sd, pixel,
+          normal, count, offsets, sds, inside, outside, expected_sd, clutter, offset, rows, good, sides):
+    """Fill `offset` (K,), `rows` (K, COLUMNS) and `good` (K,) as `follow` does, and add to `sides` (S, COLUMNS + 2)
+    gradient and information of the surface's offset along each side."""
+    follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, good)
     found = np.empty(offsets.shape[1])
     for s in range(capsule.shape[0]):
         if good[s]:
+            _, weight, error, _ = _mix(count[s], offsets[s], sds[s], inside[s], outside[s], behind[s], offset[s],
+                                       shape_variance[s], expected_sd[s] ** 2, clutter[s], found)
             side = SIDES * capsule[s] + kind[s]
-            shift = aside[side] * side_sd[s]
-            _, weight, error, _ = _mix(count[s], offsets[s], sds[s], inside[s], outside[s], behind[s],
-                                       offset[s] + shift, shape_variance[s], expected_sd[s] ** 2, clutter[s], found)
-            sides[side, COLUMNS] += weight * side_sd[s] * (error + shift)
+            sides[side, COLUMNS] += weight * side_sd[s] * error
             sides[side, COLUMNS + 1] += weight * side_sd[s] ** 2
 
 
