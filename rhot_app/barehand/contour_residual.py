@@ -80,7 +80,8 @@ class ContourFrame:
         self.pixel, self.normal = slices[:, :2].copy(), slices[:, 2:4].copy()
         fleshy = np.where(surface.group[points.capsule] < PALM, 1.0, FLESHY)
         variance = repeated * (SHAPE_SD_M * fleshy * points.scale) ** 2
-        self.repeated, self.shape_variance, self.side_sd = repeated, (1.0 - COMMON) * variance, np.sqrt(COMMON * variance)
+        self.repeated = repeated
+        self.shape_variance, self.side_sd = (1.0 - COMMON) * variance, np.sqrt(COMMON * variance)
         self.edges: Edges | None = None
         self.clutter = np.empty((0, 0))
         self.seen = np.zeros((GROUPS, 2))
