@@ -6,7 +6,8 @@ without edges, or with edges of other things only, changes nothing.
 
 The phalanges' lengths and radii are numbers of the state, uncertain (`tracker.PHALANGES`). Two
 opposite edges then determine the axis, as in feature mode, and one edge alone is less certain. What else the surface
-has wrong lasts as long as the hand shows the same side: images within that time count as one.
+has wrong is in part the same all along one side of a capsule, in all cameras: that offset is marginalised. It lasts as
+long as the hand shows the same side: images within that time count as one.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, follow
-from rhot_app.barehand.surface import FOREARM, SHAPE, Surface
+from rhot_app.barehand.surface import FOREARM, PALM, SHAPE, Surface
 from rhot_app.estimation import residual
 from rhot_app.estimation.residual import UNIT, Rows
 from rhot_app.hand.limits import LIMIT_SD_RAD
@@ -28,7 +29,15 @@ from rhot_node.detect.edges import Edges
 Array = NDArray[np.float64]
 
 SHAPE_SD_M = 0.7e-3
-"""m: standard deviation of skin about the model's surface within a phalanx: creases, joints and nails."""
+"""m: standard deviation of a finger's skin about the model's surface: creases, joints, nails and pads."""
+
+FLESHY = 2.0
+"""The same of palm and forearm, of that of a finger: their flesh has no capsules of its own (1.0 to 1.4 mm between the
+twin's hand and the tracker's, 0.7 mm on fingers)."""
+
+COMMON = 0.5
+"""Part of its variance that is common to one side of a capsule (0.5 mm between such sides of the twin's fingers, 0.5 mm
+within one)."""
 
 MISSED = np.array([0.1, 0.4])
 """Probability that a silhouette, or an edge within the hand, is no edge of the image."""
@@ -47,7 +56,13 @@ SAME_TIME_S = 1e-3
 
 _STUDENT_4 = 0.375  # density at 0 of Student's t of 4 degrees of freedom
 _LEAST_CLUTTER = 1e-3  # edges per px
+SIDES = 4
+"""Kinds of contour points of a capsule (`contours.SIDE` and the others)."""
+
 _RIDGE = 1e-3  # 1/m^2 and 1/rad^2, as good as nothing
+
+
+Predicted = tuple[Array, Array, NDArray[np.bool_]]
 
 
 class ContourFrame:
@@ -63,7 +78,10 @@ class ContourFrame:
         self.surface, self.points, self.pose, self.intrinsics = surface, points, pose, intrinsics
         self.slices, self.expected_sd, self.late_s, self.size_column = slices, expected_sd, late_s, size_column
         self.pixel, self.normal = slices[:, :2].copy(), slices[:, 2:4].copy()
-        self.repeated, self.shape_variance = repeated, repeated * (SHAPE_SD_M * points.scale) ** 2
+        fleshy = np.where(surface.group[points.capsule] < PALM, 1.0, FLESHY)
+        variance = repeated * (SHAPE_SD_M * fleshy * points.scale) ** 2
+        self.repeated = repeated
+        self.shape_variance, self.side_sd = (1.0 - COMMON) * variance, np.sqrt(COMMON * variance)
         self.edges: Edges | None = None
         self.clutter = np.empty((0, 0))
         self.seen = np.zeros((GROUPS, 2))
@@ -77,7 +95,7 @@ class ContourFrame:
         stronger = len(strength[valid]) - np.searchsorted(np.sort(strength[valid]), strength)
         self.clutter = np.maximum(stronger / max(length, 1.0), _LEAST_CLUTTER)
 
-    def predict(self, state: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def predict(self, state: Array) -> Predicted:
         """The contour on each slice: (K,) px from its centre, its derivative (K, COLUMNS), and whether it exists."""
         count = len(self.slices)
         offset, rows = np.zeros(count), np.zeros((count, COLUMNS))
@@ -101,8 +119,8 @@ class ContourFrame:
             if good[s]:
                 _, weight, mean, _ = _mix(self.edges.number[s], self.edges.offset[s], self.edges.sd[s],
                                           self.edges.inside[s], self.edges.outside[s], self.points.behind[s],
-                                          offset[s], self.shape_variance[s], self.expected_sd[s] ** 2,
-                                          self.clutter[s], found[s])
+                                          offset[s], self.shape_variance[s],
+                                          self.expected_sd[s] ** 2 + self.side_sd[s] ** 2, self.clutter[s], found[s])
                 if weight > 0.0:
                     error[s] = mean
         return found, error
@@ -111,16 +129,27 @@ class ContourFrame:
         """COLUMNS rows with the information of all slices, and one with the rest of their cost."""
         return Contours([self]).linearise(state)
 
-    def gather(self, state: Array, information: Array, pull: Array) -> float:
-        """Add the lower triangle of the slices' information (COLUMNS, COLUMNS) and their gradient (COLUMNS,); returns
-        their cost."""
+    def lean(self, state: Array, sides: Array) -> Predicted:
+        """Add to the last two columns of `sides` (S, COLUMNS + 2) what the slices say of the surface's offset along
+        each side, in standard deviations: gradient and information. Returns where the contours are (`predict`)."""
+        assert self.edges is not None, "the edges of the slices have not been observed"
+        count, p, e = len(self.slices), self.points, self.edges
+        offset, rows, good = np.zeros(count), np.zeros((count, COLUMNS)), np.zeros(count, np.bool_)
+        _lean(self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule, p.kind,
+              p.along, p.behind, self.shape_variance, self.side_sd, self.pixel, self.normal, e.number, e.offset, e.sd,
+              e.inside, e.outside, self.expected_sd, self.clutter, offset, rows, good, sides)
+        return offset, rows, good
+
+    def gather(self, predicted: Predicted, aside: Array, information: Array, pull: Array, sides: Array) -> float:
+        """Add the lower triangle of the slices' information (COLUMNS, COLUMNS), their gradient (COLUMNS,), and to
+        `sides` (S, COLUMNS + 2) what `_marginalise` takes; returns their cost."""
         assert self.edges is not None, "the edges of the slices have not been observed"
         p, e = self.points, self.edges
         self.seen = np.zeros((GROUPS, 2))
         return float(_gather(
-            self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule, p.kind, p.along,
-            p.behind, self.shape_variance, self.pixel, self.normal, e.number, e.offset, e.sd, e.inside, e.outside,
-            self.expected_sd, self.clutter, information, pull, self.seen))
+            self.surface, *predicted, p.capsule, p.kind, p.behind, self.shape_variance, self.side_sd, e.number,
+            e.offset, e.sd, e.inside, e.outside, self.expected_sd, self.clutter, aside, information, pull, self.seen,
+            sides))
 
 
 class Contours:
@@ -139,7 +168,13 @@ class Contours:
         found = []
         for late_s, frames in by_time.items():
             information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
-            cost = sum(frame.gather(state, information, pull) for frame in frames)
+            sides = np.zeros((SIDES * len(frames[0].surface.row), COLUMNS + 2))
+            predicted = [frame.lean(state, sides) for frame in frames]
+            aside = sides[:, COLUMNS] / (1.0 + sides[:, COLUMNS + 1])
+            sides[:] = 0.0
+            cost = float(aside @ aside) + sum(frame.gather(at, aside, information, pull, sides)
+                                              for frame, at in zip(frames, predicted, strict=True))
+            _marginalise(sides, information, pull)
             found.append(compressed(information, pull, cost, len(state) - BIAS + MOTION, frames[0].size_column, late_s))
         if len(found) == 1:
             return found[0]
@@ -192,7 +227,7 @@ def slices_of(surface: Surface, state: Array, covariance: Array, pose: Array, in
         own, rows = np.r_[own, POSE:2 * POSE], np.hstack([rows, late_s * rows[:, :POSE]])
     variance = np.sum((rows @ covariance[np.ix_(own, own)]) * rows, axis=1)
     frame.expected_sd = np.sqrt(np.maximum(variance, 0.0))
-    spread = np.sqrt(variance + 4.0 * frame.shape_variance)
+    spread = np.sqrt(variance + 4.0 * (frame.shape_variance + frame.side_sd**2))
     slices[:, 4] = np.clip(reach * spread + 1.0, 3.0, longest_px)
     return frame
 
@@ -200,7 +235,8 @@ def slices_of(surface: Surface, state: Array, covariance: Array, pose: Array, in
 @njit(cache=True)
 def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance, spread_variance, clutter, found):
     """Fill `found` with the probability that each edge is the hand's. Returns -2 log likelihood over its least, the
-    weight 1/px^2, the weighted mean error px, and the probability that any is."""
+    weight 1/px^2, the weighted mean error px, and the probability that any is. Edges that are far apart and equally
+        probable add the variance between them (probabilistic data association, Bar-Shalom and Tse 1975)."""
     missed = MISSED[behind]
     total, peak = missed, missed
     for k in range(count):
@@ -213,7 +249,7 @@ def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance,
         found[k] = top * (1.0 + error * error / (DEGREES * variance)) ** (-0.5 * (DEGREES + 1.0))
         total += found[k]
         peak = max(peak, missed + top)
-    weight = mean = 0.0
+    weight = mean = square = 0.0
     for k in range(count):
         found[k] /= total
         variance = sds[k] * sds[k] + shape_variance
@@ -222,37 +258,81 @@ def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance,
         one = found[k] * (DEGREES + 1.0) / (DEGREES + error * error / wide) / variance
         weight += one
         mean += one * error
+        square += one * error * error
     if weight > 0.0:
         mean /= weight
+        weight /= 1.0 + max(square - weight * mean * mean, 0.0)  # which edge it is, is uncertain
     return 2.0 * np.log(max(peak / total, 1.0)), weight, mean, 1.0 - missed / total
 
 
 @njit(cache=True)
-def _gather(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, shape_variance, pixel, normal,
-            count, offsets, sds, inside, outside, expected_sd, clutter, information, pull, seen):
+def _lean(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, shape_variance, side_sd, pixel,
+          normal, count, offsets, sds, inside, outside, expected_sd, clutter, offset, rows, good, sides):
+    """Fill `offset` (K,), `rows` (K, COLUMNS) and `good` (K,) as `follow` does, and add to `sides` (S, COLUMNS + 2)
+    gradient and information of the surface's offset along each side."""
+    follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, good)
+    found = np.empty(offsets.shape[1])
+    for s in range(capsule.shape[0]):
+        if good[s]:
+            _, weight, error, _ = _mix(count[s], offsets[s], sds[s], inside[s], outside[s], behind[s], offset[s],
+                                       shape_variance[s], expected_sd[s] ** 2, clutter[s], found)
+            side = SIDES * capsule[s] + kind[s]
+            sides[side, COLUMNS] += weight * side_sd[s] * error
+            sides[side, COLUMNS + 1] += weight * side_sd[s] ** 2
+
+
+@njit(cache=True)
+def _gather(surface, offset, rows, good, capsule, kind, behind, shape_variance, side_sd, count, offsets, sds, inside,
+            outside, expected_sd, clutter, aside, information, pull, seen, sides):
     """Add the slices' information to the lower triangle of `information` (COLUMNS, COLUMNS) and to `pull` (COLUMNS,);
     returns their cost."""
-    slices = capsule.shape[0]
-    offset, rows = np.zeros(slices), np.zeros((slices, COLUMNS))
-    good, found = np.zeros(slices, np.bool_), np.empty(offsets.shape[1])
-    follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, good)
-    cost, own = 0.0, np.empty(COLUMNS, np.int64)
-    for s in range(slices):
+    found, cost, own = np.empty(offsets.shape[1]), 0.0, np.empty(COLUMNS, np.int64)
+    for s in range(capsule.shape[0]):
         if not good[s]:
             continue
-        one, weight, error, present = _mix(count[s], offsets[s], sds[s], inside[s], outside[s], behind[s], offset[s],
-                                           shape_variance[s], expected_sd[s] ** 2, clutter[s], found)
+        side = SIDES * capsule[s] + kind[s]
+        shift = aside[side] * side_sd[s]
+        one, weight, error, present = _mix(count[s], offsets[s], sds[s], inside[s], outside[s], behind[s],
+                                           offset[s] + shift, shape_variance[s], expected_sd[s] ** 2, clutter[s], found)
+        error += shift
         cost += one
         seen[surface.group[capsule[s]], 0] += present
         seen[surface.group[capsule[s]], 1] += 1.0
-        used = 0
-        for i in range(COLUMNS):
-            if rows[s, i] != 0.0:
-                own[used] = i
-                used += 1
+        sides[side, COLUMNS] += weight * side_sd[s] * error
+        sides[side, COLUMNS + 1] += weight * side_sd[s] ** 2
+        used = _nonzero(rows[s], own)
         for p in range(used):
             a = weight * rows[s, own[p]]
+            sides[side, own[p]] += side_sd[s] * a
             pull[own[p]] += a * error
             for q in range(p + 1):
                 information[own[p], own[q]] += a * rows[s, own[q]]
     return cost
+
+
+@njit(cache=True)
+def _marginalise(sides, information, pull):
+    """Take out of the lower triangle of `information` (COLUMNS, COLUMNS) and of `pull` (COLUMNS,) what may be the
+    surface's offset along a side (Schur complement). Of each of `sides` (S, COLUMNS + 2): derivatives of the residuals
+    by the state, their error, and their derivative by the offset, each times weight and that derivative."""
+    own = np.empty(COLUMNS, np.int64)
+    for s in range(sides.shape[0]):
+        if sides[s, COLUMNS + 1] == 0.0:
+            continue
+        used, part = _nonzero(sides[s, :COLUMNS], own), 1.0 / (1.0 + sides[s, COLUMNS + 1])
+        for p in range(used):
+            a = part * sides[s, own[p]]
+            pull[own[p]] -= a * sides[s, COLUMNS]
+            for q in range(p + 1):
+                information[own[p], own[q]] -= a * sides[s, own[q]]
+
+
+@njit(cache=True)
+def _nonzero(row, own):
+    """Fill `own` with the places of the numbers of `row` that are not 0, and return how many are."""
+    used = 0
+    for i in range(row.shape[0]):
+        if row[i] != 0.0:
+            own[used] = i
+            used += 1
+    return used

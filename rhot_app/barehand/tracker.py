@@ -103,9 +103,8 @@ second. Errors of edges and of the surface last as long, and would move the leng
 RELOCATION_LOG_ODDS = 5.0
 """Log odds by which a pose that was searched for must be better than the predicted one: 150 to 1."""
 
-LEAST_SUPPORT = 0.77
-"""Part of a finger's contour that is found at least: 0.9 (`contour_residual.MISSED`) less two standard deviations of
-twenty slices."""
+SEARCHED_S = 0.2
+"""s: a hand is searched for anew at least so often, which is how long a wrong pose may last."""
 
 COVER_DROP, COVER_SHARE = 0.3, 0.1
 """Log odds per pixel by which a prediction may cover the foreground worse than the hand did of late, a factor of 1.35,
@@ -161,7 +160,7 @@ class BareHandTracker:
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
         self._sequence, self._epoch_ns, self._fresh = 0, 0, False
-        self.cover, self._rng = 0.0, np.random.default_rng(0)
+        self.cover, self._searched_s, self._rng = 0.0, -np.inf, np.random.default_rng(0)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
     def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD,
@@ -176,7 +175,7 @@ class BareHandTracker:
             state[BIAS:BIAS + SHAPE] = size
         self.filter.start(0.0, state, covariance)
         self.tracking = self._fresh = True
-        self._taken_s = [-np.inf] * len(self.cameras)
+        self._taken_s, self._searched_s = [-np.inf] * len(self.cameras), -np.inf
         self.frames = [None] * len(self.cameras)
 
     def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
@@ -222,8 +221,9 @@ class BareHandTracker:
         prediction, since_s = self.filter.predict(t_s), t_s - self.filter.newest.t_s
         self.take(images, t_s)
         seen = self._silhouettes(images)
-        start = None if seen is None or not (self._fresh or self._doubtful(seen, prediction)) else self.relocate(
-            seen, prediction, since_s)
+        start = None
+        if seen is not None and (self._fresh or self._doubtful(seen, prediction, t_s)):
+            start, self._searched_s = self.relocate(seen, prediction, since_s), t_s
         initial = prediction[0] if start is None else start
         passes = START_PASSES if self._fresh or start is not None else PASSES
         knot = self._fit(images, late, t_s, prediction, initial, extra, passes)
@@ -237,14 +237,11 @@ class BareHandTracker:
         self._fresh = False
         return knot
 
-    def _doubtful(self, seen: Silhouettes, prediction: tuple[Array, Array]) -> bool:
-        """Whether a prediction is too uncertain to tell fingers apart, covers the foreground worse than the hand did of
-        late, or follows an image in which the contour of a finger was not found."""
-        state, covariance = prediction
-        depth = self.poses[0][2] @ np.array([*state[[3, 7, 11]], 1.0])
-        wide = np.sqrt(np.trace(covariance[:3, :3]) / 3.0) * self.cameras[0].intrinsics[0] / depth
-        unfound = float(np.min(np.nan_to_num(self.fit.support, nan=1.0))) < LEAST_SUPPORT
-        return bool(wide > CONFUSED_PX or unfound or self.covered(seen, state) < self.cover - COVER_DROP)
+    def _doubtful(self, seen: Silhouettes, prediction: tuple[Array, Array], t_s: float) -> bool:
+        """Whether the last search is long ago, or a prediction covers the foreground worse than the hand did of
+        late."""
+        late = t_s - self._searched_s > SEARCHED_S
+        return bool(late or self.covered(seen, prediction[0]) < self.cover - COVER_DROP)
 
     def take(self, cameras: Iterable[int], t_s: float) -> None:
         """Note that images of `cameras` at `t_s`, s since the start, are weighed next. Without cameras the phalanges'

@@ -141,14 +141,46 @@ def _left_after_three_steps(motion: str, t: float) -> float:
     state = process.retract(state_of(pose), away)
     known = [learn_background(skin_foreground(), [empty]) for empty in walls]
     for _ in range(3):
-        information, pull = np.zeros((process.size, process.size)), np.zeros(process.size)
+        frames = []
         for camera, image, foreground in zip(cameras, images, known, strict=True):
-            frame = frame_of(surface, state, camera)
-            frame.observe(find_edges(image, frame.slices, foreground, noise_of(image)))
-            rows = frame.linearise(state)
-            information += rows.jacobian.T @ rows.jacobian
-            pull += rows.jacobian.T @ rows.error
+            frames.append(frame_of(surface, state, camera))
+            frames[-1].observe(find_edges(image, frames[-1].slices, foreground, noise_of(image)))
+        rows = Contours(frames).linearise(state)
+        information, pull = rows.jacobian.T @ rows.jacobian, rows.jacobian.T @ rows.error
         step = np.zeros(process.size)
         step[:3] = np.linalg.solve(information[:3, :3], pull[:3])
         state = process.retract(state, step)
     return float(np.linalg.norm(process.difference(state, state_of(pose))[:3]))
+
+
+def _observed(offsets_px: tuple[float, ...]) -> tuple[ContourFrame, np.ndarray]:
+    """A frame whose every slice has equal edges at `offsets_px` from the contour, and its state."""
+    _, surface = model_and_surface()
+    state = state_of(poses("grasp", (0.9,))[0])
+    frame = frame_of(surface, state, two_cameras()[0])
+    frame.expected_sd[:] = 3.0
+    empty = np.zeros((len(frame.slices), MOST))
+    edges = Edges(np.full(len(empty), len(offsets_px)), *(empty.copy() for _ in range(5)))
+    for k, offset in enumerate(offsets_px):
+        edges.offset[:, k], edges.sd[:, k], edges.strength[:, k], edges.inside[:, k] = offset, 0.3, 5.0, 1.0
+    frame.observe(edges)
+    return frame, state
+
+
+def _information(frame: ContourFrame, state: np.ndarray) -> float:
+    """px^-2: of the image along all slices together, were the hand to move along the first camera axis."""
+    jacobian = frame.linearise(state).jacobian
+    return float((jacobian.T @ jacobian)[0, 0] / frame.points.scale.mean() ** 2)
+
+
+def test_two_edges_that_are_equally_probable_say_little() -> None:
+    one, two = (_information(*_observed(offsets)) for offsets in ((0.0,), (-3.0, 3.0)))
+    assert two < 0.3 * one
+
+
+def test_more_slices_do_not_tell_the_surfaces_offset_along_a_side() -> None:
+    frame, state = _observed((0.0,))
+    together = _information(frame, state)
+    frame.side_sd[:] = 0.0
+    alone = _information(frame, state)
+    assert together < 0.7 * alone

@@ -8,7 +8,6 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from rhot_app.barehand.tracker import LEAST_SUPPORT
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy, save_hand
 from rhot_app.handfit.session import HandFit
@@ -18,6 +17,10 @@ from rhot_app.ui.handfit.frame import Kept
 from rhot_app.ui.wizards.framework.plan import Memory
 
 FOLDER_KEY = "fit/folder"
+
+LEAST_FOUND = 0.77
+"""Part of a finger's contour that is found at least: 0.9 (`contour_residual.MISSED`) less two standard deviations of
+twenty slices."""
 
 
 class Changes(QObject):
@@ -100,7 +103,7 @@ class Changes(QObject):
             one = self.fit.instant
             found = one.contour.found if one is not None and one.contour is not None else 0.0
             return (f"{found:.0%} of the hand's contour was found in the pictures."
-                    + ("" if found > LEAST_SUPPORT else " Drag what is wrong to its place, then fit again."))
+                    + ("" if found > LEAST_FOUND else " Drag what is wrong to its place, then fit again."))
 
         self._work("Fitting to the contours", lambda progress: self.fit.fitted_to_contours(), "fitting to contours",
                    say)
