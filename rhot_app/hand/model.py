@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -63,6 +63,18 @@ def build_model(anatomy: HandAnatomy) -> HandModel:
         chain_bend=np.zeros(5),
         pose_prior=pose_prior(),
     )
+
+
+LOCKED_SD_RAD: Final = math.radians(5.0)
+"""rad: how far a joint is from where it is told to be held: as exactly as a goniometer repeats (chosen)."""
+
+
+def with_locked(model: HandModel, locked_deg: Mapping[str, float]) -> HandModel:
+    """The hand with angles, by their names, that it holds: the pose prior expects them there."""
+    rows = np.array([np.eye(len(ANGLES))[ANGLES.index(name)] for name in locked_deg]).reshape(-1, len(ANGLES))
+    values = np.radians(list(locked_deg.values()))
+    prior = model.pose_prior.with_terms(rows / LOCKED_SD_RAD, values / LOCKED_SD_RAD)
+    return replace(model, pose_prior=prior)
 
 
 def neutral_pose(world_from_palm: Array | None = None) -> HandPose:

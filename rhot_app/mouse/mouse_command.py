@@ -94,8 +94,7 @@ def _settings(args: argparse.Namespace) -> MouseSettings:
 
 
 def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs) -> None:
-    import numpy as np
-
+    from rhot_app.mouse.model import up_of
     from rhot_app.mouse.pointer import Mouse
     from rhot_app.state import HandState
 
@@ -108,7 +107,7 @@ def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs) -> 
             raise EngineError(f"no engine is heard in {client.directory.path}. Start it with `rhot engine --rig FILE "
                               "--start`, or let `rhot mouse --simulated` start a simulated one.")
         if mouse is None and messages:
-            mouse = Mouse(_settings(args), np.array([0.0, 0.0, 1.0]) if client.rig().up == "z" else None)
+            mouse = Mouse(_settings(args), up_of(client.rig()))
             end = now + (args.seconds or float("inf"))
         for message in messages:
             if isinstance(message, HandState) and mouse is not None:

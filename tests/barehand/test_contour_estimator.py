@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 import pytest
 from bare_scenes import model_and_surface, poses, rig_of, right_hand, scene
-from searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
 
 from rhot_app.errors import RigError
+from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model

@@ -98,7 +98,7 @@ class MarkersOfHand:
         prediction = hand.filter.predict(t_s)
         found = self.residuals([frame], hand, prediction, epoch_ns + round(1e9 * t_s))
         if found:
-            self.judge(found, hand.filter.add(t_s, [*found, hand.limits], prediction))
+            self.judge(found, hand.filter.add(t_s, [*found, *hand.known], prediction))
         return bool(found)
 
     def residuals(self, frames: Sequence[CameraObservations], hand: BareHandTracker, prediction: tuple[Array, Array],

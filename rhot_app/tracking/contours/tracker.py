@@ -167,7 +167,7 @@ class ContourEstimator:
         contour = asked(hand, 0, *hand.filter.predict(0.0), STEP_M)
         contour.observe(edges_of(len(contour.slices), np.zeros(1, np.int64), np.array([[0.0, 1.0, 9.0, 1.0, 0.0]])))
         hand.frames[0], hand.cover = contour, 1e9  # so that it is looked for elsewhere
-        hand.filter.add(0.0, [contour, hand.limits])
+        hand.filter.add(0.0, [contour, *hand.known])
         state = hand.filter.newest.state
         hand.process.difference(state, state)  # compiled here, for `_choose`
         self._finder.relocate(maps, hand.filter.newest.state, hand.filter.newest.covariance, 0.03)
@@ -394,7 +394,7 @@ class ContourEstimator:
         initial = prediction[0]
         if self._markers is not None:
             prediction, found, initial = self._choose(self._markers, marked, Contours(contours), prediction, t_s)
-        residuals: list[Residual] = [*found, Contours(contours), hand.limits]
+        residuals: list[Residual] = [*found, Contours(contours), *hand.known]
         for number in range(PASSES):
             for contour, spread in zip(contours, spreads, strict=True):
                 contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)
@@ -413,7 +413,7 @@ class ContourEstimator:
         if not found or wide is None:
             return predicted, found, predicted[0]
         again, stationary = markers.residuals(marked, hand, wide, t_ns), hand.process.stationary
-        residuals: list[Residual] = [*again, hand.limits]
+        residuals: list[Residual] = [*again, *hand.known]
         state = update(hand.process, t_s, wide, residuals, None, hand.filter.partial).state
         state = update(hand.process, t_s, wide, [*residuals, contours], state, hand.filter.partial).state
         away = hand.process.difference(state, predicted[0])[:POSE]
