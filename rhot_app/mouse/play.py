@@ -124,14 +124,15 @@ def play(script: Script, seed: int, set_up: SetUp = MARKERS, *, settings: MouseS
     times = 1e-9 * np.array([state.t_master_ns - T0_MASTER_NS for state in played.states])
     ready = 1e-9 * np.array([state.t_receive_ns - T0_MASTER_NS for state in played.states]) + played.compute_s
     mouse, true_mouse = Mouse(settings, up_of(played.rig)), Mouse(settings)
+    palms = np.array([state.world_from_palm[:3, 3] for state in played.true]).reshape(-1, 3)
     return MouseRun(script, times, played.states, [mouse.feed(state) for state in played.states],
-                    [true_mouse.feed(state) for state in played.true], np.array(
-                        [state.world_from_palm[:3, 3] for state in played.true]).reshape(-1, 3), ready - times)
+                    [true_mouse.feed(state) for state in played.true], palms, ready - times)
 
 
 @dataclass(frozen=True, slots=True)
 class _Played:
-    """A tracker's states, the true ones of the same instants, the tracker's rig, and how long one took to compute, s; NaN: not timed."""
+    """A tracker's states, the true ones of the same instants, the tracker's rig, and how long a state took to compute,
+    s; NaN: not timed."""
 
     states: list[HandState]
     true: list[HandState]
@@ -142,7 +143,7 @@ class _Played:
 def _markers(set_up: SetUp, scene: Scene, motion: Path, seconds: float, covered_s: float, watch: Watch) -> _Played:
     order = Order(scene, str(motion), seconds, sketched=not set_up.pictures)
     data = data_set(order, data_sets_folder() if set_up.pictures else motion.parent / "sets", watch)
-    truth, rig = data.truth, _rig(data.rig, set_up, scene)
+    truth, rig = data.truth, tracked_rig(data.rig, set_up, scene)
     second = data.rig.nodes[1].node_id
     records = [one for one in data.records() if one.node_id != second or one.kind is not RecordKind.DATAGRAM
                or 1e-9 * (one.t_master_ns - T0_MASTER_NS) < covered_s]
@@ -167,7 +168,7 @@ def _bare_hand(set_up: SetUp, scene: Scene, motion: Path, seconds: float, covere
                          below_m=0.8 * scene.settings.distance_m)
     sequence = BareHandSequence(whole, whole, model, str(motion), source, BareHandOptions(), lead_s + seconds, RATE_HZ,
                                 scene.seed, data_sets_folder())
-    rig = _rig(whole, set_up, scene)
+    rig = tracked_rig(whole, set_up, scene)
     progress, count = watch(f"{motion.name}, bare hand, seed {scene.seed}"), len(sequence.times_ns)
     empty: list[tuple[NDArray[np.uint8], ...]] = []
     nodes: SearchedNodes | None = None
@@ -183,12 +184,14 @@ def _bare_hand(set_up: SetUp, scene: Scene, motion: Path, seconds: float, covere
             nodes = SearchedNodes(make_tracker(rig), known, len(rig.markers.ids))
         nodes.step(number, images, times_ns=[T0_MASTER_NS + t_ns - round(1e9 * lead_s) for t_ns in frame.t_ns])
         if progress is not None:
-            progress(number / count)
+            progress(number, count)
     states = [] if nodes is None else nodes.states
     true = []
     for state in states:
         truth = sequence.truth_at(state.t_master_ns - T0_MASTER_NS + round(1e9 * lead_s))
-        true.append(_true_state(state, truth.world_from_palm, truth.joints, truth.joints[_TIPS]))
+        there = _true_state(state, truth.world_from_palm, truth.joints, truth.joints[_TIPS])
+        coming_in = state.t_master_ns < T0_MASTER_NS
+        true.append(replace(there, condition=Condition.SEARCHING) if coming_in else there)
     return _Played(states, true, rig, math.nan)
 
 
@@ -200,7 +203,7 @@ def _true_state(state: HandState, palm: Array, joints: Array, tips: Array) -> Ha
                    fingertip_covariances=np.zeros((5, 3, 3)))
 
 
-def _rig(rig: Rig, set_up: SetUp, scene: Scene) -> Rig:
+def tracked_rig(rig: Rig, set_up: SetUp, scene: Scene) -> Rig:
     """The rig that the tracker is given; with one camera, what a person knows of the table and the hand."""
     tracker = TrackerSettings("estimator", observe=set_up.observe)
     rig = msgspec.structs.replace(rig, nodes=rig.nodes[:set_up.cameras], tracker=tracker)

@@ -120,6 +120,13 @@ def carrying(balls: tuple[Ball, ...] = START) -> Script:
     return script
 
 
+def resting(seconds: float) -> Script:
+    """A hand that does nothing for a while."""
+    script = Script()
+    script.wait(seconds)
+    return script
+
+
 def home_pose() -> Array:
     """(3, 3) world_from_palm of a hand at rest, whose palm the cameras see."""
     return np.asarray(Rotation.from_rotvec([np.radians(TILT_DEG), 0.0, 0.0]).as_matrix() @ FACING)
