@@ -26,7 +26,7 @@ from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS, TIP_ROLES
 from rhot_app.mouse.model import FLAT_DEG, up_of, with_mouse_model
 from rhot_app.mouse.pointer import Mouse, MouseSettings, MouseState
-from rhot_app.mouse.script import Script, home_pose, motion_file
+from rhot_app.mouse.script import FACINGS, Script, Side, home_pose, motion_file
 from rhot_app.project import PalmPlane, Rig, TrackerSettings
 from rhot_app.recording.raw_log import RecordKind
 from rhot_app.simulator.bare_hand.sequence import ENTRY_S, BareHandOptions, BareHandSequence, MovedSource
@@ -65,16 +65,19 @@ _KEY_S: Final = 0.01  # for ways of a tenth of a second
 @dataclass(frozen=True, slots=True)
 class SetUp:
     """How a script is played. `observe`: what the tracker observes. `cameras`: with one, it tracks with the mouse's
-    model (`rhot_app.mouse.model`). `pictures`: markers are rendered and detected; a bare hand always is."""
+    model (`rhot_app.mouse.model`). `pictures`: markers are rendered and detected; a bare hand always is. `facing`: the
+    side of the hand that the cameras see."""
 
     observe: Literal["markers", "contours"] = "markers"
     cameras: int = 2
     pictures: bool = False
+    facing: Side = "palm"
 
     @property
     def name(self) -> str:
         """For people."""
-        return f"{_HANDS[self.observe]}, {'one camera' if self.cameras == 1 else 'two cameras'}"
+        seen = f", {self.facing} seen" if self.facing != "palm" else ""
+        return f"{_HANDS[self.observe]}, {'one camera' if self.cameras == 1 else 'two cameras'}{seen}"
 
 
 MARKERS: Final = SetUp()
@@ -113,9 +116,10 @@ def play(script: Script, seed: int, set_up: SetUp = MARKERS, *, settings: MouseS
          sway: Sway | None = None, covered_s: float = math.inf, watch: Watch = lambda title: None) -> MouseRun:
     """Play a script to the twin and its states to the mouse. From `covered_s` on the second camera is silent. Raises
     RhotError."""
-    settings, scene = settings or MouseSettings(), make_scene(twin_defaults(), seed)
+    settings, scene = settings or MouseSettings(), twin_scene(set_up, seed)
     posture = drawn_posture(seed) if set_up.cameras == 1 else FLAT_DEG
-    document = motion_file(script, scene.hand, settings, sway or Sway(), key_s=_KEY_S, posture=posture)
+    document = motion_file(script, scene.hand, settings, sway or Sway(), key_s=_KEY_S, posture=posture,
+                           facing=set_up.facing)
     with tempfile.TemporaryDirectory(prefix="rhot-mouse-") as name:
         path = Path(name) / f"mouse-{hashlib.sha256(msgspec.json.encode(document)).hexdigest()[:16]}.json"
         write_document(path, document)
@@ -164,7 +168,8 @@ def _bare_hand(set_up: SetUp, scene: Scene, motion: Path, seconds: float, covere
     lead_s = EMPTY_S + ENTRY_S
     whole = build_rig(scene, (NodePorts(0, 0, 0),) * len(scene.names))
     model = build_model(scene.hand)
-    source = MovedSource(load_motion(str(motion), model, scene.centre, scene.seed), -lead_s, enters_s=EMPTY_S,
+    moved = replace(load_motion(str(motion), model, scene.centre, scene.seed), facing=FACINGS[set_up.facing])
+    source = MovedSource(moved, -lead_s, enters_s=EMPTY_S,
                          below_m=0.8 * scene.settings.distance_m)
     sequence = BareHandSequence(whole, whole, model, str(motion), source, BareHandOptions(), lead_s + seconds, RATE_HZ,
                                 scene.seed, data_sets_folder())
@@ -203,6 +208,11 @@ def _true_state(state: HandState, palm: Array, joints: Array, tips: Array) -> Ha
                    fingertip_covariances=np.zeros((5, 3, 3)))
 
 
+def twin_scene(set_up: SetUp, seed: int) -> Scene:
+    """The twin's own scene, whose hand shows the wanted side."""
+    return make_scene(msgspec.structs.replace(twin_defaults(), facing=set_up.facing), seed)
+
+
 def tracked_rig(rig: Rig, set_up: SetUp, scene: Scene) -> Rig:
     """The rig that the tracker is given; with one camera, what a person knows of the table and the hand."""
     tracker = TrackerSettings("estimator", observe=set_up.observe)
@@ -213,7 +223,7 @@ def tracked_rig(rig: Rig, set_up: SetUp, scene: Scene) -> Rig:
 def drawn_plane(scene: Scene) -> PalmPlane:
     """The plane on which the scripted palm slides, with the error of a calibration."""
     rng = np.random.default_rng([scene.seed, 0x91A])
-    turn = exp_so3(PLANE_SD[1] * rng.normal(size=3)) @ home_pose()
+    turn = exp_so3(PLANE_SD[1] * rng.normal(size=3)) @ home_pose(scene.settings.facing)
     normal = turn[:, 2]
     rest = scene.centre + np.array([0.0, WRIST_BELOW_CENTRE_M, 0.0])
     return PalmPlane((float(normal[0]), float(normal[1]), float(normal[2])),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +21,17 @@ from rhot_app.hand.skeleton import ANGLES, HandPose
 from rhot_app.mouse.model import FLAT_DEG
 from rhot_app.mouse.pick_scene import START, Ball
 from rhot_app.mouse.pointer import BUTTONS, HOME_S, MouseSettings
-from rhot_app.simulator.scene.motion import FACING, Key, MotionFile, Sway
+from rhot_app.simulator.scene.motion import BACK_FACING, FACING, Key, MotionFile, Sway
 
 Array = NDArray[np.float64]
 
+Side = Literal["palm", "back"]
+FACINGS: Final = {"palm": FACING, "back": BACK_FACING}
+
 TILT_DEG: Final = 45.0
-"""The hand's plane leans so far towards the cameras: they look at it at 45 degrees, as in Rehg 1995, 4.3.4, but see the
-palm, which is the side that RHOT's cameras usually see."""
+"""The hand's plane leans so far towards the cameras: they look at it at 45 degrees, as in Rehg 1995, 4.3.4. RHOT's
+cameras usually see the palm. A finger that bends towards them is then seen from its tip; of a hand on a table they see
+the back, and all of the finger."""
 
 KEY_S: Final = 0.05
 """Between keys, unless a faster hand needs more of them; a spline goes through them."""
@@ -127,24 +131,26 @@ def resting(seconds: float) -> Script:
     return script
 
 
-def home_pose() -> Array:
-    """(3, 3) world_from_palm of a hand at rest, whose palm the cameras see."""
-    return np.asarray(Rotation.from_rotvec([np.radians(TILT_DEG), 0.0, 0.0]).as_matrix() @ FACING)
+def home_pose(facing: Side) -> Array:
+    """(3, 3) world_from_palm of a hand at rest, of which the cameras see that side."""
+    return np.asarray(Rotation.from_rotvec([np.radians(TILT_DEG), 0.0, 0.0]).as_matrix() @ FACINGS[facing])
 
 
 def motion_file(script: Script, anatomy: HandAnatomy, settings: MouseSettings, sway: Sway, *,
-                key_s: float = KEY_S, posture: Mapping[str, float] = FLAT_DEG) -> MotionFile:
-    """The script as a motion of a hand in a flat `posture`, degrees, with a key every `key_s`."""
+                key_s: float = KEY_S, posture: Mapping[str, float] = FLAT_DEG, facing: Side = "palm"
+                ) -> MotionFile:
+    """The script as a motion of a hand in a flat `posture`, degrees, with a key every `key_s`. `facing`: the side that
+    the scene's cameras see of it (`TwinSettings.facing`)."""
     period = script.end_s + 1.0
     times = np.arange(0.0, period - 0.5 * key_s, key_s)
-    home = home_pose()
+    home = home_pose(facing)
     lengths, flexions = _index_heights(anatomy, posture)
     keys = []
     for t_s, row in zip(times, script.sample(times), strict=True):
         cursor, spread, turn = row[:3], row[3:5], row[5]
         place = home @ np.array([cursor[1], -cursor[0], 0.0]) / settings.gain
         palm = home @ Rotation.from_rotvec([0.0, 0.0, turn]).as_matrix()
-        rotation = Rotation.from_matrix(palm @ FACING.T).as_rotvec(degrees=True)
+        rotation = Rotation.from_matrix(palm @ FACINGS[facing].T).as_rotvec(degrees=True)
         index = float(np.interp(cursor[2] / settings.height_gain, lengths, flexions))
         angles = {"index_mcp_flexion": round(index, 3)}
         for button, out in zip(BUTTONS, spread, strict=True):
