@@ -86,13 +86,12 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
                                                    + model.radii[4, 0])
     centres = _palm_centres(maps, [cameras[c] for c in used], breadth)
     found: list[Found] = []
+    shapes = _shapes(model)
     if plane is None:
-        shapes = _shapes(model)
         turns = Rotation.random(ROTATIONS, random_state=int(rng.integers(2**31))).as_matrix()
     else:
         met = [plane.met_by(cameras[used[0]].centre, centre) for centre in centres]
-        centres, shapes = [centre for centre in met if centre is not None], [model.pose_prior.mean]
-        turns = plane.turns(TURNS)
+        centres, turns = [centre for centre in met if centre is not None], plane.turns(TURNS)
     tried: list[tuple[float, Array, Array]] = []
     middle = np.array([0.6 * model.base[2, 0] * np.exp(size[0]), 0.0, 0.0])
 
@@ -113,8 +112,7 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
     for _, world, angles in _distinct(tried, KEPT):
         moved, bent, value = search(surface, world, angles, covariance, model.limits, size, seen, rng, FIRST_ROUNDS)
         found.append(Found(HandPose(moved, bent), value))
-    found = [_refined(one, covariance, model, surface, size, seen, rng, plane is None)
-             for one in _best(found, REFINED)]
+    found = [_refined(one, covariance, model, surface, size, seen, rng) for one in _best(found, REFINED)]
     return _best(found, most)
 
 
@@ -123,10 +121,9 @@ def _best(found: list[Found], most: int) -> list[Found]:
 
 
 def _refined(found: Found, covariance: Array, model: HandModel, surface: Surface, size: Array, images: Silhouettes,
-             rng: np.random.Generator, bends: bool) -> Found:
+             rng: np.random.Generator) -> Found:
     world, angles = found.pose.world_from_palm, found.pose.angles
-    if bends:
-        angles = bend_fingers(surface, world, angles, model, size, images)
+    angles = bend_fingers(surface, world, angles, model, size, images)
     world, angles, value = search(surface, world, angles, covariance, model.limits, size, images, rng, LAST_ROUNDS)
     return Found(HandPose(world, angles), value)
 
@@ -135,23 +132,23 @@ def settle(surface: Surface, world: Array, angles: Array, covariance: Array, mod
            images: Silhouettes, rng: np.random.Generator, plane: PalmOnPlane | None = None
            ) -> tuple[Array, Array, float]:
     """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, each finger bent or
-    straight but of a palm on a `plane`, and its score (`silhouette.search`)."""
+    straight, and its score (`silhouette.search`)."""
     if plane is not None:
         covariance = plane.narrowed(covariance)
     moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, images, rng, FIRST_ROUNDS)
-    if plane is None:
-        bent = bend_fingers(surface, moved, bent, model, size, images)
+    bent = bend_fingers(surface, moved, bent, model, size, images)
     return search(surface, moved, bent, 0.25 * covariance, model.limits, size, images, rng, FIRST_ROUNDS)
 
 
 def bend_fingers(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array,
                  images: Silhouettes) -> Array:
     """The angles (21,) with each finger as it is, open, relaxed or closed, and the thumb as it is, relaxed or to either
-    side, whichever the foreground says, one after the other, twice."""
-    angles = angles.copy()
+    side, whichever the foreground says, one after the other, twice. What the hand holds stays as it is."""
+    angles, held = angles.copy(), set(model.locked)
     thumbs = [model.pose_prior.mean[ANGLE_SLICES[0]] + aside * np.eye(5)[which]
               for which, aside in ((0, 0.0), *product((0, 1), (-_ASIDE, _ASIDE)))]
-    choices = [(ANGLE_SLICES[0], thumbs)] + [(list(flexions), np.radians(_CURLS_DEG)) for flexions in FLEXIONS[1:]]
+    choices = [] if held & {0, 1} else [(ANGLE_SLICES[0], thumbs)]
+    choices += [(list(flexions), np.radians(_CURLS_DEG)) for flexions in FLEXIONS[1:] if not held & set(flexions)]
     for where, options in [*choices, *choices]:
         steps = np.zeros((1 + len(options), 27))
         for k, option in enumerate(options):
@@ -174,7 +171,7 @@ def _distinct(tried: list[tuple[float, Array, Array]], most: int) -> list[tuple[
 
 
 def _shapes(model: HandModel) -> list[Array]:
-    """Angles (21,) of a relaxed, an open, a closed and a pointing hand."""
+    """Angles (21,) of a relaxed, an open, a closed and a pointing hand; what the hand holds is as it holds it."""
     out = []
     for curl in _CURLS_DEG:
         angles = model.pose_prior.mean.copy()
@@ -183,6 +180,9 @@ def _shapes(model: HandModel) -> list[Array]:
         out.append(angles)
     pointing = out[2].copy()
     pointing[list(FLEXIONS[1])] = np.radians(_CURLS_DEG[0])
+    held = list(model.locked)
+    for angles in (*out, pointing):
+        angles[held] = model.pose_prior.mean[held]
     return [out[1], out[0], out[2], pointing]
 
 

@@ -40,6 +40,7 @@ class HandModel:
     chain: Array  # (5, 3) m, the bones, the last one only as far as its marker's centre
     chain_bend: Array  # (5,) rad, how much more the way to the marker's centre bends than the bone: < 0 for a nail
     pose_prior: PosePrior  # of the angles
+    locked: tuple[int, ...] = ()  # angles that are held (`with_locked`)
 
 
 def build_model(anatomy: HandAnatomy) -> HandModel:
@@ -65,16 +66,18 @@ def build_model(anatomy: HandAnatomy) -> HandModel:
     )
 
 
-LOCKED_SD_RAD: Final = math.radians(5.0)
-"""rad: how far a joint is from where it is told to be held: as exactly as a goniometer repeats (chosen)."""
+LOCKED_SD_RAD: Final = math.radians(2.0)
+"""rad: how far a joint is from where it is told to be held. Chosen: Rehg's are exact, a goniometer repeats to 5
+degrees, and a finger with that much freedom is still taken for its neighbour."""
 
 
 def with_locked(model: HandModel, locked_deg: Mapping[str, float]) -> HandModel:
     """The hand with angles, by their names, that it holds: the pose prior expects them there."""
-    rows = np.array([np.eye(len(ANGLES))[ANGLES.index(name)] for name in locked_deg]).reshape(-1, len(ANGLES))
+    locked = tuple(ANGLES.index(name) for name in locked_deg)
+    rows = np.eye(len(ANGLES))[list(locked)]
     values = np.radians(list(locked_deg.values()))
     prior = model.pose_prior.with_terms(rows / LOCKED_SD_RAD, values / LOCKED_SD_RAD)
-    return replace(model, pose_prior=prior)
+    return replace(model, pose_prior=prior, locked=locked)
 
 
 def neutral_pose(world_from_palm: Array | None = None) -> HandPose:

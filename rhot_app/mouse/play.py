@@ -64,14 +64,19 @@ _KEY_S: Final = 0.01  # for ways of a tenth of a second
 
 @dataclass(frozen=True, slots=True)
 class SetUp:
-    """How a script is played. `observe`: what the tracker observes. `cameras`: with one, it tracks with the mouse's
-    model (`rhot_app.mouse.model`). `pictures`: markers are rendered and detected; a bare hand always is. `facing`: the
-    side of the hand that the cameras see."""
+    """How a script is played. `observe`: what the tracker observes. `cameras`: with one, it knows the palm's plane;
+    then, and of a bare hand, it knows the mouse's posture, too (`rhot_app.mouse.model`). `pictures`: markers are
+    rendered and detected; a bare hand always is. `facing`: the side of the hand that the cameras see."""
 
     observe: Literal["markers", "contours"] = "markers"
     cameras: int = 2
     pictures: bool = False
     facing: Side = "palm"
+
+    @property
+    def modelled(self) -> bool:
+        """Whether the tracker has the mouse's model."""
+        return self.cameras == 1 or self.observe == "contours"
 
     @property
     def name(self) -> str:
@@ -117,7 +122,7 @@ def play(script: Script, seed: int, set_up: SetUp = MARKERS, *, settings: MouseS
     """Play a script to the twin and its states to the mouse. From `covered_s` on the second camera is silent. Raises
     RhotError."""
     settings, scene = settings or MouseSettings(), twin_scene(set_up, seed)
-    posture = drawn_posture(seed) if set_up.cameras == 1 else FLAT_DEG
+    posture = drawn_posture(seed) if set_up.modelled else FLAT_DEG
     document = motion_file(script, scene.hand, settings, sway or Sway(), key_s=_KEY_S, posture=posture,
                            facing=set_up.facing)
     with tempfile.TemporaryDirectory(prefix="rhot-mouse-") as name:
@@ -214,10 +219,11 @@ def twin_scene(set_up: SetUp, seed: int) -> Scene:
 
 
 def tracked_rig(rig: Rig, set_up: SetUp, scene: Scene) -> Rig:
-    """The rig that the tracker is given; with one camera, what a person knows of the table and the hand."""
+    """The rig that the tracker is given, with what a person knows of the table and the hand."""
     tracker = TrackerSettings("estimator", observe=set_up.observe)
     rig = msgspec.structs.replace(rig, nodes=rig.nodes[:set_up.cameras], tracker=tracker)
-    return with_mouse_model(rig, drawn_plane(scene)) if set_up.cameras == 1 else rig
+    plane = drawn_plane(scene) if set_up.cameras == 1 else None
+    return with_mouse_model(rig, plane) if set_up.modelled else rig
 
 
 def drawn_plane(scene: Scene) -> PalmPlane:

@@ -12,6 +12,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,15 @@ from rhot_app.hand.motion.hand_process import BIAS, POSE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, SeenContour, no_hand
-from rhot_app.tracking.contours.evidence import asked, matched, on_foreground, same_hand, seen_contour
+from rhot_app.tracking.contours.evidence import (
+    CONFUSED_M,
+    asked,
+    joints_of,
+    matched,
+    on_foreground,
+    same_hand,
+    seen_contour,
+)
 from rhot_app.tracking.contours.finder import Finder, Maps
 from rhot_app.tracking.contours.markers import BesideContours, MarkersOfHand
 from rhot_app.tracking.contours.states import published
@@ -97,6 +106,13 @@ class _Camera:
                 and abs(t_ns - self.newest.t_row0_master_ns) < WRONG_AFTER_PERIODS * self.period_ns)
 
 
+class _Expected(NamedTuple):
+    """What is known of a request: after how many starts it was made, and the contour that was expected."""
+
+    start: int
+    contour: ContourFrame
+
+
 class ContourEstimator:
     """Implements `Tracker` and `ImageTracking`: a state after the edges of every frame."""
 
@@ -107,7 +123,7 @@ class ContourEstimator:
         self._markers = MarkersOfHand(rig, self._hand) if rig.tracker.observe != "contours" else None
         self._finder = Finder(self._hand)
         self._names = tuple(node.name for node in rig.nodes)
-        self._sequence = 0
+        self._sequence = self._starts = 0
         self.reset()
 
     def reset(self) -> None:
@@ -302,10 +318,13 @@ class ContourEstimator:
         state, _ = self._hand.filter.predict(self._seconds(t_ns))
         other, _ = self._hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
         other[BIAS:], seen = state[BIAS:], maps.silhouettes(self._hand)
-        if same_hand(self._hand, state, pose):
-            self._confirmed = self._ever = True
-        elif self._hand.score_of(seen, other) > self._hand.score_of(seen, state):
+        gain = self._hand.score_of(seen, other) - self._hand.score_of(seen, state)
+        apart_m = float(np.linalg.norm(joints_of(self._hand, other) - joints_of(self._hand, state), axis=1).mean())
+        same = same_hand(self._hand, state, pose)
+        if gain > (LEAST_GAIN if same else 0.0) and apart_m > CONFUSED_M:  # it has come in meanwhile, or is another one
             self._start(pose, t_ns)
+        elif same:
+            self._confirmed = self._ever = True
         else:
             self._finder.look(maps)
 
@@ -318,6 +337,7 @@ class ContourEstimator:
         worse = hand.cover != 0.0 and covered < hand.cover - COVER_DROP
         if worse and moved is not None and hand.score_of(seen, moved) > hand.score_of(seen, knot.state) + LEAST_GAIN:
             hand.restart(knot.t_s, moved)
+            self._starts += 1
             for number, camera in enumerate(self._cameras):
                 if camera.newest is not None:
                     self._ask(number, camera.newest.t_row0_master_ns)
@@ -352,6 +372,7 @@ class ContourEstimator:
     def _start(self, pose: HandPose, t_ns: int) -> None:
         self._hand.start(pose, t_ns)
         self._hand.cover = 0.0
+        self._starts += 1
         self._finder.reset()
         if self._markers is not None:
             self._markers.begin(self._hand)
@@ -491,16 +512,17 @@ class ContourEstimator:
         if len(contour.slices) > SLICES_MAX:
             contour = asked(self._hand, number, state, covariance, STEP_M * len(contour.slices) / SLICES_MAX)
         self._requests = [one for one in self._requests if one.camera != number]
-        self._requests.append(SliceRequest(number, contour.slices[:SLICES_MAX], STEP, contour))
+        self._requests.append(SliceRequest(number, contour.slices[:SLICES_MAX], STEP,
+                                           _Expected(self._starts, contour)))
 
     def _contour(self, frame: EdgeFrame) -> ContourFrame | None:
         """The contour on the slices that were searched, with their edges: as it was expected, or in a log as it is
         now."""
         expected = frame.request.expected
-        if isinstance(expected, ContourFrame) and expected.surface is self._hand.surface:
-            if len(expected.slices) != len(frame.request.slices):
-                return None
-            contour = copy.copy(expected)  # for this frame
+        if isinstance(expected, _Expected) and expected.contour.surface is self._hand.surface:
+            if expected.start != self._starts or len(expected.contour.slices) != len(frame.request.slices):
+                return None  # it was asked about the hand as it was taken to be before, and would pull this one there
+            contour = copy.copy(expected.contour)  # for this frame
             contour.observe(frame.edges)
             return contour
         middle_ns = round(0.5e9 * self._hand.row_s[frame.camera] * self._hand.cameras[frame.camera].height)
