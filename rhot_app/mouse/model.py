@@ -21,6 +21,10 @@ FREE: Final = ("index_mcp_flexion", "index_pip_flexion", "index_dip_flexion", "t
                "little_mcp_abduction")
 """Angles that work the mouse."""
 
+BEYOND_ONE_CAMERA: Final = "index_pip_flexion", "index_dip_flexion"
+"""Held, too, where one camera is to suffice: it does not tell a finger that rises from its knuckle from one that bends
+in its middle. Rehg's moved."""
+
 FLAT_DEG: Final = {
     "thumb_cmc_abduction": -18.0, "thumb_cmc_flexion": 8.0, "thumb_mcp_flexion": 12.0, "thumb_ip_flexion": 12.0,
     "index_mcp_flexion": 26.0, "index_pip_flexion": 10.0, "index_dip_flexion": 6.0, "index_mcp_abduction": 5.0,
@@ -32,8 +36,10 @@ others are 0."""
 
 
 def with_mouse_model(rig: Rig, plane: PalmPlane | None) -> Rig:
-    """The rig with an estimator that knows the mouse's hand. `plane`: on which the palm lies."""
-    locked = {name: FLAT_DEG.get(name, 0.0) for name in ANGLES if name not in FREE}
+    """The rig with an estimator that knows the mouse's hand. `plane`: on which the palm lies; None: two cameras see
+    where."""
+    free = set(FREE) - set(() if plane is None else BEYOND_ONE_CAMERA)
+    locked = {name: FLAT_DEG.get(name, 0.0) for name in ANGLES if name not in free}
     tracker = msgspec.structs.replace(rig.tracker, kind="estimator", locked_deg=locked, palm_plane=plane)
     return msgspec.structs.replace(rig, tracker=tracker)
 
