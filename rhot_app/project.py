@@ -33,6 +33,7 @@ Pixels = Annotated[int, Meta(ge=16, le=16384)]
 Focal = Annotated[float, Meta(gt=0, le=1e6)]
 Pixel = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Coefficient = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Sd = Annotated[float, Meta(gt=0)]
 Metres = Annotated[float, Meta(ge=-1000, le=1000)]
 Address = Annotated[str, Meta(pattern=r"\A[A-Za-z0-9._:%-]{1,253}\Z")]
 """Of a machine: its name, IPv4 or IPv6 address."""
@@ -167,7 +168,8 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     estimates one hand from every image position. The other fields are the estimator's.
     `variant`: `full` (27 degrees of freedom) or `coupled` (DIP = 2/3 PIP and no abduction of the middle finger, RHOT
     2.2 to 2.4). `float_scale`: estimate the hand's size as it moves. `observe`: paint, landmarks, the contours of the
-    bare hand, or two at once. `locked_deg`: angles of `hand.skeleton.ANGLES` that the hand holds there. `palm_plane`:
+    bare hand, or two at once. `locked_deg`: angles of `hand.skeleton.ANGLES` that the hand holds there, or
+    about there with a standard deviation. `palm_plane`:
     the palm slides on it; one camera then suffices.
     """
 
@@ -177,7 +179,7 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     limits: Literal["anatomical", "thesis"] = "anatomical"
     float_scale: bool = False
     observe: Observe = "markers"
-    locked_deg: dict[str, float] = {}
+    locked_deg: dict[str, float | tuple[float, Sd]] = {}
     palm_plane: PalmPlane | None = None
 
     @property

@@ -71,12 +71,14 @@ LOCKED_SD_RAD: Final = math.radians(2.0)
 degrees, and a finger with that much freedom is still taken for its neighbour."""
 
 
-def with_locked(model: HandModel, locked_deg: Mapping[str, float]) -> HandModel:
-    """The hand with angles, by their names, that it holds: the pose prior expects them there."""
-    locked = tuple(ANGLES.index(name) for name in locked_deg)
-    rows = np.eye(len(ANGLES))[list(locked)]
-    values = np.radians(list(locked_deg.values()))
-    prior = model.pose_prior.with_terms(rows / LOCKED_SD_RAD, values / LOCKED_SD_RAD)
+def with_locked(model: HandModel, locked_deg: Mapping[str, float | tuple[float, float]]) -> HandModel:
+    """The hand with angles, by their names, that it holds: the pose prior expects them there, or about there with the
+    standard deviation that is given."""
+    locked = tuple(ANGLES.index(name) for name, value in locked_deg.items() if not isinstance(value, tuple))
+    rows = np.eye(len(ANGLES))[[ANGLES.index(name) for name in locked_deg]]
+    both = np.radians([value if isinstance(value, tuple) else (value, math.degrees(LOCKED_SD_RAD))
+                       for value in locked_deg.values()]).reshape(-1, 2)
+    prior = model.pose_prior.with_terms(rows / both[:, 1:], both[:, 0] / both[:, 1])
     return replace(model, pose_prior=prior, locked=locked)
 
 

@@ -22,7 +22,7 @@ FREE: Final = ("index_mcp_flexion", "index_pip_flexion", "index_dip_flexion", "t
 """Angles that work the mouse."""
 
 BEYOND_ONE_CAMERA: Final = "index_pip_flexion", "index_dip_flexion"
-"""Held, too, where one camera is to suffice: it does not tell a finger that rises from its knuckle from one that bends
+"""Held, too, before one camera: it does not tell a finger that rises from its knuckle from one that bends
 in its middle. Rehg's moved."""
 
 FLAT_DEG: Final = {
@@ -35,11 +35,18 @@ FLAT_DEG: Final = {
 others are 0."""
 
 
+RISING: Final = "index_mcp_flexion", (0.5 * FLAT_DEG["index_mcp_flexion"], 0.5 * FLAT_DEG["index_mcp_flexion"])
+"""The forefinger is somewhere between its rest and straight, mean and standard deviation in degrees. One camera sees a
+finger that is bent 45 degrees to the table square to its line of sight: it looks the same if bent more or less."""
+
+
 def with_mouse_model(rig: Rig, plane: PalmPlane | None) -> Rig:
     """The rig with an estimator that knows the mouse's hand. `plane`: on which the palm lies; None: two cameras see
     where."""
-    free = set(FREE) - set(() if plane is None else BEYOND_ONE_CAMERA)
-    locked = {name: FLAT_DEG.get(name, 0.0) for name in ANGLES if name not in free}
+    free = set(FREE) - set(BEYOND_ONE_CAMERA if len(rig.nodes) == 1 else ())
+    locked: dict[str, float | tuple[float, float]] = {name: FLAT_DEG.get(name, 0.0) for name in ANGLES
+                                                      if name not in free}
+    locked |= [RISING]
     tracker = msgspec.structs.replace(rig.tracker, kind="estimator", locked_deg=locked, palm_plane=plane)
     return msgspec.structs.replace(rig, tracker=tracker)
 

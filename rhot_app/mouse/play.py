@@ -64,8 +64,8 @@ _KEY_S: Final = 0.01  # for ways of a tenth of a second
 
 @dataclass(frozen=True, slots=True)
 class SetUp:
-    """How a script is played. `observe`: what the tracker observes. `cameras`: with one, it knows the palm's plane;
-    then, and of a bare hand, it knows the mouse's posture, too (`rhot_app.mouse.model`). `pictures`: markers are
+    """How a script is played. `observe`: what the tracker observes. `cameras`: with one, and of a bare hand, it knows
+    the palm's plane and the mouse's posture (`rhot_app.mouse.model`). `pictures`: markers are
     rendered and detected; a bare hand always is. `facing`: the side of the hand that the cameras see."""
 
     observe: Literal["markers", "contours"] = "markers"
@@ -222,8 +222,7 @@ def tracked_rig(rig: Rig, set_up: SetUp, scene: Scene) -> Rig:
     """The rig that the tracker is given, with what a person knows of the table and the hand."""
     tracker = TrackerSettings("estimator", observe=set_up.observe)
     rig = msgspec.structs.replace(rig, nodes=rig.nodes[:set_up.cameras], tracker=tracker)
-    plane = drawn_plane(scene) if set_up.cameras == 1 else None
-    return with_mouse_model(rig, plane) if set_up.modelled else rig
+    return with_mouse_model(rig, drawn_plane(scene)) if set_up.modelled else rig
 
 
 def drawn_plane(scene: Scene) -> PalmPlane:

@@ -75,6 +75,11 @@ def test_held_joints_are_expected_where_they_are_held() -> None:
     for name, value in (("middle_pip_flexion", 70.0), ("ring_mcp_flexion", -5.0)):
         assert mean[ANGLES.index(name)] == pytest.approx(value, abs=1.0)
         assert np.degrees(np.sqrt(covariance[ANGLES.index(name), ANGLES.index(name)])) <= 2.0
+    about = with_locked(MODEL, {"index_mcp_flexion": (40.0, 6.0)})
+    covariance = np.linalg.inv(about.pose_prior.information)[6, 6]
+    assert ANGLES[6] == "index_mcp_flexion" and not about.locked
+    assert np.degrees(about.pose_prior.mean[6]) == pytest.approx(40.0, abs=3.0)
+    assert 4.0 < np.degrees(np.sqrt(covariance)) < 6.0
     assert with_locked(MODEL, {}).pose_prior.mean == pytest.approx(MODEL.pose_prior.mean)
 
 

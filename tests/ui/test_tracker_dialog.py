@@ -131,7 +131,7 @@ def test_a_hand_that_lies_flat_is_ticked_and_kept_by_other_choices(opened):
 
     flat = changes(lambda: click_on_word(dialog.flat_check))
     assert flat.palm_plane.normal == (0.0, 0.0, 1.0) and 0.0 < flat.palm_plane.distance_m < 0.04
-    assert "middle_pip_flexion" in flat.locked_deg and "index_mcp_flexion" not in flat.locked_deg
+    assert "middle_pip_flexion" in flat.locked_deg and "thumb_cmc_flexion" not in flat.locked_deg
     coupled = changes(lambda: QTest.keyClick(dialog.variant_box, Qt.Key.Key_Down))
     assert coupled == msgspec.structs.replace(flat, variant="coupled")
     assert changes(lambda: click_on_word(dialog.flat_check)) == TrackerSettings(kind="estimator", variant="coupled")
