@@ -147,7 +147,9 @@ def bend_fingers(surface: Surface, world: Array, angles: Array, model: HandModel
     angles, held = angles.copy(), set(model.locked)
     thumbs = [model.pose_prior.mean[ANGLE_SLICES[0]] + aside * np.eye(5)[which]
               for which, aside in ((0, 0.0), *product((0, 1), (-_ASIDE, _ASIDE)))]
-    choices = [] if held & {0, 1} else [(ANGLE_SLICES[0], thumbs)]
+    choices: list[tuple[slice | list[int], list[Array] | Array]] = []
+    if not held & {0, 1}:
+        choices.append((ANGLE_SLICES[0], thumbs))
     choices += [(list(flexions), np.radians(_CURLS_DEG)) for flexions in FLEXIONS[1:] if not held & set(flexions)]
     for where, options in [*choices, *choices]:
         steps = np.zeros((1 + len(options), 27))

@@ -1,7 +1,7 @@
 """The hand of the 3-D mouse (Rehg 1995, 4.3.4): its palm slides on a plane, and only the fingers move that it needs.
 
-One camera then suffices. The forefinger bends; thumb and little finger spread; the other joints are held as a flat,
-relaxed hand has them.
+One camera then suffices. The forefinger rises from its knuckle; thumb and little finger spread; the other joints are
+held as a flat, relaxed hand has them.
 """
 
 from __future__ import annotations
@@ -17,13 +17,9 @@ from rhot_app.project import PalmPlane, Rig
 
 Array = NDArray[np.float64]
 
-FREE: Final = ("index_mcp_flexion", "index_pip_flexion", "index_dip_flexion", "thumb_cmc_flexion",
-               "little_mcp_abduction")
-"""Angles that work the mouse."""
-
-BEYOND_ONE_CAMERA: Final = "index_pip_flexion", "index_dip_flexion"
-"""Held, too, before one camera: it does not tell a finger that rises from its knuckle from one that bends
-in its middle. Rehg's moved."""
+FREE: Final = "index_mcp_flexion", "thumb_cmc_flexion", "little_mcp_abduction"
+"""Angles that work the mouse. Rehg's forefinger bent in its middle, too; one camera, or two side by side, do not tell
+that from a finger that rises from its knuckle."""
 
 FLAT_DEG: Final = {
     "thumb_cmc_abduction": -18.0, "thumb_cmc_flexion": 8.0, "thumb_mcp_flexion": 12.0, "thumb_ip_flexion": 12.0,
@@ -35,17 +31,16 @@ FLAT_DEG: Final = {
 others are 0."""
 
 
-RISING: Final = "index_mcp_flexion", (0.5 * FLAT_DEG["index_mcp_flexion"], 0.5 * FLAT_DEG["index_mcp_flexion"])
-"""The forefinger is somewhere between its rest and straight, mean and standard deviation in degrees. One camera sees a
+RISING: Final = "index_mcp_flexion", (0.5 * FLAT_DEG["index_mcp_flexion"], 0.25 * FLAT_DEG["index_mcp_flexion"])
+"""The forefinger is between its rest and straight, two standard deviations to both sides, degrees. One camera sees a
 finger that is bent 45 degrees to the table square to its line of sight: it looks the same if bent more or less."""
 
 
 def with_mouse_model(rig: Rig, plane: PalmPlane | None) -> Rig:
     """The rig with an estimator that knows the mouse's hand. `plane`: on which the palm lies; None: two cameras see
     where."""
-    free = set(FREE) - set(BEYOND_ONE_CAMERA if len(rig.nodes) == 1 else ())
     locked: dict[str, float | tuple[float, float]] = {name: FLAT_DEG.get(name, 0.0) for name in ANGLES
-                                                      if name not in free}
+                                                      if name not in FREE}
     locked |= [RISING]
     tracker = msgspec.structs.replace(rig.tracker, kind="estimator", locked_deg=locked, palm_plane=plane)
     return msgspec.structs.replace(rig, tracker=tracker)
