@@ -37,9 +37,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "barehand"), str(ROOT / "benchma
 from bare_hand import CHI2_3, MOTIONS, mistaken  # noqa: E402
 from bare_scenes import DISTANCE_M, rig_of, right_hand  # noqa: E402
 from pictures import picture, two_cameras, wall  # noqa: E402
-from searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
 
 from rhot_app.barehand.surface import capsules_of, meet, surface_of  # noqa: E402
+from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.model import HandModel, build_model  # noqa: E402

@@ -14,6 +14,7 @@ import numpy as np
 from tables import arguments, publish, table
 
 from rhot_app.mouse.measure import measures
+from rhot_app.mouse.play import SetUp
 from rhot_app.progress import ProgressLine
 
 AXES = ("x_mm", "y_mm", "height_mm")
@@ -26,7 +27,7 @@ def main() -> int:
     parser.add_argument("--places", type=int, default=20, help="balls to pick and place, a seed each")
     parser.add_argument("--sketched", action="store_true", help="without images")
     args = parser.parse_args()
-    figures = measures(args.seed, args.places, pictures=not args.sketched,
+    figures = measures(args.seed, args.places, set_up=SetUp(pictures=not args.sketched),
                        watch=lambda title: ProgressLine(f"rendering {title}"))
     late, found, away = figures["latency"], figures["throughput"], [one["away_mm"] for one in figures["place"]]
     rows = [["a state is ready after the hand was there, ms: p50, p99",

@@ -15,6 +15,7 @@ from msgspec import Meta
 
 from rhot_app.errors import ObjectError, RigError
 from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.skeleton import ANGLES
 from rhot_app.objects.object_file import Name, ObjectModel, load_object, require_distinct
 from rhot_node.files import decode_document, read_document, write_document
 from rhot_node.markers import MarkerSet
@@ -32,6 +33,7 @@ Pixels = Annotated[int, Meta(ge=16, le=16384)]
 Focal = Annotated[float, Meta(gt=0, le=1e6)]
 Pixel = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Coefficient = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Sd = Annotated[float, Meta(gt=0)]
 Metres = Annotated[float, Meta(ge=-1000, le=1000)]
 Address = Annotated[str, Meta(pattern=r"\A[A-Za-z0-9._:%-]{1,253}\Z")]
 """Of a machine: its name, IPv4 or IPv6 address."""
@@ -147,6 +149,18 @@ Observe = Literal["markers", "landmarks", "contours", "both", "landmarks_and_con
 """
 
 
+class PalmPlane(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A plane on which the palm slides. `normal`: along the back of the hand, rig frame, of any length. `distance_m`:
+    of the palm's origin, the wrist, from the rig frame's origin along it."""
+
+    normal: tuple[float, float, float]
+    distance_m: Metres
+
+    def __post_init__(self) -> None:
+        if not sum(value * value for value in self.normal) > 0.0:
+            raise ValueError("the normal of a plane is not 0, 0, 0")
+
+
 class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which tracker makes a hand of the markers, and what it may assume.
 
@@ -154,7 +168,9 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     estimates one hand from every image position. The other fields are the estimator's.
     `variant`: `full` (27 degrees of freedom) or `coupled` (DIP = 2/3 PIP and no abduction of the middle finger, RHOT
     2.2 to 2.4). `float_scale`: estimate the hand's size as it moves. `observe`: paint, landmarks, the contours of the
-    bare hand, or two at once.
+    bare hand, or two at once. `locked_deg`: angles of `hand.skeleton.ANGLES` that the hand holds there, or
+    about there with a standard deviation. `palm_plane`:
+    the palm slides on it; one camera then suffices.
     """
 
     kind: TrackerKind = "classic"
@@ -163,6 +179,8 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     limits: Literal["anatomical", "thesis"] = "anatomical"
     float_scale: bool = False
     observe: Observe = "markers"
+    locked_deg: dict[str, float | tuple[float, Sd]] = {}
+    palm_plane: PalmPlane | None = None
 
     @property
     def smooths(self) -> bool:
@@ -185,6 +203,9 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.kind == "classic" and self.observe != "markers":
             raise ValueError(f"the classic tracker knows markers only, and observe is \"{self.observe}\"; choose the "
                              "kind \"estimator\", or take observe away")
+        unknown = sorted(set(self.locked_deg) - set(ANGLES))
+        if unknown:
+            raise ValueError(f"there is no joint angle {unknown[0]!r} to lock; they are {', '.join(ANGLES)}")
 
 
 class CameraCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

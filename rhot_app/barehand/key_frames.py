@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import COLUMNS, ContourFrame, JointLimits
 from rhot_app.barehand.contours import STEP_M
-from rhot_app.barehand.surface import FINGERS, FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
+from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
 from rhot_app.barehand.tracker import FOREARM_SD, LENGTH_SD, RADIUS_SD, SIZE_SD, BareHandTracker
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, POSE, VELOCITY
@@ -136,7 +136,7 @@ def phalanx_sd(covariance: Array) -> tuple[Array, Array]:
     """(15,) and (15,) standard deviations of the logarithms of the phalanges' lengths and of their radii, sizes
     included, from the shape's covariance."""
     lengths, radii = np.zeros((15, FOREARM_TURN)), np.zeros((15, FOREARM_TURN))
-    lengths[:, [WHOLE, FINGERS]] = radii[:, [WHOLE, THICKNESS]] = 1.0
+    lengths[:, [WHOLE, FINGER_SIZE]] = radii[:, [WHOLE, THICKNESS]] = 1.0
     lengths[range(15), range(LENGTH, RADIUS)] = radii[range(15), range(RADIUS, RADIUS + 15)] = 1.0
     return (np.sqrt(np.sum((lengths @ covariance) * lengths, axis=1)),
             np.sqrt(np.sum((radii @ covariance) * radii, axis=1)))

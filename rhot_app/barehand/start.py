@@ -21,6 +21,7 @@ from rhot_app.barehand.surface import Surface
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.model import HandModel
+from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS, HandPose
 from rhot_node.detect.foreground import Foreground, foreground_map
 
@@ -31,6 +32,9 @@ STEP = 8
 
 ROTATIONS = 400
 """Rotations of a relaxed hand tried at a candidate: 25 degrees apart."""
+
+TURNS = 60
+"""Of a palm on a plane, all around: 6 degrees apart. Chosen, not tuned."""
 
 SHAPED = 80
 """Rotations, the best of all candidates, that are tried with the other shapes of the hand. Chosen, not tuned."""
@@ -63,16 +67,17 @@ class Found:
 
 def find_hand(images: Sequence[NDArray[np.uint8] | None], cameras: Sequence[CameraModel],
               foreground: Sequence[Foreground], model: HandModel, surface: Surface, size: Array,
-              rng: np.random.Generator, most: int = 3) -> list[Found]:
+              rng: np.random.Generator, most: int = 3, plane: PalmOnPlane | None = None) -> list[Found]:
     """The most probable hands in images (H, W, 3) RGB of some cameras, best first, at most `most`; none without
-    foreground as thick as a palm."""
+    foreground as thick as a palm. On a `plane` the palm lies, in the posture of the model's pose prior."""
     maps = [None if image is None else foreground_map(image, learnt, STEP)
             for image, learnt in zip(images, foreground, strict=True)]
-    return find_in_maps(maps, cameras, model, surface, size, rng, most)
+    return find_in_maps(maps, cameras, model, surface, size, rng, most, plane)
 
 
 def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequence[CameraModel], model: HandModel,
-                 surface: Surface, size: Array, rng: np.random.Generator, most: int = 3) -> list[Found]:
+                 surface: Surface, size: Array, rng: np.random.Generator, most: int = 3,
+                 plane: PalmOnPlane | None = None) -> list[Found]:
     """The same in foreground probabilities (h, w) of every STEP-th pixel, None of a camera without an image."""
     used = [c for c, one in enumerate(foreground) if one is not None]
     maps = [one for one in foreground if one is not None]
@@ -83,7 +88,11 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
     centres = _palm_centres(maps, [cameras[c] for c in used], breadth)
     found: list[Found] = []
     shapes = _shapes(model)
-    turns = Rotation.random(ROTATIONS, random_state=int(rng.integers(2**31))).as_matrix()
+    if plane is None:
+        turns = Rotation.random(ROTATIONS, random_state=int(rng.integers(2**31))).as_matrix()
+    else:
+        met = [plane.met_by(cameras[used[0]].centre, centre) for centre in centres]
+        centres, turns = [centre for centre in met if centre is not None], plane.turns(TURNS)
     tried: list[tuple[float, Array, Array]] = []
     middle = np.array([0.6 * model.base[2, 0] * np.exp(size[0]), 0.0, 0.0])
 
@@ -99,6 +108,8 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
     tried.sort(key=lambda one: -one[0])
     covariance = np.diag(np.repeat(np.square(_SPREAD), (3, 3, 21)))
     covariance[6:, 6:] = np.linalg.inv(model.pose_prior.information + np.eye(21) / _SPREAD[2] ** 2)
+    if plane is not None:
+        covariance = plane.narrowed(covariance)
     for _, world, angles in _distinct(tried, KEPT):
         moved, bent, value = search(surface, world, angles, covariance, model.limits, size, seen, rng, FIRST_ROUNDS)
         found.append(Found(HandPose(moved, bent), value))
@@ -119,9 +130,12 @@ def _refined(found: Found, covariance: Array, model: HandModel, surface: Surface
 
 
 def settle(surface: Surface, world: Array, angles: Array, covariance: Array, model: HandModel, size: Array,
-           images: Silhouettes, rng: np.random.Generator) -> tuple[Array, Array, float]:
+           images: Silhouettes, rng: np.random.Generator, plane: PalmOnPlane | None = None
+           ) -> tuple[Array, Array, float]:
     """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, each finger bent or
     straight, and its score (`silhouette.search`)."""
+    if plane is not None:
+        covariance = plane.narrowed(covariance)
     moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, images, rng, FIRST_ROUNDS)
     bent = bend_fingers(surface, moved, bent, model, size, images)
     return search(surface, moved, bent, 0.25 * covariance, model.limits, size, images, rng, FIRST_ROUNDS)
@@ -130,11 +144,14 @@ def settle(surface: Surface, world: Array, angles: Array, covariance: Array, mod
 def bend_fingers(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array,
                  images: Silhouettes) -> Array:
     """The angles (21,) with each finger as it is, open, relaxed or closed, and the thumb as it is, relaxed or to either
-    side, whichever the foreground says, one after the other, twice."""
-    angles = angles.copy()
+    side, whichever the foreground says, one after the other, twice. What the hand holds stays as it is."""
+    angles, held = angles.copy(), set(model.locked)
     thumbs = [model.pose_prior.mean[ANGLE_SLICES[0]] + aside * np.eye(5)[which]
               for which, aside in ((0, 0.0), *product((0, 1), (-_ASIDE, _ASIDE)))]
-    choices = [(ANGLE_SLICES[0], thumbs)] + [(list(flexions), np.radians(_CURLS_DEG)) for flexions in FLEXIONS[1:]]
+    choices: list[tuple[slice | list[int], list[Array] | Array]] = []
+    if not held & {0, 1}:
+        choices.append((ANGLE_SLICES[0], thumbs))
+    choices += [(list(flexions), np.radians(_CURLS_DEG)) for flexions in FLEXIONS[1:] if not held & set(flexions)]
     for where, options in [*choices, *choices]:
         steps = np.zeros((1 + len(options), 27))
         for k, option in enumerate(options):
@@ -157,7 +174,7 @@ def _distinct(tried: list[tuple[float, Array, Array]], most: int) -> list[tuple[
 
 
 def _shapes(model: HandModel) -> list[Array]:
-    """Angles (21,) of a relaxed, an open, a closed and a pointing hand."""
+    """Angles (21,) of a relaxed, an open, a closed and a pointing hand; what the hand holds is as it holds it."""
     out = []
     for curl in _CURLS_DEG:
         angles = model.pose_prior.mean.copy()
@@ -166,6 +183,9 @@ def _shapes(model: HandModel) -> list[Array]:
         out.append(angles)
     pointing = out[2].copy()
     pointing[list(FLEXIONS[1])] = np.radians(_CURLS_DEG[0])
+    held = list(model.locked)
+    for angles in (*out, pointing):
+        angles[held] = model.pose_prior.mean[held]
     return [out[1], out[0], out[2], pointing]
 
 

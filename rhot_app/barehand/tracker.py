@@ -27,7 +27,7 @@ from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
 from rhot_app.estimation.residual import Residual
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_app.hand.model import build_model
+from rhot_app.hand.model import build_model, with_locked
 from rhot_app.hand.motion.hand_process import (
     ACCELERATION,
     ANGLES,
@@ -39,6 +39,7 @@ from rhot_app.hand.motion.hand_process import (
     VELOCITY,
     HandProcess,
 )
+from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS, JOINT_SLICES, HandPose
 from rhot_app.project import Rig
 from rhot_app.state import (
@@ -137,7 +138,9 @@ class BareHandTracker:
         camera's node has learnt of hand and background; nothing by default. `row_s`: each camera's time between two
         rows, s; 0 by default."""
         self.mode = mode
-        self.model = build_model(rig.hand)
+        self.model = with_locked(build_model(rig.hand), rig.tracker.locked_deg)
+        plane = rig.tracker.palm_plane
+        self.plane = None if plane is None else PalmOnPlane(plane)
         self.surface = surface_of(self.model)
         self.cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
         self.names = tuple(node.name for node in rig.nodes)
@@ -155,7 +158,7 @@ class BareHandTracker:
                                    np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, np.full(3, FASTEST),
                                    FASTEST, self.shape_covariance, self.shape_s)
         self.filter = IteratedFilter(self.process)
-        self.limits = JointLimits(self.model.limits)
+        self.known: list[Residual] = [JointLimits(self.model.limits), *([] if self.plane is None else [self.plane])]
         self.tracking = False
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
@@ -186,7 +189,8 @@ class BareHandTracker:
         """
         size = np.zeros(SHAPE)
         best: tuple[float, Found] | None = None
-        for found in find_hand(images, self.cameras, self.foreground, self.model, self.surface, size, self._rng):
+        for found in find_hand(images, self.cameras, self.foreground, self.model, self.surface, size, self._rng,
+                               plane=self.plane):
             if found.score <= 0.0:
                 continue
             self.start(found.pose, t_ns)
@@ -272,7 +276,7 @@ class BareHandTracker:
         for number in range(passes):
             frames = [self._search(camera, image, state, covariance * 0.25**number, number == passes - 1,
                                    late_s.get(camera, 0.0)) for camera, image in images.items()]
-            residuals = [Contours(frames), self.limits, *extra]
+            residuals = [Contours(frames), *self.known, *extra]
             if number < passes - 1:
                 state = update(self.process, t_s, prediction, residuals, state, self.filter.partial).state
         return self.filter.add(t_s, residuals, prediction, state)
@@ -307,7 +311,7 @@ class BareHandTracker:
         world = np.eye(4)
         world[:3] = state[:ANGLES].reshape(3, 4)
         world, angles, value = settle(self.surface, world, state[ANGLES:VELOCITY].copy(), spread, self.model,
-                                      state[BIAS:BIAS + SHAPE].copy(), seen, self._rng)
+                                      state[BIAS:BIAS + SHAPE].copy(), seen, self._rng, self.plane)
         if value < self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS:
             return None
         out = state.copy()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -40,6 +40,7 @@ class HandModel:
     chain: Array  # (5, 3) m, the bones, the last one only as far as its marker's centre
     chain_bend: Array  # (5,) rad, how much more the way to the marker's centre bends than the bone: < 0 for a nail
     pose_prior: PosePrior  # of the angles
+    locked: tuple[int, ...] = ()  # angles that are held (`with_locked`)
 
 
 def build_model(anatomy: HandAnatomy) -> HandModel:
@@ -63,6 +64,22 @@ def build_model(anatomy: HandAnatomy) -> HandModel:
         chain_bend=np.zeros(5),
         pose_prior=pose_prior(),
     )
+
+
+LOCKED_SD_RAD: Final = math.radians(2.0)
+"""rad: how far a joint is from where it is told to be held. Chosen: Rehg's are exact, a goniometer repeats to 5
+degrees, and a finger with that much freedom is still taken for its neighbour."""
+
+
+def with_locked(model: HandModel, locked_deg: Mapping[str, float | tuple[float, float]]) -> HandModel:
+    """The hand with angles, by their names, that it holds: the pose prior expects them there, or about there with the
+    standard deviation that is given."""
+    locked = tuple(ANGLES.index(name) for name, value in locked_deg.items() if not isinstance(value, tuple))
+    rows = np.eye(len(ANGLES))[[ANGLES.index(name) for name in locked_deg]]
+    both = np.radians([value if isinstance(value, tuple) else (value, math.degrees(LOCKED_SD_RAD))
+                       for value in locked_deg.values()]).reshape(-1, 2)
+    prior = model.pose_prior.with_terms(rows / both[:, 1:], both[:, 0] / both[:, 1])
+    return replace(model, pose_prior=prior, locked=locked)
 
 
 def neutral_pose(world_from_palm: Array | None = None) -> HandPose:

@@ -6,33 +6,19 @@ The truth scripts the hand and judges what came of it; the mouse gets the tracke
 from __future__ import annotations
 
 import math
-import tempfile
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.engine.offline.replay_summary import replay_states
-from rhot_app.engine.pipeline import warm_up
-from rhot_app.evaluation.data_sets import Order, Watch, data_set, data_sets_folder
-from rhot_app.evaluation.track import Timed
-from rhot_app.hand.skeleton import TIP_ROLES
+from rhot_app.evaluation.data_sets import Watch
 from rhot_app.mouse.pick_scene import Ball, PickScene
-from rhot_app.mouse.pointer import GROUND_M, Mouse, MouseSettings, MouseState
-from rhot_app.mouse.script import LEAD_S, Script, motion_file
+from rhot_app.mouse.play import MARKERS, MouseRun, SetUp, play
+from rhot_app.mouse.pointer import BUTTONS, GROUND_M, MouseSettings, MouseState
+from rhot_app.mouse.script import LEAD_S, Script
 from rhot_app.mouse.target_test import EFFECTIVE, WIDTH_M, TargetTest
-from rhot_app.project import Rig, with_tracker
-from rhot_app.recording.raw_log import RecordKind
-from rhot_app.simulator.film.node_log import T0_MASTER_NS
-from rhot_app.simulator.film.truth import Truth
 from rhot_app.simulator.scene.motion import Sway
-from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.sources.replay import LogValidator
-from rhot_app.state import Condition, HandState, Knowledge
-from rhot_app.tracking.trackers import make_tracker
-from rhot_node.files import write_document
 
 Array = NDArray[np.float64]
 Figures = dict[str, Any]
@@ -51,86 +37,11 @@ HELD_M: Final = 0.029
 ORDINARY_SWAY: Final = Sway(position_mm=0.5, rotation_deg=0.3, angle_deg=0.3, tremor_mm=0.05)
 """Of a hand that rests on a table: a quarter of one held in the air (resources/motions/tap.json), with its tremor."""
 
+SAME_PRESS_S: Final = 0.25
+"""s: a press is that of the true hand if it is no farther away in time: half of what lies between two clicks."""
+
 _AXES: Final = "x_mm", "y_mm", "height_mm"
-_KEY_S: Final = 0.01  # for ways of a tenth of a second
 _CARRY_M: Final = 0.025  # radius of the ball that is picked and placed
-
-
-@dataclass(frozen=True, slots=True)
-class MouseRun:
-    """One script through the pipeline. N states of the tracker; `mouse` and `true_mouse` are what the mouse makes of
-    them and of the true hand. `times_s` (N,): scene times. `age_s` (N,): until a state was ready."""
-
-    script: Script
-    times_s: Array
-    states: list[HandState]
-    mouse: list[MouseState]
-    true_mouse: list[MouseState]
-    true_palm: Array  # (N, 3) m
-    age_s: Array
-
-    @property
-    def cursor(self) -> Array:
-        """(N, 3) m, NaN before the rest."""
-        return _cursors(self.mouse)
-
-    @property
-    def true_cursor(self) -> Array:
-        """(N, 3) m, of the true hand."""
-        return _cursors(self.true_mouse)
-
-    def during(self, begin_s: float, end_s: float) -> NDArray[np.bool_]:
-        """Mask (N,) of the states between two scene times at which both cursors are there."""
-        there = np.isfinite(self.cursor).all(axis=1) & np.isfinite(self.true_cursor).all(axis=1)
-        return np.asarray((self.times_s >= begin_s) & (self.times_s <= end_s) & there)
-
-
-def play(script: Script, seed: int, *, settings: MouseSettings | None = None, pictures: bool = False,
-         sway: Sway | None = None, covered_s: float = math.inf, watch: Watch = lambda title: None) -> MouseRun:
-    """Play a script to the twin and its states to the mouse. `pictures`: render and detect; else the observations are
-    made without pictures (`rhot_app.simulator.film.ideal_observations`). From `covered_s` on the second camera is
-    silent. Raises RhotError."""
-    settings, scene = settings or MouseSettings(), make_scene(twin_defaults(), seed)
-    with tempfile.TemporaryDirectory(prefix="rhot-mouse-") as name:
-        path = Path(name) / "mouse.json"
-        write_document(path, motion_file(script, scene.hand, settings, sway or Sway(), key_s=_KEY_S))
-        order = Order(scene, str(path), script.end_s, sketched=not pictures)
-        data = data_set(order, data_sets_folder() if pictures else Path(name) / "sets", watch)
-        truth, second = data.truth, data.rig.nodes[1].node_id
-        records = [one for one in data.records() if one.node_id != second or one.kind is not RecordKind.DATAGRAM
-                   or 1e-9 * (one.t_master_ns - T0_MASTER_NS) < covered_s]
-    rig = with_tracker(data.rig, "estimator")
-    tracker = make_tracker(rig)
-    warm_up(tracker, rig)
-    timed = Timed(records)
-    states = list(replay_states(timed, LogValidator(rig), tracker))
-    return _run(script, states, truth, rig, settings, float(np.median(timed.compute_s)))
-
-
-def _run(script: Script, states: list[HandState], truth: Truth, rig: Rig, settings: MouseSettings,
-         compute_s: float) -> MouseRun:
-    times = 1e-9 * np.array([state.t_master_ns - T0_MASTER_NS for state in states])
-    ready = 1e-9 * np.array([state.t_receive_ns - T0_MASTER_NS for state in states]) + compute_s
-    mouse, true_mouse = Mouse(settings), Mouse(settings)
-    return MouseRun(script, times, states, [mouse.feed(state) for state in states],
-                    [true_mouse.feed(state) for state in _true_states(states, truth, rig, times)],
-                    truth.palm_at(times)[:, :3, 3], ready - times)
-
-
-def _true_states(states: list[HandState], truth: Truth, rig: Rig, times_s: Array) -> list[HandState]:
-    """The same instants with the true hand, all of it measured."""
-    roles = [marker.role for marker in rig.markers.markers]
-    tips = truth.markers_at(times_s)[:, [roles.index(role) for role in TIP_ROLES]]
-    measured = np.full(21, Knowledge.MEASURED, np.uint8)
-    return [replace(state, condition=Condition.TRACKING, world_from_palm=palm, palm_knowledge=Knowledge.MEASURED,
-                    palm_covariance=np.zeros((6, 6)), joint_positions=joints, joint_knowledge=measured,
-                    fingertip_positions=tip, fingertip_covariances=np.zeros((5, 3, 3)))
-            for state, palm, joints, tip in zip(states, truth.palm_at(times_s), truth.joints_at(times_s), tips,
-                                                strict=True)]
-
-
-def _cursors(mouse: list[MouseState]) -> Array:
-    return np.array([np.full(3, np.nan) if one.cursor is None else one.cursor for one in mouse])
 
 
 def _rms(errors_m: Array) -> Figures | None:
@@ -205,7 +116,8 @@ def speed(metres_per_s: float, seed: int, **how: Any) -> Figures:
 
 def latency(run: MouseRun) -> Figures | None:
     """From the hand to the cursor: until the state is ready, and how far the cursor lags behind the hand at the state's
-    own time, by the shift that fits best; ms. None when the hand was not tracked."""
+    own time, by the shift that fits best; ms. The first is None where no state was timed, all of it when the hand was
+    not tracked."""
     inside = run.during(LEAD_S, run.script.end_s)
     if not inside.any():
         return None
@@ -213,8 +125,9 @@ def latency(run: MouseRun) -> Figures | None:
     shifts = np.arange(0.0, 0.1, 0.001)
     misfits = [sum(np.square(np.interp(times - shift, times, true[:, k]) - cursor[:, k]).mean() for k in range(2))
                for shift in shifts]
-    ready = 1e3 * np.percentile(run.age_s[inside], [50, 99])
-    return {"ready_p50_ms": float(ready[0]), "ready_p99_ms": float(ready[1]),
+    p50, p99 = (None if math.isnan(value) else 1e3 * float(value)
+                for value in np.percentile(run.age_s[inside], [50, 99]))
+    return {"ready_p50_ms": p50, "ready_p99_ms": p99,
             "lag_ms": abs(round(1e3 * float(shifts[int(np.argmin(misfits))]), 1))}
 
 
@@ -231,6 +144,34 @@ def one_camera(seed: int, **how: Any) -> Figures:
         inside = run.during(LEAD_S, script.end_s)
         figures[name] = _rms(run.cursor[inside] - run.true_cursor[inside])
     return figures
+
+
+# -- buttons -----------------------------------------------------------------------------------------------------------
+
+def buttons(seed: int, **how: Any) -> Figures:
+    """Both buttons clicked in turn at random places and heights: of the presses that the true hand makes, how many the
+    tracked one makes, too (`right`), and how many more it makes (`wrong`); and how late the right ones are, ms."""
+    rng, script = np.random.default_rng([seed, 0xB07]), Script()
+    for number in range(8):
+        script.move(_random_place(rng, 0.35 * np.array(GROUND_M)), 0.6)
+        script.wait(0.3)
+        script.click(BUTTONS[number % 2], 0.2)
+    script.wait(0.4)
+    run = play(script, seed, sway=ORDINARY_SWAY, **how)
+    figures: Figures = {}
+    for button in BUTTONS:
+        true, found = (_presses(run, mouse, button) for mouse in (run.true_mouse, run.mouse))
+        late = [float(found[k] - t_s) for t_s in true if len(found)
+                for k in [int(np.argmin(np.abs(found - t_s)))] if abs(found[k] - t_s) < SAME_PRESS_S]
+        figures[button] = {"presses": len(true), "right": len(late), "wrong": len(found) - len(late),
+                           "late_ms": 1e3 * float(np.median(late)) if late else None}
+    return figures
+
+
+def _presses(run: MouseRun, mouse: list[MouseState], button: str) -> Array:
+    """(K,) s: when a button went down."""
+    down = np.array([one.is_pressed(button) for one in mouse], np.bool_)
+    return np.asarray(run.times_s[1:][down[1:] & ~down[:-1]])
 
 
 # -- target test and pick and place ------------------------------------------------------------------------------------
@@ -292,15 +233,18 @@ def _random_place(rng: np.random.Generator, half: Array) -> tuple[float, float, 
     return float(x), float(y), float(rng.uniform(_CARRY_M, 0.12))
 
 
-def measures(seed: int, places: int, *, pictures: bool, watch: Watch) -> Figures:
-    """All of it. The speeds are always from pictures, because it is the detector that loses a fast hand."""
-    how = {"pictures": pictures, "watch": watch}
-    figures: Figures = {"seed": seed, "pictures": pictures}
-    figures["speed"] = [speed(one, seed, pictures=True, watch=watch) for one in SPEEDS_M_PER_S]
+def measures(seed: int, places: int, *, set_up: SetUp = MARKERS, watch: Watch) -> Figures:
+    """All of it in one set-up. The speeds are always from pictures, because it is the detector that loses a fast
+    hand."""
+    how: dict[str, Any] = {"set_up": set_up, "watch": watch}
+    figures: Figures = {"seed": seed, "set_up": set_up.name, "pictures": set_up.pictures or set_up.observe != "markers"}
+    figures["speed"] = [speed(one, seed, **how | {"set_up": replace(set_up, pictures=True)}) for one in SPEEDS_M_PER_S]
     figures["coupling"] = coupling(seed, **how)
     figures["resolution"] = [resolution(turn, seed, **how) for turn in TURNS_DEG]
+    figures["buttons"] = buttons(seed, **how)
     figures["throughput"], run = throughput(seed, **how)
     figures["latency"] = latency(run)
-    figures["one_camera"] = one_camera(seed, **how)
+    if set_up.cameras > 1:
+        figures["one_camera"] = one_camera(seed, **how)
     figures["place"] = [place_once(seed + k, **how) for k in range(places)]
     return figures

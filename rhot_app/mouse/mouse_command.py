@@ -1,4 +1,5 @@
-"""``rhot mouse``: a 3-D cursor and two buttons worked by the tracked hand, live, on the twin, or measured there."""
+"""``rhot mouse``: a 3-D cursor and two buttons worked by the tracked hand, live, of a recording, on the twin, or
+measured there."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import EngineError, OutputError, SimulatorError
+from rhot_app.errors import EngineError, OutputError, RecordingError, SimulatorError
 
 if TYPE_CHECKING:
     from rhot_app.engine.client import EngineClient
@@ -33,6 +34,15 @@ PLACES = 20
 MOTION = "mouse"
 """Of resources/motions; the hand carries the balls of the app's page about."""
 
+BACKGROUND_S = 2.0
+"""The nodes of a simulated bare hand learn the empty scene for so long, as the app's wizard has them do."""
+
+COMMAND_S = 30.0
+"""A node of a busy machine answers within this time."""
+
+REST_S = 10.0
+"""Until the simulated hand's motion at rest repeats itself."""
+
 TRACKED_S = 360.0
 """The first start of all compiles the numerical code; on a slow or busy machine that takes minutes."""
 
@@ -42,6 +52,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--directory", type=Path, metavar="DIR", help="private directory of the engine's sockets")
     parser.add_argument("--simulated", action="store_true",
                         help="start a simulated rig whose hand works the mouse, and end it afterwards")
+    parser.add_argument("--log", type=Path, metavar="LOG",
+                        help="print the mouse's states of this raw log, and end; of a bare hand with its "
+                             "recorded slices")
+    parser.add_argument("--rig", type=Path, metavar="FILE",
+                        help="track the --log with this rig instead of the one it was recorded with")
+    parser.add_argument("--bare", action="store_true",
+                        help="with --simulated or --measure: a hand without markers, tracked by its contours")
+    parser.add_argument("--cameras", type=int, choices=(1, 2), default=2, metavar="N",
+                        help="with --simulated or --measure: 1 leaves one camera, and the palm on a known plane "
+                             "(default 2)")
     parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="of the simulated rig (default 1)")
     parser.add_argument("--seconds", type=_positive, default=None, metavar="S", help="end after so long")
     parser.add_argument("--gain", type=_positive, default=None, metavar="G",
@@ -56,17 +76,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pointer", action="store_true",
                         help="move the system's pointer, too (Linux; needs write permission on /dev/uinput)")
     parser.add_argument("--measure", action="store_true",
-                        help="print speed, coupling, resolution, latency, target test and pick-and-place on the twin; "
-                             "takes minutes")
+                        help="print speed, coupling, resolution, buttons, latency, target test and pick-and-place on "
+                             "the twin, of --bare or --cameras 1 beside those of markers with two cameras; takes "
+                             "minutes, a bare hand an hour")
     parser.add_argument("--places", type=_seed, default=PLACES, metavar="N",
                         help=f"how often --measure picks and places (default {PLACES})")
     parser.add_argument("--pictures", action="store_true",
-                        help="let --measure render all images; else only those of the speeds are rendered")
+                        help="let --measure render all images of markers; else only those of the speeds are rendered")
     parser.add_argument("--json", action="store_true", help="print JSON: a line per state, or all measures")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run until interrupted, or for --seconds. Raises RhotError."""
+    _check(args)
     if args.measure:
         return _measure(args)
     from rhot_app.engine.client import EngineClient
@@ -74,12 +96,53 @@ def run(args: argparse.Namespace) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with contextlib.ExitStack() as stack:
         outputs = _Outputs(args, stack)
-        directory = stack.enter_context(simulated_hand(args.seed)) if args.simulated else args.directory
+        if args.log is not None:
+            _replay(args, outputs)
+            outputs.close()
+            return 0
+        directory = stack.enter_context(simulated_hand(args.seed, bare=args.bare, cameras=args.cameras)
+                                        ) if args.simulated else args.directory
         client = stack.enter_context(EngineClient(directory))
         with contextlib.suppress(KeyboardInterrupt):
             _live(args, client, outputs)
         outputs.close()
     return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Raises OutputError when options contradict each other."""
+    if args.measure and (args.simulated or args.log is not None or args.osc is not None or args.pointer):
+        raise OutputError("--measure runs on the twin by itself; leave --simulated, --log, --osc and --pointer out.")
+    if args.log is not None and (args.simulated or args.directory is not None or args.seconds is not None):
+        raise OutputError("--log reads a recording to its end; leave --simulated, --directory and --seconds out.")
+    if args.rig is not None and args.log is None:
+        raise OutputError("--rig is for a --log; a running engine has its own rig.")
+    if (args.bare or args.cameras == 1) and not (args.measure or args.simulated):
+        raise OutputError("--bare and --cameras are for --simulated and --measure. A rig's tracker says itself what it "
+                          "observes and where the palm slides (Calibrate, Tracker).")
+
+
+def _replay(args: argparse.Namespace, outputs: _Outputs) -> None:
+    """Give the outputs all states of a recording. Raises RecordingError, RigError."""
+    from rhot_app.engine.offline.replay_summary import replay_states
+    from rhot_app.mouse.model import up_of
+    from rhot_app.mouse.pointer import Mouse
+    from rhot_app.project import load_rig
+    from rhot_app.recording.raw_log import LogReader
+    from rhot_app.sources.replay import LogValidator
+    from rhot_app.tracking.trackers import make_tracker
+    from rhot_node.compiled import announce_compilation
+
+    with contextlib.closing(LogReader(args.log)) as reader:
+        rig = load_rig(args.rig) if args.rig is not None else reader.rig
+        announce_compilation()
+        mouse, count = Mouse(_settings(args), up_of(rig)), 0
+        for state in replay_states(reader, LogValidator(rig), make_tracker(rig)):
+            outputs.write(mouse.feed(state), every=True)
+            count += 1
+    if not count:
+        raise RecordingError(f"{args.log}: the tracker makes no state of it, so there is no mouse. `rhot replay "
+                             f"{args.log} --json` says what it holds.")
 
 
 def _settings(args: argparse.Namespace) -> MouseSettings:
@@ -94,8 +157,7 @@ def _settings(args: argparse.Namespace) -> MouseSettings:
 
 
 def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs) -> None:
-    import numpy as np
-
+    from rhot_app.mouse.model import up_of
     from rhot_app.mouse.pointer import Mouse
     from rhot_app.state import HandState
 
@@ -108,7 +170,7 @@ def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs) -> 
             raise EngineError(f"no engine is heard in {client.directory.path}. Start it with `rhot engine --rig FILE "
                               "--start`, or let `rhot mouse --simulated` start a simulated one.")
         if mouse is None and messages:
-            mouse = Mouse(_settings(args), np.array([0.0, 0.0, 1.0]) if client.rig().up == "z" else None)
+            mouse = Mouse(_settings(args), up_of(client.rig()))
             end = now + (args.seconds or float("inf"))
         for message in messages:
             if isinstance(message, HandState) and mouse is not None:
@@ -136,8 +198,8 @@ class _Outputs:
             self._osc = stack.enter_context(contextlib.closing(UdpSink(parse_output(f"osc:{args.osc}"))))
             self._osc.open()
 
-    def write(self, mouse: MouseState) -> None:
-        """Give one state to all of them."""
+    def write(self, mouse: MouseState, *, every: bool = False) -> None:
+        """Give one state to all of them; people get ten a second, unless `every` one is wanted."""
         age_ms = 1e-6 * (time.monotonic_ns() - mouse.t_master_ns)
         live = 0.0 <= age_ms < self._live_ms  # else it is of a replayed log
         self._ages_ms.extend([age_ms] if live else [])
@@ -154,6 +216,8 @@ class _Outputs:
                               "cursor_m": cursor, "pressed": sorted(mouse.pressed),
                               "age_ms": round(age_ms, 2) if live else None, "needs": mouse.needs}),
                   flush=True)
+        elif every:
+            print(f"{1e-9 * mouse.t_master_ns:14.3f} s {line_of(mouse)}")
         elif time.monotonic() >= self._next_s:
             self._next_s = time.monotonic() + LINE_S
             print(line_of(mouse), flush=True)
@@ -176,51 +240,88 @@ def line_of(mouse: MouseState) -> str:
 
 
 @contextlib.contextmanager
-def simulated_hand(seed: int) -> Iterator[Path]:
+def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterator[Path]:
     """A simulated rig whose hand carries balls about, and an engine that tracks it; the engine's directory. Both end
-    with the context. Raises SimulatorError, EngineError."""
+    with the context. `bare`: the hand wears no markers; its nodes have learnt the background. With one of the
+    `cameras` the engine knows the plane and the mouse's hand. Raises SimulatorError, EngineError."""
     import tempfile
 
     from rhot_app.engine.client import EngineClient
     from rhot_app.engine.process import ensure_engine, stop_engine
-    from rhot_app.project import load_rig, save_rig, with_tracker
+    from rhot_app.mouse.play import SetUp, tracked_rig
+    from rhot_app.mouse.pointer import MouseSettings
+    from rhot_app.mouse.script import motion_file, resting
+    from rhot_app.project import load_rig, save_rig
     from rhot_app.simulator.nodes.remote import TwinRemote
-    from rhot_app.simulator.scene.scene_description import HandShow
+    from rhot_app.simulator.scene.motion import Sway
+    from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+    from rhot_app.simulator.scene.scene_description import BareHandShow, EmptyShow, HandShow
+    from rhot_node.files import write_document
 
+    show = BareHandShow if bare else HandShow
     with tempfile.TemporaryDirectory(prefix="rhot-mouse-") as name, contextlib.ExitStack() as stack:
         place = Path(name)
-        rig = place / "rig.json"
-        twin = subprocess.Popen([sys.executable, "-m", "rhot_app.simulator.nodes.live", "--motion", MOTION,
-                                 "--seed", str(seed), "--directory", str(place), "--rig", str(rig)],
-                                stdout=subprocess.PIPE)
+        rig, rest, scene = place / "rig.json", place / "rest.json", make_scene(twin_defaults(), seed)
+        write_document(rest, motion_file(resting(REST_S), scene.hand, MouseSettings(), Sway()))
+        twin = subprocess.Popen([sys.executable, "-m", "rhot_app.simulator.nodes.live", "--motion", str(rest),
+                                 *(["--bare"] if bare else []), "--seed", str(seed), "--directory", str(place), "--rig",
+                                 str(rig)], stdout=subprocess.PIPE)
         stack.callback(twin.wait)
         stack.callback(twin.terminate)
         assert twin.stdout is not None
         if not twin.stdout.readline():
             raise SimulatorError("the simulated rig did not start; its own words stand above.")
-        save_rig(rig, with_tracker(load_rig(rig), "estimator"))
+        save_rig(rig, tracked_rig(load_rig(rig), SetUp("contours" if bare else "markers", cameras), scene))
         stack.callback(stop_engine, place / "engine")
         ensure_engine(rig, place / "engine", start=True)
         with EngineClient(place / "engine") as client, TwinRemote(place) as remote:
             deadline = time.monotonic() + TRACKED_S
+            if bare:
+                remote.show(EmptyShow())
+                _learn_backgrounds(client, deadline)
+                remote.show(show(str(rest)))
             while client.state is None or not client.state.tracked:
                 client.poll(0.1)
                 if time.monotonic() > deadline:
                     raise SimulatorError(f"the simulated hand was not tracked within {TRACKED_S:.0f} s. Is this "
                                          "computer busy? Try again.")
-            remote.show(HandShow(MOTION))  # from its beginning, where it rests
+            remote.show(show(MOTION))  # it begins where the hand rests now
         yield place / "engine"
 
 
+def _learn_backgrounds(client: EngineClient, deadline: float) -> None:
+    """Have all nodes learn the empty scene. Raises SimulatorError, EngineError."""
+    def ask(node_id: int, request: dict[str, Any]) -> dict[str, Any]:
+        answer: dict[str, Any] = client.command("node", node_id=node_id, request=request, timeout_s=COMMAND_S)["answer"]
+        return answer
+
+    nodes = [node.node_id for node in client.rig().nodes]
+    for node_id in nodes:
+        while True:  # until the node streams
+            try:
+                ask(node_id, {"request": "learn_background", "seconds": BACKGROUND_S})
+                break
+            except EngineError:
+                if time.monotonic() > deadline:
+                    raise
+                time.sleep(0.5)
+    while not all((known := ask(node_id, {"request": "state"})["foreground"])["background"] and not known["learning_s"]
+                  for node_id in nodes):
+        if time.monotonic() > deadline:
+            raise SimulatorError("the simulated nodes did not learn the background in time. Is this computer busy? Try "
+                                 "again.")
+        time.sleep(0.1)
+
+
 def _measure(args: argparse.Namespace) -> int:
-    if args.simulated or args.osc is not None or args.pointer:
-        raise OutputError("--measure runs on the twin by itself; leave --simulated, --osc and --pointer out.")
     from rhot_app.mouse.measure import measures
+    from rhot_app.mouse.play import SetUp
     from rhot_app.mouse.report import report
     from rhot_app.progress import ProgressLine
 
-    figures = measures(args.seed, args.places, pictures=args.pictures,
-                       watch=lambda title: ProgressLine(f"rendering {title}"))
+    chosen = SetUp("contours" if args.bare else "markers", args.cameras, args.pictures)
+    figures = [measures(args.seed, args.places, set_up=one, watch=lambda title: ProgressLine(f"rendering {title}"))
+               for one in dict.fromkeys((SetUp(pictures=args.pictures), chosen))]
     print(json.dumps(figures) if args.json else report(figures))
     return 0
 

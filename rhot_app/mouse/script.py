@@ -6,8 +6,9 @@ where a person would correct the cursor by eye. Ways are of minimum jerk (Flash 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +18,20 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, HandPose
+from rhot_app.mouse.model import FLAT_DEG
 from rhot_app.mouse.pick_scene import START, Ball
 from rhot_app.mouse.pointer import BUTTONS, HOME_S, MouseSettings
-from rhot_app.simulator.scene.motion import FACING, Key, MotionFile, Sway
+from rhot_app.simulator.scene.motion import BACK_FACING, FACING, Key, MotionFile, Sway
 
 Array = NDArray[np.float64]
 
+Side = Literal["palm", "back"]
+FACINGS: Final = {"palm": FACING, "back": BACK_FACING}
+
 TILT_DEG: Final = 45.0
-"""The hand's plane leans so far towards the cameras: they look at it at 45 degrees, as in Rehg 1995, 4.3.4, but see the
-palm, which is the side that RHOT's cameras usually see."""
+"""The hand's plane leans so far towards the cameras: they look at it at 45 degrees, as in Rehg 1995, 4.3.4. RHOT's
+cameras usually see the palm. A finger that bends towards them is then seen from its tip; of a hand on a table they see
+the back, and all of the finger."""
 
 KEY_S: Final = 0.05
 """Between keys, unless a faster hand needs more of them; a spline goes through them."""
@@ -38,15 +44,6 @@ LEAD_S: Final = 1.0 + HOME_S
 
 SPREAD_DEG: Final = 27.0
 """A finger spreads so far: 12 degrees, its natural variation (`rhot_app.hand.limits`), beyond a press."""
-
-_REST_DEG: Final = {
-    "thumb_cmc_abduction": -18.0, "thumb_cmc_flexion": 8.0, "thumb_mcp_flexion": 12.0, "thumb_ip_flexion": 12.0,
-    "index_mcp_flexion": 26.0, "index_pip_flexion": 10.0, "index_dip_flexion": 6.0, "index_mcp_abduction": 5.0,
-    "middle_mcp_flexion": 12.0, "middle_pip_flexion": 16.0, "middle_dip_flexion": 10.0,
-    "ring_mcp_flexion": 12.0, "ring_pip_flexion": 16.0, "ring_dip_flexion": 10.0, "ring_mcp_abduction": -3.0,
-    "little_mcp_flexion": 12.0, "little_pip_flexion": 16.0, "little_dip_flexion": 10.0, "little_mcp_abduction": -6.0}
-"""A flat relaxed hand, the thumb beside it on the table; its index finger hangs down a little, so that it can rise."""
-
 
 _SPREADS: Final = {"thumb": ("thumb_cmc_flexion", -1.0), "little": ("little_mcp_abduction", -1.0)}
 """Angle that spreads each button's finger in the palm's plane, and its sign."""
@@ -127,28 +124,41 @@ def carrying(balls: tuple[Ball, ...] = START) -> Script:
     return script
 
 
+def resting(seconds: float) -> Script:
+    """A hand that does nothing for a while."""
+    script = Script()
+    script.wait(seconds)
+    return script
+
+
+def home_pose(facing: Side) -> Array:
+    """(3, 3) world_from_palm of a hand at rest, of which the cameras see that side."""
+    return np.asarray(Rotation.from_rotvec([np.radians(TILT_DEG), 0.0, 0.0]).as_matrix() @ FACINGS[facing])
+
+
 def motion_file(script: Script, anatomy: HandAnatomy, settings: MouseSettings, sway: Sway, *,
-                key_s: float = KEY_S) -> MotionFile:
-    """The script as a motion of a hand whose palm the cameras see, with a key every `key_s`."""
+                key_s: float = KEY_S, posture: Mapping[str, float] = FLAT_DEG, facing: Side = "palm"
+                ) -> MotionFile:
+    """The script as a motion of a hand in a flat `posture`, degrees, with a key every `key_s`. `facing`: the side that
+    the scene's cameras see of it (`TwinSettings.facing`)."""
     period = script.end_s + 1.0
     times = np.arange(0.0, period - 0.5 * key_s, key_s)
-    tilt = Rotation.from_rotvec([np.radians(TILT_DEG), 0.0, 0.0])
-    home = tilt.as_matrix() @ FACING
-    lengths, flexions = _index_heights(anatomy)
+    home = home_pose(facing)
+    lengths, flexions = _index_heights(anatomy, posture)
     keys = []
     for t_s, row in zip(times, script.sample(times), strict=True):
         cursor, spread, turn = row[:3], row[3:5], row[5]
         place = home @ np.array([cursor[1], -cursor[0], 0.0]) / settings.gain
         palm = home @ Rotation.from_rotvec([0.0, 0.0, turn]).as_matrix()
-        rotation = Rotation.from_matrix(palm @ FACING.T).as_rotvec(degrees=True)
+        rotation = Rotation.from_matrix(palm @ FACINGS[facing].T).as_rotvec(degrees=True)
         index = float(np.interp(cursor[2] / settings.height_gain, lengths, flexions))
         angles = {"index_mcp_flexion": round(index, 3)}
         for button, out in zip(BUTTONS, spread, strict=True):
             name, sign = _SPREADS[button]
-            angles[name] = round(_REST_DEG[name] + sign * SPREAD_DEG * float(out), 3)
+            angles[name] = round(posture[name] + sign * SPREAD_DEG * float(out), 3)
         keys.append(Key(round(float(t_s), 6), _triple(1e3 * place), _triple(rotation), angles))
     words = "The hand works the 3-D mouse: it picks three balls and carries them."
-    return MotionFile("mouse", words, round(float(period), 6), tuple(keys), dict(_REST_DEG), sway)
+    return MotionFile("mouse", words, round(float(period), 6), tuple(keys), dict(posture), sway)
 
 
 def _triple(values: Array) -> tuple[float, float, float]:
@@ -156,13 +166,13 @@ def _triple(values: Array) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _index_heights(anatomy: HandAnatomy) -> tuple[Array, Array]:
+def _index_heights(anatomy: HandAnatomy, posture: Mapping[str, float]) -> tuple[Array, Array]:
     """Heights m of the index marker above its rest, and the MCP flexions deg that give them; heights increase."""
     model = build_model(anatomy)
-    angles = np.radians([_REST_DEG.get(name, 0.0) for name in ANGLES])
+    angles = np.radians([posture.get(name, 0.0) for name in ANGLES])
     number = ANGLES.index("index_mcp_flexion")
     heights, flexions = [], np.arange(70.0, -0.5, -1.0)
-    for flexion in (_REST_DEG["index_mcp_flexion"], *flexions):
+    for flexion in (posture["index_mcp_flexion"], *flexions):
         angles[number] = np.radians(flexion)
         heights.append(forward(model, HandPose(np.eye(4), angles.copy())).marker_centres[1, 2])
     return np.array(heights[1:]) - heights[0], flexions

@@ -132,10 +132,10 @@ class RecordingEstimator(Estimator):
         super()._resize(log_scale, variance)
         self._scale = math.exp(log_scale), math.sqrt(variance)
 
-    def _start(self, located: Located, pose: HandPose) -> None:
+    def _start(self, t_ns: int, pose: HandPose, located: Located | None = None) -> None:
         self._end_segment()
         self._smoother = ChunkedSmoother()
-        super()._start(located, pose)
+        super()._start(t_ns, pose, located)
         self._release(self._count)
 
     def _give_up(self) -> None:

@@ -10,9 +10,9 @@ import pytest
 from bare_scenes import DISTANCE_M, left_hand, model_and_surface, poses, rig_of, right_hand, scene
 from pictures import look_at, picture, taken, wall
 from scipy.stats import chi2
-from searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
 
 from rhot_app.errors import RigError
+from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model

@@ -159,7 +159,7 @@ def _observed(offsets_px: tuple[float, ...]) -> tuple[ContourFrame, np.ndarray]:
     state = state_of(poses("grasp", (0.9,))[0])
     frame = frame_of(surface, state, two_cameras()[0])
     frame.expected_sd[:] = 3.0
-    empty = np.zeros((len(frame.slices), MOST))
+    empty = np.zeros((len(frame.slices), EDGES_MAX))
     edges = Edges(np.full(len(empty), len(offsets_px)), *(empty.copy() for _ in range(5)))
     for k, offset in enumerate(offsets_px):
         edges.offset[:, k], edges.sd[:, k], edges.strength[:, k], edges.inside[:, k] = offset, 0.3, 5.0, 1.0

@@ -32,7 +32,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.progress": (),
     "rhot_app.keys": ("rhot_node",),
     "rhot_app.rig_history": ("rhot_node", "rhot_app.errors", "rhot_app.project", "rhot_app.hand.anatomy"),
-    "rhot_app.project": ("rhot_node", "resources", "rhot_app.errors", "rhot_app.hand.anatomy",
+    "rhot_app.project": ("rhot_node", "resources", "rhot_app.errors", "rhot_app.hand.anatomy", "rhot_app.hand.skeleton",
                          "rhot_app.objects.object_file"),
     "rhot_app.objects.object_file": ("rhot_node", "rhot_app.errors", "rhot_app.geometry.transforms"),
     "rhot_app.geometry": APP_BASE,

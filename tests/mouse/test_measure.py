@@ -27,11 +27,12 @@ def test_a_phase_without_a_tracked_hand_has_no_figures(monkeypatch: pytest.Monke
 
     lost = Cursor(Script(), np.zeros(1), [], [], [], np.zeros((1, 3)), np.zeros(1))
     monkeypatch.setattr(measure, "play", lambda *_, **__: lost)
-    figures = {"seed": 1, "pictures": False, "speed": [], "coupling": coupling(1), "resolution": [resolution(0.0, 1)],
+    figures = {"seed": 1, "set_up": "markers, two cameras", "buttons": {},
+               "pictures": False, "speed": [], "coupling": coupling(1), "resolution": [resolution(0.0, 1)],
                "latency": latency(lost), "throughput": {"true": None, "tracked": None}, "one_camera": one_camera(1),
                "place": []}
     assert figures["coupling"][0] == {"moved": "right", "rms": None, "peak": None}
     assert figures["coupling"][-1]["rms"] is not None
     assert figures["latency"] is None
     json.dumps(figures, allow_nan=False)
-    assert report(figures).count("not tracked") >= 5
+    assert report([figures]).count("not tracked") >= 5

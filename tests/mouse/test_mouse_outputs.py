@@ -19,11 +19,17 @@ import pytest
 from pythonosc.osc_bundle import OscBundle
 
 from rhot_app.errors import OutputError
+from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
 from rhot_app.mouse import mouse_command
-from rhot_app.mouse.pointer import MouseState
+from rhot_app.mouse.pointer import MouseSettings, MouseState
+from rhot_app.mouse.script import Script, motion_file
 from rhot_app.mouse.system_pointer import SystemPointer
 from rhot_app.outputs.osc import bundles, mouse_messages
+from rhot_app.project import save_rig, with_tracker
+from rhot_app.simulator.scene.motion import Sway
+from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.state import Condition
+from rhot_node.files import write_document
 
 ROOT = Path(__file__).parents[2]
 
@@ -111,11 +117,32 @@ def rhot_mouse(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.parametrize(("arguments", "words"), [
     (("--osc", "nowhere"), "HOST:PORT"), (("--measure", "--pointer"), "leave --simulated"),
-    (("--directory", "NONE"), "no engine is heard")])
+    (("--bare",), "--simulated and --measure"), (("--rig", "rig.json"), "for a --log"),
+    (("--log", "NONE"), "none"), (("--directory", "NONE"), "no engine is heard")])
 def test_what_cannot_be_is_a_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path) -> None:
     done = rhot_mouse(*(str(tmp_path / "none") if one == "NONE" else one for one in arguments))
     assert done.returncode == 2 and words in done.stderr and not done.stdout
     assert "Traceback" not in done.stderr
+
+
+def test_a_recording_works_the_mouse_as_the_hand_did(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    script, scene = Script(), make_scene(twin_defaults(), 1)
+    script.move((0.06, -0.03, 0.0), 0.5)
+    script.click("thumb")
+    script.wait(0.3)
+    write_document(tmp_path / "motion.json", motion_file(script, scene.hand, MouseSettings(), Sway()))
+    data = data_set(Order(scene, str(tmp_path / "motion.json"), script.end_s, sketched=True), tmp_path)
+    save_rig(tmp_path / "rig.json", with_tracker(data.rig, "estimator"))
+    parser = argparse.ArgumentParser()
+    mouse_command.add_arguments(parser)
+    asked = ["--log", str(data.folder / LOG_NAME), "--rig", str(tmp_path / "rig.json")]
+    assert mouse_command.run(parser.parse_args([*asked, "--json"])) == 0
+    states = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert states[-1]["cursor_m"] == pytest.approx([0.06, -0.03, 0.0], abs=0.01)
+    assert {tuple(state["pressed"]) for state in states} == {(), ("thumb",)} and not states[-1]["pressed"]
+    assert all(state["age_ms"] is None for state in states)
+    assert mouse_command.run(parser.parse_args(asked)) == 0
+    assert len(capsys.readouterr().out.splitlines()) == len(states)
 
 
 def test_the_simulated_hand_works_the_mouse_by_itself() -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from rhot_app.mouse.measure import coupling, latency, one_camera, place_once, resolution, throughput
+from rhot_app.mouse.measure import buttons, coupling, latency, one_camera, place_once, resolution, throughput
+from rhot_app.mouse.play import SetUp, play
 from rhot_app.mouse.pointer import MouseSettings
-from rhot_app.mouse.script import carrying, motion_file
+from rhot_app.mouse.script import LEAD_S, Script, carrying, motion_file
 from rhot_app.simulator.scene.motion import Sway, read_motion_file
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_node.files import resource_path
@@ -29,6 +31,33 @@ def test_resolution_coupling_and_one_camera() -> None:
     assert all(one["rms"]["x_mm"] < 2.0 and one["rms"]["height_mm"] < 5.0 for one in coupling(2))
     covered = one_camera(1)
     assert covered["on_table"]["y_mm"] < 0.5 * covered["free"]["y_mm"]
+
+
+@pytest.mark.parametrize("seed", range(1, 4))
+def test_one_camera_and_a_known_plane_pick_and_place(seed: int) -> None:
+    done = place_once(seed, set_up=SetUp(cameras=1))
+    assert done["placed"], done
+
+
+@pytest.mark.parametrize("cameras", [1, 2])
+def test_markers_press_the_buttons_that_the_hand_presses(cameras: int) -> None:
+    for one in buttons(1, set_up=SetUp(cameras=cameras)).values():
+        assert one["presses"] == one["right"] == 4 and one["wrong"] == 0
+
+
+@pytest.mark.timeout(900)
+def test_a_bare_hand_before_one_camera_works_the_mouse() -> None:
+    """It is found as it comes in, and followed where it has come to, without markers."""
+    script = Script()
+    script.move((0.06, 0.04, 0.0), 0.6)
+    script.wait(0.3)
+    script.click("thumb", 0.3)
+    run = play(script, 1, SetUp("contours", 1, facing="back"))
+    moving = run.during(LEAD_S, script.end_s)
+    palms = np.array([state.world_from_palm[:3, 3] for state in run.states])
+    assert moving.sum() > 30
+    assert np.median(np.linalg.norm(palms - run.true_palm, axis=1)[moving]) < 0.015
+    assert np.sqrt(np.square(run.cursor - run.true_cursor)[moving].mean(axis=0))[:2] == pytest.approx(0.0, abs=0.03)
 
 
 def test_throughput_and_latency() -> None:

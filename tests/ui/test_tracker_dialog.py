@@ -119,6 +119,24 @@ def test_fingers_and_limits_are_chosen_from_lists(opened):
     assert dialog.limits_box.currentData() == "anatomical"
 
 
+def test_a_hand_that_lies_flat_is_ticked_and_kept_by_other_choices(opened):
+    desk = opened(msgspec.structs.replace(with_tracker(MODEL), up="z"))
+    dialog = desk.dialog
+
+    def changes(act):
+        before = load_rig(desk.path)
+        act()
+        desk.until(lambda: load_rig(desk.path) != before and dialog.close_button.isEnabled())
+        return load_rig(desk.path).tracker
+
+    flat = changes(lambda: click_on_word(dialog.flat_check))
+    assert flat.palm_plane.normal == (0.0, 0.0, 1.0) and 0.0 < flat.palm_plane.distance_m < 0.04
+    assert "middle_pip_flexion" in flat.locked_deg and "thumb_cmc_flexion" not in flat.locked_deg
+    coupled = changes(lambda: QTest.keyClick(dialog.variant_box, Qt.Key.Key_Down))
+    assert coupled == msgspec.structs.replace(flat, variant="coupled")
+    assert changes(lambda: click_on_word(dialog.flat_check)) == TrackerSettings(kind="estimator", variant="coupled")
+
+
 def test_the_classic_trackers_solver_is_chosen_from_a_list(opened):
     desk = opened(with_tracker(TrackerSettings()))
     dialog = desk.dialog

@@ -133,7 +133,8 @@ class Finder:
 
     def _look(self, maps: Maps, run: int) -> None:
         hand, size = self._hand, np.zeros(SHAPE)
-        found = find_in_maps(maps.probabilities, hand.cameras, hand.model, hand.surface, size, self._rng, 1)
+        found = find_in_maps(maps.probabilities, hand.cameras, hand.model, hand.surface, size, self._rng, 1,
+                             hand.plane)
         if not found or run != self._run:
             return
         pose, newest = found[0].pose, self._newest
@@ -150,6 +151,8 @@ class Finder:
         seen = maps.silhouettes(hand)
         covariance = np.diag(np.repeat(np.square([MOVED_M, TURNED, TURNED]), (3, 3, 21)))
         covariance[6:, 6:] = np.linalg.inv(hand.model.pose_prior.information + np.eye(21) / TURNED**2)
+        if hand.plane is not None:
+            covariance = hand.plane.narrowed(covariance)
         world, angles, _ = search(hand.surface, pose.world_from_palm, pose.angles, covariance, hand.model.limits,
                                   np.zeros(SHAPE), seen, self._rng, _ROUNDS)
         return HandPose(world, angles)

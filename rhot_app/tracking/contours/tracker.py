@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import STEP_M
+from rhot_app.barehand.follower import CONFUSED_M
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
 from rhot_app.barehand.tracker import START_SD, BareHandTracker
@@ -24,8 +25,8 @@ from rhot_app.hand.motion.hand_process import BIAS
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
-from rhot_app.tracking.contours.evidence import Evidence, same_hand, seen_contour
-from rhot_app.tracking.contours.finder import SAME_MAPS_NS, Finder, Maps, NewestMaps
+from rhot_app.tracking.contours.evidence import Evidence, joints_of, same_hand, seen_contour
+from rhot_app.tracking.contours.finder import LEAST_GAIN, SAME_MAPS_NS, Finder, Maps, NewestMaps
 from rhot_app.tracking.contours.markers import MarkersOfHand, weigh
 from rhot_app.tracking.contours.requests import JUMP_NS, NEVER, Requests, asked
 from rhot_app.tracking.tracker import CameraObservations
@@ -110,7 +111,7 @@ class ContourEstimator:
         contour = asked(hand, 0, *hand.filter.predict(0.0), STEP_M)
         contour.observe(edges_of(len(contour.slices), np.zeros(1, np.int64), np.array([[0.0, 1.0, 9.0, 1.0, 0.0]])))
         hand.frames[0], hand.cover = contour, 1e9  # so that it is looked for elsewhere
-        hand.filter.add(0.0, [contour, hand.limits])
+        hand.filter.add(0.0, [contour, *hand.known])
         state = hand.filter.newest.state
         hand.process.difference(state, state)  # compiled here, for `MarkersOfHand.choose`
         self._finder.relocate(maps, hand.filter.newest.state, hand.filter.newest.covariance, 0.03)
@@ -226,10 +227,13 @@ class ContourEstimator:
         state, _ = self._predict(t_ns)
         other, _ = self._hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
         other[BIAS:], seen = state[BIAS:], maps.silhouettes(self._hand)
-        if same_hand(self._hand, state, pose):
-            self._evidence.confirmed = self._ever = True
-        elif self._hand.score_of(seen, other) > self._hand.score_of(seen, state):
+        gain = self._hand.score_of(seen, other) - self._hand.score_of(seen, state)
+        apart_m = float(np.linalg.norm(joints_of(self._hand, other) - joints_of(self._hand, state), axis=1).mean())
+        same = same_hand(self._hand, state, pose)
+        if gain > (LEAST_GAIN if same else 0.0) and apart_m > CONFUSED_M:  # it has come in meanwhile, or is another one
             self._start(pose, t_ns)
+        elif same:
+            self._evidence.confirmed = self._ever = True
         else:
             self._finder.look(maps)
 

@@ -10,16 +10,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.geometry.transforms import fit_rigid
+from rhot_app.estimation.filter import update
+from rhot_app.estimation.residual import stack
+from rhot_app.geometry.camera import undistort_points
+from rhot_app.geometry.transforms import fit_rigid, rigid
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.landmarks import LASTING_M, NOISE_M
 from rhot_app.hand.model import neutral_pose
+from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY, HandProcess
+from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
 from rhot_app.hand.solvers.finger_ik import solve_fingers
 from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
 from rhot_app.tracking import pairing
 from rhot_app.tracking.locate import choose_views, locate_all
 from rhot_app.tracking.markers.marker_model import MarkerModel
+from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.markers.size_evidence import Posture, implausibility
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import RigArrays
@@ -35,6 +41,12 @@ FLATTEST_M2 = 1e-5
 
 UNFIT_M = 0.06
 """Markers so far from where the hand has them are something else. A first fit of a moving hand may be 3 cm off."""
+
+TURNS = 24
+"""Of a palm on a plane, all around: 15 degrees apart, half of TRIED_SD's."""
+
+TRIED_SD = 0.03, 0.5
+"""m and rad about each of them: as of a palm that was found by two cameras (`estimator.START_SD`)."""
 
 _TARGET_SD_M = 1e-3
 _WAITING = pairing.FRAMES  # frames of each camera; those before would tell nothing more of an instant
@@ -140,6 +152,38 @@ class Starter:
         posture = Posture(m.dh, m.limits, m.pose_prior.mean, m.pose_prior.information)
         implausibility(posture, markers, np.eye(3) / variance[:, None, None], 0.0, world, angles)
         return HandPose(world, angles)
+
+
+def pose_on_plane(plane: PalmOnPlane, frame: MarkerFrame, process: HandProcess) -> HandPose | None:
+    """The hand on a plane whose markers one camera's frame shows; None when they are too few, or are where no hand has
+    them. Hands turned all around are tried, each in the posture of the process's prior."""
+    m, seen = frame.markers, frame.seen
+    if np.count_nonzero(seen) < min(LEAST_MARKERS, len(seen)):
+        return None
+    rotation, shift = m.poses[frame.camera][:, :3], m.poses[frame.camera][:, 3]
+    centre = -rotation.T @ shift
+    rays = undistort_points(frame.pixels[seen], m.intrinsics[frame.camera])
+    place = plane.met_by(centre, centre + rotation.T @ np.append(rays.mean(axis=0), 1.0))
+    if place is None:
+        return None
+    angles, worn = np.clip(process.mean, m.limits[:, 0], m.limits[:, 1]), np.empty((len(seen), 3))
+    forward_arrays(m.dh, np.eye(4), angles, empty_frames(m.dh), worn)
+    middle = worn[seen].mean(axis=0)
+    best: tuple[float, Array] | None = None
+    for turn in plane.turns(TURNS):
+        prior = process.start(rigid(turn, place - turn @ middle), angles, TRIED_SD)
+        state = update(process, 0.0, prior, [frame, plane]).state
+        away = process.difference(state, prior[0])[:POSE]
+        cost = stack([frame.linearise(state), plane.linearise(state)], process.size, weigh=True)[3]
+        cost += float(away @ np.linalg.solve(prior[1][:POSE, :POSE], away))
+        if best is None or cost < best[0]:
+            best = cost, state
+    assert best is not None
+    state, world = best[1], np.eye(4)
+    world[:3] = state[:ANGLES].reshape(3, 4)
+    metres_per_px = float(rotation[2] @ place + shift[2]) / m.intrinsics[frame.camera, 0]
+    off_px = np.linalg.norm(frame.pixels - frame.expected(state), axis=1)[seen]
+    return HandPose(world, state[ANGLES:VELOCITY].copy()) if np.all(metres_per_px * off_px < UNFIT_M) else None
 
 
 @njit(cache=True)

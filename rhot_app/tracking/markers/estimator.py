@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from rhot_app.estimation.filter import IteratedFilter
 from rhot_app.hand.landmarks import LASTING_M, LASTING_S
 from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
+from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.association import GATE, MarkerAssociation, assign
-from rhot_app.tracking.markers.acquisition import Located, Starter
+from rhot_app.tracking.markers.acquisition import Located, Starter, pose_on_plane
 from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObservations
 from rhot_app.tracking.markers.hand_size import HandSize
 from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
@@ -62,6 +63,8 @@ class Estimator:
         if rig.tracker.float_scale:
             self._size = HandSize(self._markers.dh, self._markers.limits, prior, self._markers.paint_variance)
         self._process = self._markers.process()
+        plane = rig.tracker.palm_plane
+        self._plane = None if plane is None else PalmOnPlane(plane)
         self._filter = IteratedFilter(self._process)
         self._starter = Starter(self._rig, self._markers)
         self._association = MarkerAssociation(self._rig)  # without a prediction, by rays
@@ -130,7 +133,11 @@ class Estimator:
             scale = 1.0 if self._size is None else self._size.scale
             pose = None if located is None else self._starter.pose_of(located.positions, scale)
             if located is not None and pose is not None:
-                self._start(located, pose)
+                self._start(located.t_ns, pose, located)
+            elif self._plane is not None:
+                pose = pose_on_plane(self._plane, frame, self._process)
+                if pose is not None:
+                    self._start(frame.t_ns, pose)
             return True
         self._update(frame)
         if self._size is not None and (located := self._starter.locate()) is not None:
@@ -143,18 +150,19 @@ class Estimator:
             self._give_up()
         return True
 
-    def _start(self, located: Located, pose: HandPose) -> None:
+    def _start(self, t_ns: int, pose: HandPose, located: Located | None = None) -> None:
         """Start at a pose and weigh again what was seen since."""
-        self._epoch_ns = located.t_ns
+        self._epoch_ns = t_ns
         if self._size is not None:
             self._size.settle()
-            self._size.look(located, pose.world_from_palm, pose.angles)
+            if located is not None:
+                self._size.look(located, pose.world_from_palm, pose.angles)
             self._resize(*self._size.known)
         self._note_bias(self._process.start(pose.world_from_palm, pose.angles, START_SD)[0])
         self._filter.start(0.0, *self._process.start(pose.world_from_palm, pose.angles, START_SD))
         self._tracking = self._ever = True
-        self._accepted_ns = self._plausible_ns = located.t_ns
-        for frame in self._observations.recent(located.t_ns):
+        self._accepted_ns = self._plausible_ns = t_ns
+        for frame in self._observations.recent(t_ns):
             self._update(frame)
 
     def _resize(self, log_scale: float, variance: float) -> None:
@@ -179,7 +187,7 @@ class Estimator:
         frame = associate(frame, pixels, covariances, distances)
         self._note_bias(prediction[0])
         try:
-            knot = self._filter.add(t_s, [frame], prediction)
+            knot = self._filter.add(t_s, [frame] if self._plane is None else [frame, self._plane], prediction)
         except np.linalg.LinAlgError:  # the estimate contradicts itself
             self._give_up()
             return

@@ -14,7 +14,7 @@ from rhot_app.geometry.camera import CameraModel, distort
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.landmarks import ANATOMY_SD_M, LASTING_S
 from rhot_app.hand.limits import PosePrior
-from rhot_app.hand.model import HandModel, VariantName, build_model, limit_set, make_variant
+from rhot_app.hand.model import HandModel, VariantName, build_model, limit_set, make_variant, with_locked
 from rhot_app.hand.motion.hand_process import BIAS_S, FASTEST, PALM_SPREAD, SLOWEST, HandProcess
 from rhot_app.hand.places import Place, place_of, with_markers
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE
@@ -88,7 +88,7 @@ def compile_markers(rig: Rig) -> MarkerModel:
             raise RigError(f"markers {worn_by[marker.role]!r} and {marker.id!r} both have the role {marker.role!r}; "
                            "give each a place of its own.")
         worn_by[marker.role] = marker.id
-    model = with_markers(build_model(rig.hand), rig.markers)
+    model = with_markers(with_locked(build_model(rig.hand), rig.tracker.locked_deg), rig.markers)
     places = tuple(place_of(marker, model) for marker in rig.markers.markers)
     cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
     return MarkerModel(

@@ -22,12 +22,14 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.hand.anthropometry import scaled_hand
+from rhot_app.mouse.model import table_plane, with_mouse_model
 from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, estimator_obstacle, observation_obstacle
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.models.proposal import RigChange
 from rhot_app.ui.models.words import (
+    FLAT_MEANING,
     IK_METHODS,
     KINDS,
     LANDMARKS_ONLY,
@@ -69,6 +71,8 @@ class TrackerDialog(QDialog):
         self.limits_box, self.limits_words = _choices(LIMITS), _sentence()
         self.size_check = QCheckBox("Estimate the hand's size")
         self.size_check.setToolTip(SIZE_MEANING)
+        self.flat_check = QCheckBox("Flat, for the 3-D mouse")
+        self.flat_check.setToolTip(FLAT_MEANING)
         self.size_label = _sentence()
         self.size_button = QPushButton("Use this size for the rig's hand")
         self.size_button.setToolTip("Makes every length of the rig's hand so much larger or smaller. What was there is "
@@ -103,7 +107,8 @@ class TrackerDialog(QDialog):
         self.details = _form((
             ("Tracked by", self.observe_box), ("", self.observe_words),
             ("Fingers", self.variant_box), ("", self.variant_words), ("Limits", self.limits_box),
-            ("", self.limits_words), ("Size", self.size_check), ("", self.size_label), ("", self.size_button)))
+            ("", self.limits_words), ("Hand", self.flat_check),
+            ("Size", self.size_check), ("", self.size_label), ("", self.size_button)))
         layout.addWidget(self.solver)
         layout.addWidget(self.details)
         layout.addWidget(self.sentence)
@@ -120,6 +125,7 @@ class TrackerDialog(QDialog):
         for box in (self.ik_box, self.observe_box, self.variant_box, self.limits_box):
             box.activated.connect(self._choose)
         self.size_check.clicked.connect(self._choose)
+        self.flat_check.clicked.connect(self._choose)
         self.size_button.clicked.connect(self.use_size)
         self.undo_button.clicked.connect(self.undo)
         self.close_button.clicked.connect(self.reject)
@@ -136,10 +142,16 @@ class TrackerDialog(QDialog):
     def chosen(self) -> TrackerSettings:
         """What the form says."""
         kind = self._kind()
-        return TrackerSettings(
-            kind=kind, ik=self.ik_box.currentData(), variant=self.variant_box.currentData(),
+        settings = msgspec.structs.replace(
+            self._rig.tracker, kind=kind, ik=self.ik_box.currentData(), variant=self.variant_box.currentData(),
             limits=self.limits_box.currentData(), float_scale=self.size_check.isChecked(),
             observe="markers" if kind == "classic" else self.observe_box.currentData())
+        if self.flat_check.isChecked() == bool(settings.locked_deg):
+            return settings
+        if settings.locked_deg:
+            return msgspec.structs.replace(settings, locked_deg={}, palm_plane=None)
+        rig = msgspec.structs.replace(self._rig, tracker=settings)
+        return with_mouse_model(rig, table_plane(rig)).tracker
 
     def _choose(self) -> None:
         settings = self.chosen
@@ -221,6 +233,7 @@ class TrackerDialog(QDialog):
         self.variant_box.setCurrentIndex(self.variant_box.findData(settings.variant))
         self.limits_box.setCurrentIndex(self.limits_box.findData(settings.limits))
         self.size_check.setChecked(settings.float_scale)
+        self.flat_check.setChecked(bool(settings.locked_deg))
         self.observe_box.setCurrentIndex(self.observe_box.findData(settings.observe))
         unsaid = not settings.landmarks and all(marker.shape == "landmark" for marker in self._rig.markers.markers)
         self.observe_words.setText(LANDMARKS_ONLY if unsaid and settings.observe != "contours"

@@ -233,6 +233,9 @@ OBSERVED: Final = {
                                "find the hand at once. Calibrate, Background and skin comes first here, too."),
 }
 LANDMARKS_ONLY: Final = "The rig's marker set has landmarks, no paint: they are tracked. Choose Landmarks to say so."
+FLAT_MEANING: Final = ("The hand lies flat, as the 3-D mouse has it: only forefinger, thumb and little finger move. "
+                       "Where a board on the table has placed the rig, the palm slides on the table, and one camera "
+                       "suffices.")
 SIZE_MEANING: Final = ("The hand's size is estimated as it moves, so that a hand file that is some percent too large "
                        "or too small does no harm. Open and close the hand for half a minute.")
 

@@ -7,13 +7,13 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-import numpy as np
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import QComboBox, QDialog, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import RhotError
+from rhot_app.mouse.model import up_of
 from rhot_app.mouse.pick_scene import PickScene
 from rhot_app.mouse.pointer import BUTTONS, Mouse, MouseSettings, MouseState
 from rhot_app.mouse.target_test import TargetTest
@@ -142,7 +142,7 @@ class MouseWindow(QDialog):
         self._tell("Hold the hand still for half a second: that becomes the cursor's origin.")
 
     def _new_mouse(self) -> Mouse:
-        up = np.array([0.0, 0.0, 1.0]) if self._followed is not None and self._followed.up == "z" else None
+        up = None if self._followed is None else up_of(self._followed)
         return Mouse(MouseSettings(height_from=self.height_box.currentData()), up)
 
     # -- every tick ------------------------------------------------------------------------------------------------
