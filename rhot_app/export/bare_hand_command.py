@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rhot_app.errors import RecordingError, input_file
+
 if TYPE_CHECKING:
     from rhot_app.project import Rig
     from rhot_app.sources.frame_sets import CameraVideo
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot bare-hand``."""
-    parser.add_argument("--rig", type=Path, required=True, metavar="FILE",
+    parser.add_argument("--rig", type=input_file, required=True, metavar="FILE",
                         help="the calibrated rig, with the hand's side")
     parser.add_argument("--video", action="append", required=True, metavar="NAME=FILE",
                         help="a camera of the rig and its video; once for each camera, also for one alone")
@@ -42,7 +44,6 @@ def run(args: argparse.Namespace) -> int:
     """Track, and say what came of it. Raises RecordingError, ExportError and RigError."""
     import msgspec
 
-    from rhot_app.errors import RecordingError
     from rhot_app.export.bare_hand import learn_backgrounds, track_videos
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig
@@ -80,8 +81,6 @@ def run(args: argparse.Namespace) -> int:
 
 def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:
     """What an option says of each camera, as NAME=VALUE. Raises RecordingError."""
-    from rhot_app.errors import RecordingError
-
     names = [node.name for node in rig.nodes]
     found: dict[str, str] = {}
     for text in given:
@@ -99,7 +98,6 @@ def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:
 
 def open_all(rig: Rig, paths: dict[str, str], fps: float | None) -> list[CameraVideo]:
     """The videos of cameras, in the rig's order. Raises RecordingError."""
-    from rhot_app.errors import RecordingError
     from rhot_app.sources.frame_sets import open_video
 
     files = [Path(path).resolve() for path in paths.values()]
