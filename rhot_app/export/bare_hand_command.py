@@ -44,16 +44,21 @@ def run(args: argparse.Namespace) -> int:
     """Track, and say what came of it. Raises RecordingError, ExportError and RigError."""
     import msgspec
 
-    from rhot_app.export.bare_hand import learn_backgrounds, track_videos
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig
+
+    rig = load_rig(args.rig)
+    given, empty_given = named(args.video, "--video", rig), named(args.background, "--background", rig)
+    for path in (*given.values(), *empty_given.values()):
+        input_file(path)  # refused before numba is loaded
+    from rhot_app.export.bare_hand import learn_backgrounds, track_videos
     from rhot_app.sources.frame_sets import FPS, checked_seconds, on_one_clock
     from rhot_node.compiled import announce_compilation
 
     if args.fps is not None and not FPS[0] <= args.fps <= FPS[1]:
         raise RecordingError(f"--fps {args.fps:g}: give the frames per second, from {FPS[0]:g} to {FPS[1]:g}.")
-    rig = load_rig(args.rig)
-    videos = open_all(rig, named(args.video, "--video", rig), args.fps)
+    announce_compilation()
+    videos = open_all(rig, given, args.fps)
     rig = msgspec.structs.replace(rig, nodes=tuple(node for video in videos for node in rig.nodes
                                                    if node.name == video.camera), depth=type(rig.depth)())
     offsets = {name: checked_seconds(text, f"--offset-s {name}")
@@ -61,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     videos = on_one_clock(videos, offsets)
     foreground, empty_s = None, 0.0
     if args.background:
-        empty = open_all(rig, named(args.background, "--background", rig), args.fps)
+        empty = open_all(rig, empty_given, args.fps)
         if len(empty) < len(videos):
             missing = next(node.name for node in rig.nodes if node.name not in {video.camera for video in empty})
             raise RecordingError(f"--background: camera {missing} has none; give one for every camera.")
@@ -69,7 +74,6 @@ def run(args: argparse.Namespace) -> int:
     elif args.background_seconds is not None:
         empty_s = checked_seconds(args.background_seconds, "--background-seconds")
         foreground = learn_backgrounds(videos, empty_s)
-    announce_compilation()
     line = ProgressLine("tracking")
     summary = track_videos(rig, videos, foreground, known_size=not args.unknown_size, empty_s=empty_s, out=args.out,
                            pictures=args.overlay, again=args.again, progress=line.report)
