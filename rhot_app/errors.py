@@ -53,8 +53,10 @@ def input_file(text: str) -> Path:
     path = Path(text)
     try:
         open_input(path).close()
+    except FileNotFoundError as exc:
+        raise RhotError(f"{path}: no such file. Is the name right?") from exc
     except (OSError, ValueError) as exc:
-        raise RhotError(f"{path}: cannot be read ({why(exc)}). Is the name right, and may you read it?") from exc
+        raise RhotError(f"{path}: cannot be read ({why(exc)}).") from exc
     return path
 
 

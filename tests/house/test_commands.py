@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from rhot_app.__main__ import SUBCOMMANDS
+
 ROOT = Path(__file__).parents[2]
 MODULES = {"rhot": "rhot_app", "rhot-node": "rhot_node"}
 
@@ -113,6 +115,12 @@ def test_documented_commands_exist(file: str, line: str) -> None:
     text = help_of(command)
     for option in re.findall(r"(?<!\S)--?[a-z][a-z-]*", line):
         assert option in text, f"{file}: {line!r} names {option}, which {command} --help does not"
+
+
+def test_the_list_of_commands_is_whole() -> None:
+    """docs/README.md has a row for every command."""
+    rows = re.findall(r"^\| `rhot ([a-z-]+)", (ROOT / "docs" / "README.md").read_text(), re.MULTILINE)
+    assert not SUBCOMMANDS.keys() - set(rows)
 
 
 NO_SUCH_FILE = (
