@@ -86,7 +86,7 @@ def announce_compilation(takes: str = "some minutes") -> None:
     first what can be refused."""
     from numba.core import event
 
-    class Notice(event.Listener):  # type: ignore[misc]  # numba has no types
+    class Notice(event.Listener):
         said = False
 
         def on_start(self, event: object) -> None:
