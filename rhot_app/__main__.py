@@ -7,7 +7,7 @@ import difflib
 import importlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from types import ModuleType
@@ -86,17 +86,29 @@ def _run(arguments: list[str]) -> int:
     rooms = {"": parser}
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for key, subcommand in SUBCOMMANDS.items():
-        room = commands.add_parser(key, help=subcommand.summary, description=f"{subcommand.summary.capitalize()}.")
+        sentence = f"{subcommand.summary[0].upper()}{subcommand.summary[1:]}."
+        room = commands.add_parser(key, help=subcommand.summary, description=sentence)
         rooms[key] = room
         if subcommand is chosen:  # only this one's room is imported: help stays fast
             _load(subcommand.module).add_arguments(room)
     module = _load(APP if chosen is None else chosen.module)
     if chosen is None:
         module.add_arguments(parser)
-    parsed, strange = parser.parse_known_args(arguments)
+    if chosen is None and arguments and arguments[0] == name:
+        parser.error(f"there is no command {name!r}{_meant(name, SUBCOMMANDS)}")
+    asked = rooms["" if chosen is None or name is None else name]
+    options = _options(asked)
+    strange = [word for word in arguments if word.startswith("--")
+               and not any(option.startswith(word.split("=")[0]) for option in options)]
+    if chosen is not None or not strange:  # else argparse takes what follows a misspelt option for a command
+        try:
+            parsed, strange = parser.parse_known_args(arguments)
+        except RhotError:  # no such file; it may be what follows a misspelt option
+            if not strange:
+                raise
     if strange:
-        asked = rooms["" if chosen is None or name is None else name]
-        asked.error(f"there is no {strange[0]!r} here{_meant(strange[0], asked)}")
+        what = "option" if strange[0].startswith("-") else "argument"
+        asked.error(f"there is no {what} {strange[0]!r} here{_meant(strange[0].split('=')[0], options)}")
     return int(module.run(parsed))
 
 
@@ -113,10 +125,18 @@ def _command_first(arguments: list[str]) -> list[str]:
     return [rest[0], *arguments[:len(arguments) - len(rest)], *rest[1:]]
 
 
-def _meant(strange: str, parser: argparse.ArgumentParser) -> str:
-    """The option that somebody may have meant by a strange one, as the end of a sentence."""
-    known = [option for action in parser._actions for option in action.option_strings]
-    near = difflib.get_close_matches(strange.split("=")[0], known, n=1)
+def _options(parser: argparse.ArgumentParser) -> list[str]:
+    """The options of a parser and of those within it."""
+    found = [option for action in parser._actions for option in action.option_strings]
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            found += [option for inner in action.choices.values() for option in _options(inner)]
+    return found
+
+
+def _meant(strange: str, known: Iterable[str]) -> str:
+    """The one of what is known that somebody may have meant by something strange, as the end of a sentence."""
+    near = difflib.get_close_matches(strange, known, n=1)
     return f"; did you mean {near[0]}?" if near else ". See --help."
 
 

@@ -28,6 +28,7 @@ from rhot_app.project import Rig, save_rig
 from rhot_app.project import load_rig as _load_rig
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.extrapolation import Extrapolator
+from rhot_node.compiled import announce_compilation
 
 if TYPE_CHECKING:
     import pandas
@@ -39,6 +40,8 @@ __all__ = [
     "StereoCalibration", "Validity", "calibrate_stereo", "export", "live", "load_object", "load_rig",
     "open_recording", "save_object", "save_rig",
 ]
+
+announce_compilation()  # a program that imports this waits for minutes, once, and its user would not know why
 
 PATIENCE_S = 5.0
 """An engine publishes its status ten times a second; after this long without a message there is none."""

@@ -1,5 +1,11 @@
 """Every error the master raises on purpose. A message says what was wrong, in which file or node, and what to do."""
 
+from __future__ import annotations
+
+from pathlib import Path
+
+from rhot_node.files import open_input, why
+
 
 class RhotError(Exception):
     """Root of all errors of this package; commands print it and exit with code 2: nothing came of it."""
@@ -39,6 +45,19 @@ class EngineError(RhotError):
 
 class CalibrationError(RhotError):
     """A calibration cannot begin or end: its input is missing, unreadable, or does not determine the answer."""
+
+
+def input_file(text: str) -> Path:
+    """Type of a command's argument that names a file to read, for argparse. What cannot be opened is refused here,
+    before the command loads anything that takes time. Raises RhotError."""
+    path = Path(text)
+    try:
+        open_input(path).close()
+    except FileNotFoundError as exc:
+        raise RhotError(f"{path}: no such file. Is the name right?") from exc
+    except (OSError, ValueError) as exc:
+        raise RhotError(f"{path}: cannot be read ({why(exc)}).") from exc
+    return path
 
 
 _losses: dict[str, str] = {}  # by file

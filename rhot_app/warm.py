@@ -10,7 +10,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 
 import msgspec
@@ -139,8 +139,9 @@ def warm(name: str) -> str:
 def main() -> int:
     """Take all steps, side by side; returns the exit code."""
     with ProcessPoolExecutor(min(len(STEPS), os.cpu_count() or 1), get_context("spawn")) as pool:
-        for line in pool.map(warm, STEPS):
-            print(line, flush=True)
+        print(f"0 of {len(STEPS)} compiled", flush=True)
+        for done, step in enumerate(as_completed([pool.submit(warm, name) for name in STEPS]), 1):
+            print(f"{done} of {len(STEPS)} compiled; {step.result()}", flush=True)
     mark_complete()
     return 0
 

@@ -9,6 +9,7 @@ sources in another one.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import re
@@ -79,18 +80,42 @@ def is_complete() -> bool:
     return VARIABLE in os.environ and (Path(os.environ[VARIABLE]) / _COMPLETE).exists()
 
 
-def is_cold() -> bool:
-    """Whether nothing has been compiled yet for the present sources, so that the first start takes long."""
-    return VARIABLE not in os.environ or not (is_complete() or any(Path(os.environ[VARIABLE]).rglob("*.nbi")))
+def announce_compilation(takes: str = "some minutes") -> None:
+    """Have this process say on standard error when it begins to compile, once: whoever waits learns why. It says
+    nothing where all that it calls is compiled. `takes`: how long it takes where nothing is. Loads numba, so check
+    first what can be refused."""
+    from numba.core import event
+
+    class Notice(event.Listener):
+        said = False
+
+        def on_start(self, event: object) -> None:
+            if not self.said:
+                self.said = True
+                print("rhot: the numerical code is being compiled, once for these sources; that takes "
+                      f"{'some seconds' if is_complete() else takes}.", file=sys.stderr, flush=True)
+
+        def on_end(self, event: object) -> None:
+            """Nothing: the next function follows."""
+
+    global _announced
+    if not _announced:
+        _announced = True
+        event.register("numba:compile", Notice())
 
 
-def announce_compilation(part: str = "tracking", takes: str = "some minutes") -> None:
-    """Say on standard error why the first run of all takes long; later ones say nothing. A command that tracks nothing,
-    such as ``rhot simulate``, compiles only what it needs and leaves the tracker for later. `part`: the package that a
-    command needs last; `takes`: how long it takes."""
-    if is_cold() or not (is_complete() or any(Path(os.environ[VARIABLE]).glob(f"{part}_*/*.nbi"))):
-        print(f"rhot: the numerical code is being compiled, once for these sources; that takes {takes}.",
-              file=sys.stderr, flush=True)
+_announced = False  # the listener stays registered until the process ends
+
+
+def compiles_since(t_unix_s: float) -> bool:
+    """Whether programs that began at this time have to compile: nothing is compiled yet, or something has been since,
+    while all of it was not."""
+    if is_complete():
+        return False
+    files = list(Path(os.environ[VARIABLE]).rglob("*.nbi")) if VARIABLE in os.environ else []
+    with contextlib.suppress(OSError):  # one that is being replaced
+        return not files or any(file.stat().st_mtime >= t_unix_s for file in files)
+    return True
 
 
 def is_compiled_in(cache: Path) -> bool:

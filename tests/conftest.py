@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 
 # Before numpy loads. A second thread only waits for the first one, busily, where matrices are as small as here: the
 # shape of a hand then takes five times the processor's time. Programs that a test starts inherit it.
@@ -21,15 +19,9 @@ import rhot_app  # noqa: E402, F401 - decides where compiled code is kept, befor
 settings.register_profile("patient", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("patient")
 
-_folder = pytest.StashKey[str]()
 
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Programs that a test starts inherit the place of the master's keys, which are never the user's."""
-    config.stash[_folder] = tempfile.mkdtemp(prefix="rhot-test-keys-")
-    os.environ["RHOT_KEYS"] = f"{config.stash[_folder]}/keys.json"
-
-
-def pytest_unconfigure(config: pytest.Config) -> None:
-    """Leave nothing behind."""
-    shutil.rmtree(config.stash[_folder], ignore_errors=True)
+@pytest.fixture(scope="session", autouse=True)
+def master_keys(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Programs that a test starts inherit the place of the master's keys, which are never the user's. pytest removes it
+    one day, also after runs that were killed."""
+    os.environ["RHOT_KEYS"] = str(tmp_path_factory.mktemp("keys") / "keys.json")

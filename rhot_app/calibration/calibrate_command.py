@@ -7,6 +7,8 @@ import importlib
 import sys
 from types import ModuleType
 
+from rhot_node.compiled import announce_compilation
+
 KINDS: dict[str, str] = {
     "bones": "the hand's bones and where the markers sit, from a minute of free movement or a ruler",
     "filters": "the filters' settings, from a hand held still and one that moves fast",
@@ -37,6 +39,7 @@ def run(args: argparse.Namespace) -> int:
         rows = "\n".join(f"  {kind:12s}{summary}" for kind, summary in KINDS.items())
         print(f"rhot calibrate KIND, one of:\n{rows}\n`rhot calibrate KIND --help` has its options.", file=sys.stderr)
         return 2
+    announce_compilation()
     return int(_module(args.kind).run(args))
 
 

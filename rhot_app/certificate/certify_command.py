@@ -11,6 +11,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rhot_app.errors import CertificateError, input_file
+from rhot_node.compiled import announce_compilation
+
 if TYPE_CHECKING:
     from rhot_app.certificate.document import Certificate
     from rhot_app.certificate.recordings import ProtocolFile
@@ -23,7 +26,7 @@ DIFFERS = 1
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot certify``."""
-    parser.add_argument("--rig", type=Path, default=None, metavar="FILE", help="the rig file that is certified")
+    parser.add_argument("--rig", type=input_file, default=None, metavar="FILE", help="the rig file that is certified")
     parser.add_argument("--recordings", type=Path, default=None, metavar="DIR",
                         help="recordings made before, with protocol.json; without it, and without --step and "
                              "--simulated, the running engine records now, step by step in this terminal")
@@ -49,13 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Collect, solve, judge, report; returns 1 when a line differs."""
-    from rhot_app.errors import CertificateError
     from rhot_app.progress import ProgressLine, within
 
     if args.compare is not None:
         return _compare(args)
     out = args.out or Path(f"certificate-{datetime.now():%Y%m%d-%H%M%S}")
     _check(args, out)
+    announce_compilation()
     line = ProgressLine("certificate", sys.stderr)
     with contextlib.ExitStack() as stack:
         folder = args.recordings or _folder(args, out, stack)
@@ -75,8 +78,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace, out: Path) -> None:
     """Before the work, not after."""
-    from rhot_app.errors import CertificateError
-
     if args.rig is None and not args.simulated:
         raise CertificateError("--rig FILE says which rig is certified; or give --simulated.")
     if args.simulated and (args.recordings is not None or args.step):

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.engine.directory import default_directory
+from rhot_app.errors import EngineError, RigError, input_file
 from rhot_app.outputs.spec import HELP, WEB_PORT, parse_output, web_settings
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot engine``."""
-    parser.add_argument("--rig", type=Path, required=True, metavar="FILE", help="the rig file (rhot-rig, JSON)")
+    parser.add_argument("--rig", type=input_file, required=True, metavar="FILE", help="the rig file (rhot-rig, JSON)")
     parser.add_argument("--record", "--log", type=Path, dest="log", metavar="FILE",
                         help="write the raw log of all datagrams to this new file")
     parser.add_argument("--video", action="store_true",
@@ -42,8 +43,6 @@ def _require_acceptable(rig: Rig, path: Path) -> None:
     """Raises RigError when `rhot check` refuses the rig."""
     from rhot_app.calibration.check.checks import check_rig
     from rhot_app.calibration.verdict import Grade
-    from rhot_app.errors import RigError
-
     verdict = check_rig(rig).verdict
     if not verdict.acceptable:
         wrong = " ".join(finding.sentence for finding in verdict.findings if finding.grade is Grade.POOR)
@@ -82,7 +81,6 @@ def run(args: argparse.Namespace) -> int:
     """Run the engine until SIGTERM, SIGINT or the command ``quit``."""
     from rhot_app.engine.advice import calibration_advice
     from rhot_app.engine.serve import serving
-    from rhot_app.errors import EngineError
     from rhot_app.keys import load_master_keys
     from rhot_app.project import load_rig
     from rhot_app.sources.links import UdpNodes

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rhot_app.errors import RecordingError, input_file
+
 if TYPE_CHECKING:
     from rhot_app.project import Rig
     from rhot_app.sources.frame_sets import CameraVideo
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot bare-hand``."""
-    parser.add_argument("--rig", type=Path, required=True, metavar="FILE",
+    parser.add_argument("--rig", type=input_file, required=True, metavar="FILE",
                         help="the calibrated rig, with the hand's side")
     parser.add_argument("--video", action="append", required=True, metavar="NAME=FILE",
                         help="a camera of the rig and its video; once for each camera, also for one alone")
@@ -45,17 +47,21 @@ def run(args: argparse.Namespace) -> int:
     """Track, and say what came of it. Raises RecordingError, ExportError and RigError."""
     import msgspec
 
-    from rhot_app.errors import RecordingError
-    from rhot_app.export.bare_hand import learn_backgrounds, track_videos
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig
+
+    rig = load_rig(args.rig)
+    given, empty_given = named(args.video, "--video", rig), named(args.background, "--background", rig)
+    for path in (*given.values(), *empty_given.values()):
+        input_file(path)  # refused before numba is loaded
+    from rhot_app.export.bare_hand import learn_backgrounds, track_videos
     from rhot_app.sources.frame_sets import FPS, checked_seconds, on_one_clock
     from rhot_node.compiled import announce_compilation
 
     if args.fps is not None and not FPS[0] <= args.fps <= FPS[1]:
         raise RecordingError(f"--fps {args.fps:g}: give the frames per second, from {FPS[0]:g} to {FPS[1]:g}.")
-    rig = load_rig(args.rig)
-    videos = open_all(rig, named(args.video, "--video", rig), args.fps)
+    announce_compilation()
+    videos = open_all(rig, given, args.fps)
     rig = msgspec.structs.replace(rig, nodes=tuple(node for video in videos for node in rig.nodes
                                                    if node.name == video.camera), depth=type(rig.depth)())
     offsets = {name: checked_seconds(text, f"--offset-s {name}")
@@ -63,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     videos = on_one_clock(videos, offsets)
     foreground, empty_s = None, 0.0
     if args.background:
-        empty = open_all(rig, named(args.background, "--background", rig), args.fps)
+        empty = open_all(rig, empty_given, args.fps)
         if len(empty) < len(videos):
             missing = next(node.name for node in rig.nodes if node.name not in {video.camera for video in empty})
             raise RecordingError(f"--background: camera {missing} has none; give one for every camera.")
@@ -71,7 +77,6 @@ def run(args: argparse.Namespace) -> int:
     elif args.background_seconds is not None:
         empty_s = checked_seconds(args.background_seconds, "--background-seconds")
         foreground = learn_backgrounds(videos, empty_s)
-    announce_compilation()
     line = ProgressLine("tracking")
     summary = track_videos(rig, videos, foreground, known_size=not args.unknown_size, empty_s=empty_s, out=args.out,
                            pictures=args.overlay, again=args.again, hand_file=args.adapt, progress=line.report)
@@ -84,8 +89,6 @@ def run(args: argparse.Namespace) -> int:
 
 def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:
     """What an option says of each camera, as NAME=VALUE. Raises RecordingError."""
-    from rhot_app.errors import RecordingError
-
     names = [node.name for node in rig.nodes]
     found: dict[str, str] = {}
     for text in given:
@@ -103,7 +106,6 @@ def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:
 
 def open_all(rig: Rig, paths: dict[str, str], fps: float | None) -> list[CameraVideo]:
     """The videos of cameras, in the rig's order. Raises RecordingError."""
-    from rhot_app.errors import RecordingError
     from rhot_app.sources.frame_sets import open_video
 
     files = [Path(path).resolve() for path in paths.values()]

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rhot_app.errors import input_file
+
 if TYPE_CHECKING:
     from rhot_app.export.plan import ExportOptions
 
@@ -16,7 +18,8 @@ READ_WITH_LOSSES = 3
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot export``."""
-    parser.add_argument("path", type=Path, metavar="LOG", help="a raw log written by rhot engine --log or the app")
+    parser.add_argument("path", type=input_file, metavar="LOG",
+                        help="a raw log written by rhot engine --log or the app")
     parser.add_argument("--out", type=Path, metavar="FILE",
                         help="file to write (default: named as the log, beside it)")
     add_export_arguments(parser, "default: by the ending of --out")
@@ -27,7 +30,7 @@ def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -
     """What ``rhot export`` and ``rhot batch`` have in common; `without_format` says what holds without --format."""
     parser.add_argument("--format", default=None, metavar="F",
                         help=f"csv, trc, c3d, bvh, gltf, npz, parquet or mcap ({without_format})")
-    parser.add_argument("--rig", type=Path, metavar="FILE",
+    parser.add_argument("--rig", type=input_file, metavar="FILE",
                         help="track with this rig instead of the one the log was recorded with")
     parser.add_argument("--tracker", choices=("classic", "estimator"), default=None,
                         help="track with this tracker instead of the one that the rig asks for")

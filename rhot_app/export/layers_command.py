@@ -8,6 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rhot_app.errors import RigError, input_file
+from rhot_node.compiled import announce_compilation
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -29,7 +32,7 @@ BACKGROUND = 60  # grey level, so that white and black lines both show
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot layers``."""
-    parser.add_argument("file", type=Path, nargs="?", metavar="FILE",
+    parser.add_argument("file", type=input_file, nargs="?", metavar="FILE",
                         help="a rhot-hand or rhot-articulated file; without it, the shipped right hand")
     parser.add_argument("--angle", action="append", default=[], metavar="NAME=DEG",
                         help="set an angle; the others rest. Give it once for every angle")
@@ -51,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
     bodies, names, angles = _posed(args.file, args.angle)
     azimuth, elevation = _eye(args.eye)
     film = _is_film(args.out)
+    announce_compilation("some seconds")
     placed = place(bodies, np.eye(4), angles)
     cameras = [_camera(bodies, placed, azimuth + turn, elevation) for turn in
                (np.arange(FILM_FRAMES) * 360.0 / FILM_FRAMES if film else [0.0])]
@@ -79,7 +83,6 @@ def _posed(path: Path | None, wanted: list[str]) -> tuple[Bodies, tuple[str, ...
 
     from rhot_app.articulated.bodies import bodies_of, hand_bodies
     from rhot_app.barehand.surface import surface_of
-    from rhot_app.errors import RigError
     from rhot_app.hand.anatomy import load_hand
     from rhot_app.hand.articulated import FORMAT, load_articulated
     from rhot_app.hand.articulated_model import STATE_ROOT, build_articulated
@@ -114,8 +117,6 @@ def _posed(path: Path | None, wanted: list[str]) -> tuple[Bodies, tuple[str, ...
 def _number(where: str, text: str) -> float:
     import math
 
-    from rhot_app.errors import RigError
-
     try:
         value = float(text)
     except ValueError:
@@ -126,8 +127,6 @@ def _number(where: str, text: str) -> float:
 
 
 def _eye(text: str) -> tuple[float, float]:
-    from rhot_app.errors import RigError
-
     parts = text.split(",")
     if len(parts) != 2:
         raise RigError(f"--from {text}: give two numbers, azimuth and elevation, such as 60,50.")
@@ -138,8 +137,6 @@ def _eye(text: str) -> tuple[float, float]:
 
 
 def _is_film(path: Path) -> bool:
-    from rhot_app.errors import RigError
-
     if path.suffix not in (".png", ".jpg", ".avi", ".mp4"):
         raise RigError(f"--out {path}: a picture ends in .png or .jpg, a film in .avi or .mp4.")
     if not path.parent.is_dir():
@@ -189,7 +186,6 @@ def _pictures(bodies: Bodies, placed: Placed, cameras: list[CameraModel],
 def _picture(path: Path, image: Any) -> None:
     import cv2
 
-    from rhot_app.errors import RigError
     from rhot_node.files import write_atomically
 
     try:

@@ -7,6 +7,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rhot_app.errors import RigError, input_file
+
 if TYPE_CHECKING:
     from rhot_app.hand.anatomy import HandAnatomy
     from rhot_app.hand.articulated import Articulated
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot hand``."""
-    parser.add_argument("file", type=Path, nargs="?", metavar="HAND",
+    parser.add_argument("file", type=input_file, nargs="?", metavar="HAND",
                         help="a rhot-hand or rhot-articulated file; without it, the rig's hand or the shipped one")
     parser.add_argument("--length", type=float, metavar="MM",
                         help="hand length to scale to, mm, from the wrist to the tip of the stretched middle finger")
@@ -33,7 +35,6 @@ def run(args: argparse.Namespace) -> int:
     """Make, check, write and show; raises RigError for what cannot be, before anything is written."""
     import msgspec
 
-    from rhot_app.errors import RigError
     from rhot_app.hand.articulated import Articulated
     from rhot_app.project import load_rig
     from rhot_app.rig_history import accept
@@ -60,7 +61,6 @@ def _wanted(args: argparse.Namespace, worn: HandAnatomy | None) -> HandAnatomy |
     """The hand that the arguments ask for; `worn`: the rig's, to begin with when no file is named."""
     import msgspec
 
-    from rhot_app.errors import RigError
     from rhot_app.hand.articulated import Articulated, articulated_hand, scaled_to_length
 
     hand = worn if worn is not None and args.file is None else _read(args.file)
@@ -99,7 +99,6 @@ def _name(hand: HandAnatomy | Articulated, args: argparse.Namespace) -> str:
 
 
 def _read(path: Path | None) -> HandAnatomy | Articulated:
-    from rhot_app.errors import RigError
     from rhot_app.hand.anatomy import load_hand
     from rhot_app.hand.articulated import FORMAT, load_articulated
     from rhot_node.files import read_json, resource_path
@@ -115,15 +114,12 @@ def _read(path: Path | None) -> HandAnatomy | Articulated:
 
 
 def _require_folders(args: argparse.Namespace) -> None:
-    from rhot_app.errors import RigError
-
     for path in (args.out, args.draw):
         if path is not None and not path.parent.is_dir():
             raise RigError(f"{path}: there is no folder {path.parent}. Make it first, or name another place.")
 
 
 def _write(path: Path, hand: HandAnatomy | Articulated) -> None:
-    from rhot_app.errors import RigError
     from rhot_app.hand.anatomy import save_hand
     from rhot_app.hand.articulated import Articulated, save_articulated
 
@@ -146,7 +142,6 @@ def _picture(hand: HandAnatomy | Articulated) -> bytes:
 
 
 def _store(path: Path, data: bytes) -> None:
-    from rhot_app.errors import RigError
     from rhot_node.files import write_atomically
 
     try:

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rhot_node.compiled import announce_compilation
+
 if TYPE_CHECKING:
     from rhot_app.objects.object_file import ObjectModel
     from rhot_app.objects.observations import FiducialFrame
@@ -38,6 +40,7 @@ def run(args: argparse.Namespace) -> int:
         if not model.fiducials:
             raise ObjectError(f"{args.file}: {model.name!r} has colour markers only, which are not looked for in still "
                               "images. Give an object with fiducials.")
+        announce_compilation("some seconds")
         fields.update(_pose_fields(_solve(model, load_rig(args.rig), args.images)))
     print(json.dumps(fields) if args.json else "\n".join(_lines(fields)))
     return 0

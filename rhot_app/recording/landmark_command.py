@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rhot_app.errors import RecordingError, input_file
 from rhot_app.hand.landmarks import ANATOMY_SD_M, COMMON_M, LASTING_M, NOISE_M
 
 if TYPE_CHECKING:
@@ -28,9 +29,9 @@ recorded hand in docs/landmarks.md with the shipped bones, and 1.8 with a wrong 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot landmarks``."""
-    parser.add_argument("tables", type=Path, nargs="+", metavar="CSV",
+    parser.add_argument("tables", type=input_file, nargs="+", metavar="CSV",
                         help="a landmark table for each camera, in the rig's order (docs/landmarks.md)")
-    parser.add_argument("--rig", type=Path, required=True, metavar="FILE",
+    parser.add_argument("--rig", type=input_file, required=True, metavar="FILE",
                         help="the calibrated rig, with the marker set landmarks21")
     parser.add_argument("--out", type=Path, required=True, metavar="LOG", help="the raw log to write; a new file")
     parser.add_argument("--fps", type=float, default=None, metavar="N",
@@ -40,7 +41,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the log, track it, print the summary. Raises RecordingError and RigError."""
-    from rhot_app.errors import RecordingError
     from rhot_app.project import load_rig, with_tracker
     from rhot_app.recording.landmark_log import landmark_order, read_landmark_table, write_landmark_log
     from rhot_node.compiled import announce_compilation

@@ -15,6 +15,7 @@ from rhot_app.simulator.scene.scene_arguments import (
     scene_of,
     show_of,
 )
+from rhot_node.compiled import announce_compilation
 
 if TYPE_CHECKING:
     from rhot_app.simulator.film.film import Progress
@@ -52,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.simulator.film.shot import make_shot
 
     _check(args)
+    announce_compilation()
     if args.depth_table is not None:
         return _write_depth_table(args)
     began = time.monotonic()

@@ -191,7 +191,7 @@ def test_the_command_refuses_with_a_sentence(tmp_path: Path, capsys: pytest.Capt
     text.write_text("not a recording\n")
     out = tmp_path / "hand.json"
     for arguments, words in (
-            (["--tsv", str(tmp_path / "none.tsv")], "cannot be read"), (["--tsv", str(text)], "not a Qualisys TSV"),
+            (["--tsv", str(tmp_path / "none.tsv")], "no such file"), (["--tsv", str(text)], "not a Qualisys TSV"),
             (["--set", "index.proximal=long"], "not a number"), (["--set", "index.proximal"], "NAME=VALUE"),
             (["--set", "index.proximal=41", "index.proximal=42"], "twice"), ([], "give one of")):
         assert main(["calibrate", "bones", *arguments, "--out", str(out)]) == 2

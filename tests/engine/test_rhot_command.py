@@ -55,8 +55,12 @@ def test_mistakes_end_with_a_sentence_and_2(tmp_path: Path) -> None:
         (("engine", "--rig", str(tmp_path / "binary.log")), "binary.log: this is no text, so no rhot-rig file"),
         (("replay", str(tmp_path / "foreign.log"), "--smooth"), "foreign.log: this is not a raw log"),
         (("replay", str(tmp_path / "foreign.log"), "--speed", "fast"), "fast is neither a number nor max"),
-        (("replay", str(tmp_path / "foreign.log"), "--jsn"), "there is no '--jsn' here; did you mean --json?"),
-        (("dance",), "dance"),
+        (("replay", str(tmp_path / "foreign.log"), "--jsn"), "no option '--jsn' here; did you mean --json?"),
+        (("export", "--trakcer", "classic", "no.log"), "no option '--trakcer' here; did you mean --tracker?"),
+        (("--motoin", "wave"), "there is no option '--motoin' here"),
+        (("--frobnicate",), "there is no option '--frobnicate' here"),
+        (("exprt", "no.log"), "there is no command 'exprt'; did you mean export?"),
+        (("dance",), "there is no command 'dance'"),
     ]:
         done = rhot(*arguments)
         assert done.returncode == 2, done

@@ -98,7 +98,7 @@ def test_logs_that_are_none(log: Path, tmp_path: Path, capsys: pytest.CaptureFix
     reader = LogReader(log)
     (tmp_path / "empty.rhotlog").write_bytes(encode_header(reader.rig, {}))
     before = left(tmp_path)
-    for name, words in (("no", "cannot be read"), ("later", "version 9 of the raw log is not supported"),
+    for name, words in (("no", "no such file"), ("later", "version 9 of the raw log is not supported"),
                         ("foreign", "this is not a raw log"), ("nothing", "the file is empty"),
                         ("empty", "it holds no observations")):
         arguments = ["export", str(tmp_path / f"{name}.rhotlog"), "--format", "csv", "--tracker", "classic"]

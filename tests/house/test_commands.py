@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from rhot_app.__main__ import SUBCOMMANDS
+
 ROOT = Path(__file__).parents[2]
 MODULES = {"rhot": "rhot_app", "rhot-node": "rhot_node"}
 
@@ -113,6 +115,34 @@ def test_documented_commands_exist(file: str, line: str) -> None:
     text = help_of(command)
     for option in re.findall(r"(?<!\S)--?[a-z][a-z-]*", line):
         assert option in text, f"{file}: {line!r} names {option}, which {command} --help does not"
+
+
+def test_the_list_of_commands_is_whole() -> None:
+    """docs/README.md has a row for every command."""
+    rows = re.findall(r"^\| `rhot ([a-z-]+)", (ROOT / "docs" / "README.md").read_text(), re.MULTILINE)
+    assert not SUBCOMMANDS.keys() - set(rows)
+
+
+NO_SUCH_FILE = (
+    "replay NONE --json", "export NONE --format csv", "refine NONE", "recover NONE --out x", "video collect NONE",
+    "bare-hand --rig NONE --video left=a.mp4", "bare-hand --rig RIG --video left=NONE",
+    "landmarks NONE --rig RIG --out x", "calibrate bones --log NONE", "calibrate time --log NONE --rig RIG",
+    "calibrate filters --log-still NONE --log-fast NONE --rig RIG", "calibrate colours --image NONE --out x",
+    "calibrate depth --table NONE", "calibrate alignment --foreign NONE --rig-points NONE", "hand NONE", "object NONE",
+    "layers NONE --out x.png", "fit-hand --rig NONE --pictures a b", "check --rig NONE", "engine --rig NONE",
+    "certify --rig NONE", "report NONE --out x.zip", "--rig NONE",
+)
+
+
+@pytest.mark.parametrize("command", NO_SUCH_FILE)
+def test_a_missing_file_is_refused_before_compiled_code_is_loaded(command: str, tmp_path: Path) -> None:
+    """Loading it takes seconds, and the first time of all minutes."""
+    words = command.replace("NONE", "no-such-file").replace("RIG", str(ROOT / "resources/rigs/two_pis.json")).split()
+    code = ("import sys, rhot_app; sys.modules['numba'] = None\n"
+            "from rhot_app.__main__ import main; sys.exit(main(sys.argv[1:]))")
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False,
+                          cwd=tmp_path)
+    assert done.returncode == 2 and "no-such-file" in done.stderr, done.stderr
 
 
 def test_help_loads_no_numerical_library() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rhot_node.compiled import VARIABLE, announce_compilation, is_cold, is_complete, mark_complete, sources_hash
+from rhot_node.compiled import VARIABLE, compiles_since, is_complete, mark_complete, sources_hash
 
 
 @pytest.fixture
@@ -85,25 +85,38 @@ def test_complete_belongs_to_one_folder(tmp_path: Path, monkeypatch: pytest.Monk
     mark_complete()
 
 
-def test_a_cache_is_cold_until_anything_was_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                                     capsys: pytest.CaptureFixture[str]) -> None:
+def test_programs_compile_until_all_is_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, str(tmp_path))
-    assert is_cold()
-    announce_compilation()
-    assert "being compiled" in capsys.readouterr().err
+    assert compiles_since(100.0), "nothing is compiled yet"
     (tmp_path / "detect_1").mkdir()
     (tmp_path / "detect_1" / "kernel.py311.nbi").touch()
-    assert not is_cold()
-    announce_compilation()
-    assert "being compiled" in capsys.readouterr().err, "the tracker is not compiled yet"
-    (tmp_path / "tracking_2").mkdir()
-    (tmp_path / "tracking_2" / "tracker.py311.nbi").touch()
-    announce_compilation()
-    assert capsys.readouterr().err == ""
-    announce_compilation("objects", "some seconds")
-    assert "takes some seconds" in capsys.readouterr().err, "this command needs something else"
+    os.utime(tmp_path / "detect_1" / "kernel.py311.nbi", (50.0, 50.0))
+    assert not compiles_since(100.0)
+    (tmp_path / "tracker.py311.nbi").touch()
+    assert compiles_since(100.0)
+    mark_complete()
+    assert not compiles_since(100.0)
     monkeypatch.delenv(VARIABLE)
-    assert is_cold()
+    assert compiles_since(100.0)
+
+
+def test_a_process_says_at_once_and_only_then_that_it_compiles(tmp_path: Path) -> None:
+    program = ("from numba import njit\nfrom rhot_node.compiled import announce_compilation\n"
+               "announce_compilation()\nannounce_compilation()\n"
+               "@njit(cache=True)\ndef twice(x): return x + x\ntwice(1)\ntwice(1.0)\n")
+    (tmp_path / "program.py").write_text(program)
+    environment = os.environ | {VARIABLE: str(tmp_path / "cache")}
+
+    def said() -> str:
+        return subprocess.run([sys.executable, "program.py"], cwd=tmp_path, env=environment, capture_output=True,
+                              text=True, check=True).stderr
+
+    first = said()
+    assert first.count("being compiled") == 1 and "minutes" in first
+    assert said() == "", "it is in the cache"
+    (tmp_path / "cache" / "complete").touch()
+    (tmp_path / "program.py").write_text(f"{program}twice(1j)\n")
+    assert "some seconds" in said()
 
 
 def test_a_program_that_loads_numba_first_uses_the_same_folder() -> None:

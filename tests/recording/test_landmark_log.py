@@ -92,7 +92,7 @@ def test_the_command_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFi
     assert "rig 'landmarks' has 2 cameras, but the landmark tables are 1" in capsys.readouterr().err
     assert not out.exists()
     assert main([*say[:2], str(tmp_path / "none.csv"), *say[2:]]) == 2
-    assert "none.csv: cannot be read (No such file or directory)." in capsys.readouterr().err
+    assert "none.csv: no such file." in capsys.readouterr().err
     painted = load_rig(resource_path("rigs", "two_pis.json"))
     save_rig(rig_path, msgspec.structs.replace(painted))
     assert main([*say[:2], str(one), *say[2:]]) == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from fake_backend import FakeBackend
@@ -10,6 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 
 from rhot_app.project import save_rig
+from rhot_app.ui.welcome import COMPILING
 from rhot_node.compiled import VARIABLE, mark_complete
 
 
@@ -21,14 +23,28 @@ def test_the_first_page_offers_three_ways(bench):
     assert bench.window.toolbar.badge.word == "NO RIG"
     assert not bench.window.actions_.start.isEnabled()
     assert not any(dock.isVisible() for dock in bench.window.docks.docks)
+    advice = bench.window.advice
+    bench.until(lambda: advice.texts)
+    assert advice.height() < 2 * advice.line_px, "one sentence, no strip for two"
 
 
 def test_only_the_first_start_of_all_is_said_to_take_long(bench, tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     bench.backend.gate.clear()
     bench.click(bench.window.welcome.twin_button)
-    bench.until(lambda: bench.window.welcome.compile_note.isVisible())
+    bench.until(lambda: bench.window.welcome.progress_label.text() == COMPILING)
     assert bench.window.welcome.progress_bar.isVisible()
+
+
+def test_a_start_that_compiles_more_than_there_was_says_so(bench, tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    (tmp_path / "old.nbi").touch()
+    os.utime(tmp_path / "old.nbi", (0, 0))
+    bench.backend.gate.clear()
+    bench.click(bench.window.welcome.twin_button)
+    bench.until(lambda: bench.window.welcome.progress_label.text() == "Starting the engine …")
+    (tmp_path / "new.nbi").touch()
+    bench.until(lambda: bench.window.welcome.progress_label.text() == COMPILING)
 
 
 def test_opening_shows_progress_and_can_be_cancelled(bench, tmp_path, monkeypatch):
@@ -40,7 +56,6 @@ def test_opening_shows_progress_and_can_be_cancelled(bench, tmp_path, monkeypatc
     bench.until(lambda: bench.window.welcome.progress_label.text() == "Starting the engine …")
     assert bench.window.welcome.progress_bar.value() == 40
     bench.until(lambda: bench.window.toolbar.badge.word == "STARTING")
-    assert not bench.window.welcome.compile_note.isVisible()
     bench.click(bench.window.welcome.cancel_button)
     bench.until(lambda: "give up" in bench.backend.calls and bench.window.welcome.twin_button.isVisible())
     bench.until(lambda: bench.window.toolbar.badge.word == "NO RIG")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.errors import CalibrationError, input_file
 
 if TYPE_CHECKING:
     from rhot_app.calibration.hand.bones_report import BonesReport
@@ -19,14 +20,14 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot calibrate bones``."""
     source = parser.add_mutually_exclusive_group()
-    source.add_argument("--log", type=Path, metavar="LOG",
+    source.add_argument("--log", type=input_file, metavar="LOG",
                         help="a raw log in which the hand moves freely for a minute")
-    source.add_argument("--tsv", type=Path, metavar="FILE", help="a Qualisys TSV export with markers on a hand")
-    parser.add_argument("--rig", type=Path, metavar="RIG",
+    source.add_argument("--tsv", type=input_file, metavar="FILE", help="a Qualisys TSV export with markers on a hand")
+    parser.add_argument("--rig", type=input_file, metavar="RIG",
                         help="calibrated rig for the log (default: the log's own)")
     parser.add_argument("--roles", nargs="+", default=[], metavar="NAME=ROLE",
                         help="where markers sit, as m1=index_tip m2=index_medial m3=palm_1 m4=wrist")
-    parser.add_argument("--hand", type=Path, metavar="BASE",
+    parser.add_argument("--hand", type=input_file, metavar="BASE",
                         help="hand file to begin from (default: the rig's hand, or the adult hand of the project)")
     parser.add_argument("--side", choices=("right", "left"), help="which hand it is (default: the base hand's)")
     parser.add_argument("--set", nargs="+", default=[], metavar="BONE=MM", dest="lengths",
@@ -38,7 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Solve or enter, report; the hand is written only with ``--out`` and a verdict that allows it."""
-    from rhot_app.errors import CalibrationError
     from rhot_app.hand.anatomy import save_hand
 
     lengths = _lengths(args.lengths)
@@ -152,8 +152,6 @@ def _base(args: argparse.Namespace, worn: HandAnatomy | None, name: str) -> Hand
 
 
 def _pairs(words: list[str], example: str) -> list[tuple[str, str]]:
-    from rhot_app.errors import CalibrationError
-
     found = []
     for word in words:
         name, equals, value = word.partition("=")
@@ -165,8 +163,6 @@ def _pairs(words: list[str], example: str) -> list[tuple[str, str]]:
 
 def _lengths(words: list[str]) -> dict[str, float]:
     """What was entered, mm by bone."""
-    from rhot_app.errors import CalibrationError
-
     found: dict[str, float] = {}
     for name, text in _pairs(words, "--set index.proximal=41"):
         if name in found:

@@ -20,11 +20,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check and report; exit code 2 when the rig cannot be tracked with."""
-    from rhot_app.calibration.check.camera_calibration import calibration_text
-    from rhot_app.calibration.check.checks import check_rig
     from rhot_app.project import load_rig
 
-    rig = load_rig(rig_of(args))
+    rig = load_rig(rig_of(args))  # refused before numba is loaded
+    from rhot_app.calibration.check.camera_calibration import calibration_text
+    from rhot_app.calibration.check.checks import check_rig
+
     report, calibration = check_rig(rig), calibration_text(rig)
     tell({**_fields(report), "calibration": calibration}, [*_lines(report), f"cameras calibrated: {calibration}"],
          report.verdict, as_json=args.json)

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.calibration.commands.output import add_json_argument, show
-from rhot_app.errors import CalibrationError
-from rhot_node.compiled import announce_compilation
+from rhot_app.errors import CalibrationError, input_file
 
 if TYPE_CHECKING:
     import numpy as np
@@ -52,11 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Define the command's options."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("--image", type=Path, action="append", required=True, metavar="PATH",
+    parser.add_argument("--image", type=input_file, action="append", required=True, metavar="PATH",
                         help="a picture as the camera gives it; several are numbered 1, 2, ...")
     parser.add_argument("--sample", action="append", required=True, metavar="NAME=x,y,w,h",
                         help="a box on the paint of marker NAME (NAME@2=...: in the second picture)")
-    parser.add_argument("--markers", type=Path, metavar="BASE", help="marker file whose markers are learnt anew")
+    parser.add_argument("--markers", type=input_file, metavar="BASE", help="marker file whose markers are learnt anew")
     parser.add_argument("--skin", action="append", default=[], metavar="x,y,w,h",
                         help="a box on bare skin (@2=x,y,w,h: in the second picture)")
     parser.add_argument("--out", type=Path, required=True, metavar="MARKERS", help="marker file to write")
@@ -86,7 +85,6 @@ def run(args: argparse.Namespace) -> int:
             collector.keep_view(image)
     skin = _skin([parse_box(f"skin{text}" if text.startswith("@") else f"skin={text}", "--skin") for text in args.skin],
                  images, args.image)
-    announce_compilation()
     line = ProgressLine("colours", sys.stderr)
     report = solve_colours(collector.samples, collector.views, skin=skin, base=base, progress=line.report)
     line.finish()

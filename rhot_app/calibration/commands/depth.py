@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
+from rhot_app.errors import CalibrationError, input_file
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,9 +20,9 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot calibrate depth``."""
-    parser.add_argument("--table", type=Path, required=True, metavar="CSV",
+    parser.add_argument("--table", type=input_file, required=True, metavar="CSV",
                         help="measured distances and disparities, columns real_cm and disparity_px")
-    parser.add_argument("--rig", type=Path, metavar="FILE", help="the rig whose two cameras were used")
+    parser.add_argument("--rig", type=input_file, metavar="FILE", help="the rig whose two cameras were used")
     parser.add_argument("--out", type=Path, metavar="FILE",
                         help="write the rig with this law as its way to find distance")
     parser.add_argument("--baseline-mm", type=float, metavar="B",
@@ -37,7 +38,6 @@ def run(args: argparse.Namespace) -> int:
 
     from rhot_app.calibration.depth.fit import fit_depth
     from rhot_app.calibration.depth.table import read_depth_table
-    from rhot_app.errors import CalibrationError
     from rhot_app.project import load_rig
     from rhot_app.rig_history import accept
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.errors import CalibrationError, input_file
 
 if TYPE_CHECKING:
     from rhot_app.calibration.filters.meters import FilterTargets, MarkerFigures
@@ -15,10 +16,11 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot calibrate filters``."""
-    parser.add_argument("--log-still", type=Path, required=True, metavar="LOG",
+    parser.add_argument("--log-still", type=input_file, required=True, metavar="LOG",
                         help="10 s of a hand held still, recorded by rhot engine --log or the app")
-    parser.add_argument("--log-fast", type=Path, required=True, metavar="LOG", help="10 s of a hand that waves briskly")
-    parser.add_argument("--rig", type=Path, required=True, metavar="FILE", help="the rig, calibrated")
+    parser.add_argument("--log-fast", type=input_file, required=True, metavar="LOG",
+                        help="10 s of a hand that waves briskly")
+    parser.add_argument("--rig", type=input_file, required=True, metavar="FILE", help="the rig, calibrated")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the rig with the proposed filters")
     parser.add_argument("--per-marker", action="store_true", help="write each marker's own settings too")
     parser.add_argument("--jitter-mm", type=float, default=None, metavar="J",
@@ -52,8 +54,6 @@ def _targets(args: argparse.Namespace) -> FilterTargets:
     from dataclasses import replace
 
     from rhot_app.calibration.filters.meters import FilterTargets
-    from rhot_app.errors import CalibrationError
-
     targets = FilterTargets()
     for option, value, field in (("--jitter-mm", args.jitter_mm, "jitter_m"), ("--lag-ms", args.lag_ms, "lag_s")):
         if value is not None:

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
+from rhot_app.errors import CalibrationError, RecordingError, RhotError, input_file
+from rhot_node.compiled import announce_compilation
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
@@ -22,8 +24,8 @@ SCALE_S = 120.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot refine``."""
-    parser.add_argument("log", type=Path, metavar="LOG", help="a raw log of a hand that moves through the volume")
-    parser.add_argument("--rig", type=Path, metavar="FILE", help="rig to check (default: the log's own)")
+    parser.add_argument("log", type=input_file, metavar="LOG", help="a raw log of a hand that moves through the volume")
+    parser.add_argument("--rig", type=input_file, metavar="FILE", help="rig to check (default: the log's own)")
     parser.add_argument("--out", type=Path, metavar="RIG", help="write the refined rig here")
     parser.add_argument("--use", action="store_true",
                         help="write it to --rig; what is there is kept (rhot history)")
@@ -33,7 +35,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Refine and report; a rig is written only with ``--out`` or ``--use``, when it is stale and may be refined."""
-    from rhot_app.errors import CalibrationError
     from rhot_app.project import load_rig
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.rig_history import accept
@@ -45,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
     require_folder(target)
     with contextlib.closing(LogReader(args.log)) as reader:
         rig = load_rig(args.rig) if args.rig is not None else reader.rig
+    announce_compilation()
     frames = _frames(args.log, rig)
     found = _refine(args.log, rig, frames)
     refined = refined_rig(rig, found)
@@ -66,7 +68,6 @@ def run(args: argparse.Namespace) -> int:
 def _frames(log: Path, rig: Rig) -> list[CameraObservations]:
     """Every admitted frame. Raises RecordingError when there is none."""
     from rhot_app.calibration.recorded_observations import why_none
-    from rhot_app.errors import RecordingError
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogValidator
     from rhot_app.tracking.tracker import CameraObservations
@@ -81,7 +82,6 @@ def _frames(log: Path, rig: Rig) -> list[CameraObservations]:
 
 
 def _refine(log: Path, rig: Rig, frames: Iterable[CameraObservations]) -> Refinement:
-    from rhot_app.errors import CalibrationError
     from rhot_app.tracking.refinement.rig_refinement import RigRefiner
 
     refiner = RigRefiner(rig)
@@ -101,7 +101,6 @@ def _scale(rig: Rig, frames: list[CameraObservations]) -> Scale:
     """The hand's size by the estimator on the refined rig; unknown where the rig does not allow it."""
     import msgspec
 
-    from rhot_app.errors import RhotError
     from rhot_app.project import TrackerSettings
     from rhot_app.tracking.refinement.refined_rig import Scale
     from rhot_app.tracking.trackers import make_tracker

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.errors import input_file
 
 if TYPE_CHECKING:
     from rhot_app.calibration.time.offset import TimeReport
@@ -15,9 +16,10 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot calibrate time``."""
-    parser.add_argument("--log", type=Path, required=True, metavar="LOG",
+    parser.add_argument("--log", type=input_file, required=True, metavar="LOG",
                         help="20 s of a hand that waves up and down, recorded by rhot engine --log or the app")
-    parser.add_argument("--rig", type=Path, required=True, metavar="FILE", help="the rig, its geometry calibrated")
+    parser.add_argument("--rig", type=input_file, required=True, metavar="FILE",
+                        help="the rig, its geometry calibrated")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the rig with corrected times")
     add_json_argument(parser)
 

@@ -7,11 +7,10 @@ import json
 import logging
 import sys
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.engine.command import add_serving_arguments, asked_outputs, print_addresses
-from rhot_app.errors import RecordingError
+from rhot_app.errors import RecordingError, input_file
 from rhot_node.compiled import announce_compilation
 
 if TYPE_CHECKING:
@@ -26,8 +25,9 @@ LAST_WORDS_S = 0.5
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot replay``."""
-    parser.add_argument("path", type=Path, metavar="LOG", help="a raw log written by rhot engine --log or the app")
-    parser.add_argument("--rig", type=Path, metavar="FILE",
+    parser.add_argument("path", type=input_file, metavar="LOG",
+                        help="a raw log written by rhot engine --log or the app")
+    parser.add_argument("--rig", type=input_file, metavar="FILE",
                         help="track with this rig instead of the one the log was recorded with")
     parser.add_argument("--tracker", choices=("classic", "estimator"), default=None,
                         help="track with this tracker instead of the one that the rig asks for")
@@ -61,14 +61,13 @@ def run(args: argparse.Namespace) -> int:
         rig = with_tracker(rig, args.tracker)
     if args.smooth and not rig.tracker.smooths:
         raise RecordingError(NOT_SMOOTHED)
+    announce_compilation()
     if args.json:
-        announce_compilation()
         print(json.dumps(summarise(reader, rig, SmoothedTracker(rig) if args.smooth else make_tracker(rig))))
         return 0
     reader.close()
     trackers: MakeTracker = make_tracker
     if args.smooth:
-        announce_compilation()
         line = ProgressLine(f"smoothing {args.path.name}")
         trackers = SmoothedReplay(args.path, rig, line.report).for_rig
         line.finish()

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
+from rhot_app.errors import CalibrationError, input_file
 
 if TYPE_CHECKING:
     from rhot_app.objects.alignment.motion_stream import MotionStream
@@ -22,21 +23,20 @@ POINT_COLUMNS = ("t", "x", "y", "z")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot calibrate alignment``."""
-    parser.add_argument("--foreign", type=Path, required=True, metavar="CSV",
+    parser.add_argument("--foreign", type=input_file, required=True, metavar="CSV",
                         help="the other tracker's poses, t,x,y,z,qw,qx,qy,qz in s and m, with that header")
-    parser.add_argument("--rig-points", type=Path, required=True, metavar="CSV",
+    parser.add_argument("--rig-points", type=input_file, required=True, metavar="CSV",
                         help="positions of a fingertip or tag on that tracker, t,x,y,z in s and m, rig frame")
     parser.add_argument("--search", type=float, default=1.0, metavar="S",
                         help="search the time offset within this, either way (default: 1 s)")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the alignment")
-    parser.add_argument("--check", type=Path, metavar="FILE",
+    parser.add_argument("--check", type=input_file, metavar="FILE",
                         help="solve nothing: say whether the streams still agree with this alignment, or it is stale")
     add_json_argument(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Solve and report; a file is written only with ``--out``."""
-    from rhot_app.errors import CalibrationError
     from rhot_app.objects.alignment.alignment_file import save_alignment, to_alignment
     from rhot_app.objects.alignment.motion_stream import read_stream
     from rhot_app.objects.alignment.report import calibrate_alignment
@@ -62,7 +62,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(path: Path, foreign: MotionStream, rig: MotionStream, *, as_json: bool) -> int:
     """Print whether the alignment is stale; 2 when it is. Raises CalibrationError without a file or overlap."""
-    from rhot_app.errors import CalibrationError
     from rhot_app.objects.alignment.alignment_file import load_alignment
     from rhot_app.objects.alignment.drift import DriftMonitor
 

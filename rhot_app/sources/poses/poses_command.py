@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     tracked = [pose for pose in poses if pose.validity is Validity.TRACKED]
     if len(tracked) < 2:
         raise SourceError(notice or f"{name}: there was no pose within {args.seconds:g} s.")
-    announce_compilation("objects", "some seconds")
+    announce_compilation("some seconds")
     if args.out is not None:
         write_poses(args.out, tracked)
     fields = {"source": name, **figures(poses), "notice": notice,

@@ -24,6 +24,7 @@ PAGES: tuple[tuple[str, str], ...] = (
 
 _MARGIN_PX = 16
 _SCROLL_BAR_PX = 24
+_SPACING_PX = 3
 
 
 def page_path(name: str) -> Path:
@@ -70,12 +71,13 @@ class GuideViewer(QDialog):
         self.setWindowTitle("RHOT guide")
         self.resize(960, 680)
         self.list = QListWidget()
-        self.list.setFixedWidth(210)
         for name, title in PAGES:
             item = QListWidgetItem(title)
             item.setData(Qt.ItemDataRole.UserRole, name)
             self.list.addItem(item)
-        self.list.setSpacing(3)
+        self.list.setSpacing(_SPACING_PX)
+        self.list.setFixedWidth(self.list.sizeHintForColumn(0) + 2 * (_SPACING_PX + self.list.frameWidth())
+                                + self.list.verticalScrollBar().sizeHint().width())
         self.browser = PageBrowser()
         self.browser.setOpenLinks(False)
         self.browser.document().setDocumentMargin(_MARGIN_PX)

@@ -97,6 +97,14 @@ def style_sheet(s: Scheme) -> str:
     QLabel[title="true"] {{ font-weight: 600; }}
     QFrame[card="true"] {{ background: {s.raised}; border: 1px solid {s.border}; border-radius: 8px; }}
     QScrollArea {{ border: none; background: {s.panel}; }}
+    QScrollBar {{ background: {s.panel}; border: none; }}
+    QScrollBar:vertical {{ width: 12px; }}
+    QScrollBar:horizontal {{ height: 12px; }}
+    QScrollBar::handle {{ background: {s.border}; border-radius: 4px; margin: 2px; }}
+    QScrollBar::handle:vertical {{ min-height: 24px; }}
+    QScrollBar::handle:horizontal {{ min-width: 24px; }}
+    QScrollBar::handle:hover {{ background: {s.muted}; }}
+    QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
     QTableView {{ background: {s.panel}; border: none; gridline-color: {s.border}; }}
     QHeaderView::section {{ background: {s.panel}; color: {s.muted}; border: none; padding: 4px 10px; }}
     QTableView::item {{ padding: 0 6px; }}

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import CalibrationError
+from rhot_app.errors import CalibrationError, input_file
 
 if TYPE_CHECKING:
     from rhot_app.hand.anatomy import HandAnatomy
@@ -17,14 +17,15 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot fit-hand``."""
-    parser.add_argument("--rig", type=Path, required=True, metavar="RIG", help="the calibrated rig")
+    parser.add_argument("--rig", type=input_file, required=True, metavar="RIG", help="the calibrated rig")
     parser.add_argument("--pictures", nargs="+", action="append", required=True, metavar="[NAME=]FILE",
                         help="pictures or videos of one instant, in the order of the rig's cameras or with their "
                              "names; give it again for another instant")
     parser.add_argument("--at", type=float, nargs="+", default=[], metavar="S",
                         help="of videos: the second of each instant, from the first moment that all videos show "
                              "(default 0)")
-    parser.add_argument("--hand", type=Path, metavar="HAND", help="hand file to begin with (default: the rig's hand)")
+    parser.add_argument("--hand", type=input_file, metavar="HAND",
+                        help="hand file to begin with (default: the rig's hand)")
     parser.add_argument("--save", type=Path, metavar="OUT", help="where Save writes the hand file (default: asked for)")
     parser.add_argument("--settings", type=Path, metavar="FILE",
                         help="remember settings in this file instead of the user's configuration folder")
@@ -57,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         fit.add_pictures(read_instant(rig, given, args.at[k] if k < len(args.at) else 0.0))
     fit.begin()
     _require_screen()
-    announce_compilation("barehand")
+    announce_compilation()
     warm_up(rig)
     from PySide6.QtWidgets import QApplication
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtGui import QAction
+from PySide6.QtGui import QAction, QIcon
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QLabel, QListWidget, QMenu, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app import rig_history
@@ -66,8 +66,14 @@ class Launcher(QObject):
         self.fit: HandFitWindow | None = None
 
     def show_ages(self, actions: list[QAction], path: str) -> None:
-        """A tick and the age of what is in force, for each wizard's action in the order of `WIZARDS`."""
-        when = {**self._noted(path), **(in_force(Path(path)) if path else {})}
+        """A tick and the age of what is in force, for each wizard's action in the order of `WIZARDS`; titles alone
+        without a rig."""
+        if not path:
+            for action, wizard in zip(actions, WIZARDS, strict=True):
+                action.setIcon(QIcon())
+                action.setText(f"{wizard.title} …")
+            return
+        when = {**self._noted(path), **in_force(Path(path))}
         scheme, ratio = self._scheme(), self._window.devicePixelRatioF()
         for action, wizard in zip(actions, WIZARDS, strict=True):
             done = max((at for reason, at in when.items() if reason.startswith(wizard.reason)), default=None)

@@ -72,6 +72,8 @@ def test_a_wizard_opens_over_the_window_and_its_age_stands_in_the_menu(bench):
     action = window.actions_.wizards[0]
     window._show_ages()
     assert action.text() == "Sample …\tnot yet"
+    window.wizards.show_ages(window.actions_.wizards, "")
+    assert action.text() == "Sample …", "no rig is open"
     action.trigger()
     bench.until(lambda: window.wizards.wizard is not None)
     wizard = Hands(window.wizards.wizard)
