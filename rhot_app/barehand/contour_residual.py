@@ -167,19 +167,27 @@ class Contours:
             by_time.setdefault(late_s if abs(late_s) > SAME_TIME_S else 0.0, []).append(frame)
         found = []
         for late_s, frames in by_time.items():
-            information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
-            sides = np.zeros((SIDES * len(frames[0].surface.row), COLUMNS + 2))
-            predicted = [frame.lean(state, sides) for frame in frames]
-            aside = sides[:, COLUMNS] / (1.0 + sides[:, COLUMNS + 1])
-            sides[:] = 0.0
-            cost = float(aside @ aside) + sum(frame.gather(at, aside, information, pull, sides)
-                                              for frame, at in zip(frames, predicted, strict=True))
-            _marginalise(sides, information, pull)
+            information, pull, cost = gathered(frames, state)
             found.append(compressed(information, pull, cost, len(state) - BIAS + MOTION, frames[0].size_column, late_s))
         if len(found) == 1:
             return found[0]
         return Rows(np.concatenate([rows.error for rows in found]), np.concatenate([rows.jacobian for rows in found]),
                     UNIT)
+
+
+def gathered(frames: Sequence[ContourFrame], state: Array) -> tuple[Array, Array, float]:
+    """Information (COLUMNS, COLUMNS), of which only the lower triangle is filled, gradient (COLUMNS,) and cost of all
+    slices of some cameras at one instant. The surface's offset along each side is the most probable one, and
+    marginalised."""
+    information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
+    sides = np.zeros((SIDES * len(frames[0].surface.row), COLUMNS + 2))
+    predicted = [frame.lean(state, sides) for frame in frames]
+    aside = sides[:, COLUMNS] / (1.0 + sides[:, COLUMNS + 1])
+    sides[:] = 0.0
+    cost = float(aside @ aside) + sum(frame.gather(at, aside, information, pull, sides)
+                                      for frame, at in zip(frames, predicted, strict=True))
+    _marginalise(sides, information, pull)
+    return information, pull, cost
 
 
 def compressed(information: Array, pull: Array, cost: float, size: int, size_column: int, late_s: float = 0.0) -> Rows:

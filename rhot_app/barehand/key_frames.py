@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import COLUMNS, ContourFrame, JointLimits
+from rhot_app.barehand.contour_residual import COLUMNS, ContourFrame, JointLimits, gathered
 from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
 from rhot_app.barehand.tracker import FOREARM_SD, LENGTH_SD, RADIUS_SD, SIZE_SD, BareHandTracker
@@ -58,8 +58,8 @@ class KeyFrame:
 def normal_equations(frames: Sequence[ContourFrame], state: Array, model: HandModel) -> tuple[Array, Array, float]:
     """Information (COLUMNS, COLUMNS), gradient (COLUMNS,) and cost of a key frame's edges and of the priors of its own
     numbers; nothing of the shape's prior."""
-    information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
-    cost = sum(frame.gather(state, information, pull) for frame in frames) / TOGETHER
+    information, pull, cost = gathered(frames, state)
+    cost /= TOGETHER
     information = (information + np.tril(information, -1).T) / TOGETHER
     pull /= TOGETHER
     angles, prior, bend = slice(6, POSE), model.pose_prior, state[BIAS + FOREARM_TURN:BIAS + SHAPE]

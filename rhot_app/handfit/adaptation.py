@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import SILHOUETTE
 from rhot_app.barehand.key_frames import OWN, SHAPE_SD, SHARED, KeyFrame, normal_equations, phalanx_sd
-from rhot_app.barehand.surface import FINGERS as FINGER_SIZE
-from rhot_app.barehand.surface import FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
+from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
 from rhot_app.estimation.least_squares import minimise
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.kinematics import move

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import COLUMNS, compressed
+from rhot_app.barehand.contour_residual import COLUMNS, compressed, gathered
 from rhot_app.barehand.contours import NEAREST_M, STEP_M, project
 from rhot_app.barehand.joints import add_lengths
 from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, LENGTH, RADIUS, SHAPE, WHOLE
@@ -222,8 +222,7 @@ def _contour_rows(contour: Contour, state: FitState, k: int) -> Rows:
     bare[:ANGLES], bare[ANGLES:VELOCITY] = one.pose.world_from_palm[:3].ravel(), one.pose.angles
     bare[BIAS:BIAS + FOREARM_TURN] = (state.shape - contour.shape)[:FOREARM_TURN]
     bare[BIAS + FOREARM_TURN:] = one.bend
-    information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
-    cost = sum(frame.gather(bare, information, pull) for frame in contour.frames)
+    information, pull, cost = gathered(contour.frames, bare)
     rows = compressed(information / TOGETHER, pull / TOGETHER, cost / TOGETHER, COLUMNS, POSE)
     jacobian, own = np.zeros((len(rows.error), state.size)), state.own(k).start
     jacobian[:, :FOREARM_TURN] = rows.jacobian[:, POSE:POSE + FOREARM_TURN]
