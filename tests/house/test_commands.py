@@ -127,7 +127,7 @@ NO_SUCH_FILE = (
     "replay NONE --json", "export NONE --format csv", "refine NONE", "recover NONE --out x", "video collect NONE",
     "bare-hand --rig NONE --video left=a.mp4", "bare-hand --rig RIG --video left=NONE",
     "landmarks NONE --rig RIG --out x", "calibrate bones --log NONE", "calibrate time --log NONE --rig RIG",
-    "calibrate filters --log-still NONE --log-fast NONE --rig RIG", "calibrate colours --image NONE --out x",
+    "calibrate filters --log-still NONE --log-fast NONE --rig RIG", "calibrate colours --image x.png --markers NONE --out x",
     "calibrate depth --table NONE", "calibrate alignment --foreign NONE --rig-points NONE", "hand NONE", "object NONE",
     "layers NONE --out x.png", "fit-hand --rig NONE --pictures a b", "check --rig NONE", "engine --rig NONE",
     "certify --rig NONE", "report NONE --out x.zip", "--rig NONE",
