@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rhot_node.files import open_input, why
-
 
 class RhotError(Exception):
     """Root of all errors of this package; commands print it and exit with code 2: nothing came of it."""
@@ -52,11 +50,15 @@ def input_file(text: str) -> Path:
     before the command loads anything that takes time. Raises RhotError."""
     path = Path(text)
     try:
-        open_input(path).close()
+        path.stat()
+        if path.is_file():  # what reads it refuses a pipe or a folder
+            path.open("rb").close()
     except FileNotFoundError as exc:
         raise RhotError(f"{path}: no such file. Is the name right?") from exc
-    except (OSError, ValueError) as exc:
-        raise RhotError(f"{path}: cannot be read ({why(exc)}).") from exc
+    except OSError as exc:
+        raise RhotError(f"{path}: cannot be read ({exc.strerror}).") from exc
+    except ValueError as exc:
+        raise RhotError(f"{path}: cannot be read (a file's name has no NUL).") from exc
     return path
 
 

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Define the command's options."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
-    parser.add_argument("--image", type=input_file, action="append", required=True, metavar="PATH",
+    parser.add_argument("--image", type=Path, action="append", required=True, metavar="PATH",
                         help="a picture as the camera gives it; several are numbered 1, 2, ...")
     parser.add_argument("--sample", action="append", required=True, metavar="NAME=x,y,w,h",
                         help="a box on the paint of marker NAME (NAME@2=...: in the second picture)")
