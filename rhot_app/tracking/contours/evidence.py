@@ -77,10 +77,10 @@ class Evidence:
                 camera.supported_ns = frame.t_row0_master_ns
         self._note()
 
-    def take_map(self, frame: ForegroundFrame) -> None:
-        """See whether the hand lies on foreground in one frame."""
+    def take_map(self, frame: ForegroundFrame, state: Array) -> None:
+        """See whether the hand, in `state` then, lies on foreground in one frame."""
         camera = self._shown[frame.camera]
-        inside, share = on_foreground(self._hand, frame, self._hand.filter.newest.state)
+        inside, share = on_foreground(self._hand, frame, state)
         camera.whole = inside > MAJORITY
         camera.mapped_ns = frame.t_row0_master_ns
         if share > MAJORITY and (self.confirmed or camera.whole):

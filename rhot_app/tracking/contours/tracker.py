@@ -204,7 +204,7 @@ class ContourEstimator:
         if not self._tracking:
             self._begin(maps)
             return
-        self._evidence.take_map(frame)
+        self._evidence.take_map(frame, self._predict(max(frame.t_row0_master_ns, self._time_ns()))[0])
         if maps is None or maps.t_ns == self._maps_ns or self._waiting:
             return
         self._maps_ns = maps.t_ns
