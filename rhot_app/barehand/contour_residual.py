@@ -129,15 +129,15 @@ class ContourFrame:
         """COLUMNS rows with the information of all slices, and one with the rest of their cost."""
         return Contours([self]).linearise(state)
 
-    def lean(self, state: Array, sides: Array) -> Predicted:
+    def add_sides(self, state: Array, sides: Array) -> Predicted:
         """Add to the last two columns of `sides` (S, COLUMNS + 2) what the slices say of the surface's offset along
         each side, in standard deviations: gradient and information. Returns where the contours are (`predict`)."""
         assert self.edges is not None, "the edges of the slices have not been observed"
         count, p, e = len(self.slices), self.points, self.edges
         offset, rows, good = np.zeros(count), np.zeros((count, COLUMNS)), np.zeros(count, np.bool_)
-        _lean(self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule, p.kind,
-              p.along, p.behind, self.shape_variance, self.side_sd, self.pixel, self.normal, e.number, e.offset, e.sd,
-              e.inside, e.outside, self.expected_sd, self.clutter, offset, rows, good, sides)
+        _add_sides(self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule,
+                   p.kind, p.along, p.behind, self.shape_variance, self.side_sd, self.pixel, self.normal, e.number,
+                   e.offset, e.sd, e.inside, e.outside, self.expected_sd, self.clutter, offset, rows, good, sides)
         return offset, rows, good
 
     def gather(self, predicted: Predicted, aside: Array, information: Array, pull: Array, sides: Array) -> float:
@@ -181,7 +181,7 @@ def gathered(frames: Sequence[ContourFrame], state: Array) -> tuple[Array, Array
     marginalised."""
     information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
     sides = np.zeros((SIDES * len(frames[0].surface.row), COLUMNS + 2))
-    predicted = [frame.lean(state, sides) for frame in frames]
+    predicted = [frame.add_sides(state, sides) for frame in frames]
     aside = sides[:, COLUMNS] / (1.0 + sides[:, COLUMNS + 1])
     sides[:] = 0.0
     cost = float(aside @ aside) + sum(frame.gather(at, aside, information, pull, sides)
@@ -274,8 +274,9 @@ def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance,
 
 
 @njit(cache=True)
-def _lean(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, shape_variance, side_sd, pixel,
-          normal, count, offsets, sds, inside, outside, expected_sd, clutter, offset, rows, good, sides):
+def _add_sides(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, shape_variance, side_sd,
+               pixel, normal, count, offsets, sds, inside, outside, expected_sd, clutter, offset, rows, good,
+               sides):
     """Fill `offset` (K,), `rows` (K, COLUMNS) and `good` (K,) as `follow` does, and add to `sides` (S, COLUMNS + 2)
     gradient and information of the surface's offset along each side."""
     follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, good)

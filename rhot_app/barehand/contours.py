@@ -38,7 +38,7 @@ Indices = NDArray[np.int64]
 STEP_M = 4e-3
 """m: spacing of contour points; skin's creases and nails are as long, so nearer ones are correlated."""
 
-BESIDE_M = 1e-4
+BESIDE_M = 1e-3
 """m: distance outside of the capsule at which a ray tests what is behind a contour."""
 
 GRAZE_M = 1e-4

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import COLUMNS, ContourFrame, JointLimits, gathered
-from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
 from rhot_app.barehand.tracker import FOREARM_SD, LENGTH_SD, RADIUS_SD, SIZE_SD, BareHandTracker
 from rhot_app.hand.model import HandModel
@@ -27,9 +26,6 @@ second."""
 
 APART_S = 0.1
 """s: frames nearer in time show the same pose: a hand moves within 1/15 s (`hand_process.FASTEST`)."""
-
-TOGETHER = 0.025 / STEP_M
-"""Contour points that count as one observation: where the surface is wrong, it is so along a phalanx, 25 mm."""
 
 SHAPE_SD = np.concatenate([SIZE_SD, np.full(15, LENGTH_SD), np.full(15, RADIUS_SD), FOREARM_SD[:1]])
 """(FOREARM_TURN,) standard deviations of the shape's numbers in adults, relative to a hand file."""
@@ -59,9 +55,7 @@ def normal_equations(frames: Sequence[ContourFrame], state: Array, model: HandMo
     """Information (COLUMNS, COLUMNS), gradient (COLUMNS,) and cost of a key frame's edges and of the priors of its own
     numbers; nothing of the shape's prior."""
     information, pull, cost = gathered(frames, state)
-    cost /= TOGETHER
-    information = (information + np.tril(information, -1).T) / TOGETHER
-    pull /= TOGETHER
+    information += np.tril(information, -1).T
     angles, prior, bend = slice(6, POSE), model.pose_prior, state[BIAS + FOREARM_TURN:BIAS + SHAPE]
     away = prior.mean - state[ANGLES:VELOCITY]
     information[angles, angles] += prior.information

@@ -71,9 +71,9 @@ START_SD = 0.015, 0.2, 0.2
 """m, rad and rad: standard deviation of place, rotation and angles where a start is given: of landmarks, about a
 thumb's breadth."""
 
-PASSES, START_PASSES = 2, 5
+PASSES, START_PASSES = 2, 6
 """Searches of an image, and of one in which the hand is not where it was expected. Each halves how far from the contour
-an edge may be."""
+an edge may be: six leave less than a pixel of LONGEST_PX."""
 
 SIZE_SD = 0.1, 0.05, 0.08
 """Standard deviations of the logarithms of a hand's size, of its fingers' part of it, and of its thickness beyond that,

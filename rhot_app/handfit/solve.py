@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import COLUMNS, compressed, gathered
-from rhot_app.barehand.contours import NEAREST_M, STEP_M, project
+from rhot_app.barehand.contours import NEAREST_M, project
 from rhot_app.barehand.joints import add_lengths
 from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, LENGTH, RADIUS, SHAPE, WHOLE
 from rhot_app.barehand.tracker import FOREARM_SD, START_SD
@@ -47,11 +47,6 @@ DRAG_SD = START_SD[0], START_SD[1]
 
 FREE_SD = 1.0, np.pi
 """m and rad: of the palm in a fit to anchors: as good as nothing is known."""
-
-TOGETHER = 0.025 / STEP_M
-"""Contour points that count as one observation: where the model's surface is wrong, it is so along a phalanx, 25 mm.
-As independent ones they would give the simulated hand, which has another surface, lengths six standard deviations off.
-"""
 
 DRAG_STEPS, LAST_STEPS, FIT_STEPS = 6, 20, 60
 """Most steps of a solution while the pointer moves, 20 ms on a small computer, where it stops, and of one that has
@@ -223,7 +218,7 @@ def _contour_rows(contour: Contour, state: FitState, k: int) -> Rows:
     bare[BIAS:BIAS + FOREARM_TURN] = (state.shape - contour.shape)[:FOREARM_TURN]
     bare[BIAS + FOREARM_TURN:] = one.bend
     information, pull, cost = gathered(contour.frames, bare)
-    rows = compressed(information / TOGETHER, pull / TOGETHER, cost / TOGETHER, COLUMNS, POSE)
+    rows = compressed(information, pull, cost, COLUMNS, POSE)
     jacobian, own = np.zeros((len(rows.error), state.size)), state.own(k).start
     jacobian[:, :FOREARM_TURN] = rows.jacobian[:, POSE:POSE + FOREARM_TURN]
     jacobian[:, own:own + POSE] = rows.jacobian[:, :POSE]

@@ -28,7 +28,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_node.detect": (*NODE_BASE, "rhot_node.wire"),
     "rhot_node": ("rhot_node", "resources"),
     # the app, from the bottom up
-    "rhot_app.errors": (),
+    "rhot_app.errors": ("rhot_node.files",),
     "rhot_app.progress": (),
     "rhot_app.keys": ("rhot_node",),
     "rhot_app.rig_history": ("rhot_node", "rhot_app.errors", "rhot_app.project", "rhot_app.hand.anatomy"),
