@@ -120,7 +120,7 @@ class ContourFrame:
                 _, weight, mean, _ = _mix(self.edges.number[s], self.edges.offset[s], self.edges.sd[s],
                                           self.edges.inside[s], self.edges.outside[s], self.points.behind[s],
                                           offset[s], self.shape_variance[s],
-                                          self.expected_sd[s] ** 2 + self.side_sd[s] ** 2, self.clutter[s], found[s])
+                                          self.expected_sd[s] ** 2, self.clutter[s], found[s])
                 if weight > 0.0:
                     error[s] = mean
         return found, error
@@ -161,12 +161,15 @@ class Contours:
     def linearise(self, state: Array) -> Rows:
         """For each instant of the frames, COLUMNS whitened rows of their information and one of the remaining cost.
         Frames within SAME_TIME_S of the state count as of its instant."""
-        by_time: dict[float, list[ContourFrame]] = {}
+        by_time: dict[int, list[ContourFrame]] = {}
         for frame in self.frames:
             late_s = float(frame.late_s.mean()) if len(frame.late_s) else 0.0
-            by_time.setdefault(late_s if abs(late_s) > SAME_TIME_S else 0.0, []).append(frame)
+            by_time.setdefault(round(0.5 * late_s / SAME_TIME_S), []).append(frame)
+        if not by_time:
+            return Rows(np.empty(0), np.empty((0, len(state) - BIAS + MOTION)), UNIT)
         found = []
-        for late_s, frames in by_time.items():
+        for place, frames in by_time.items():
+            late_s = float(np.mean([frame.late_s.mean() for frame in frames if len(frame.late_s)])) if place else 0.0
             information, pull, cost = gathered(frames, state)
             found.append(compressed(information, pull, cost, len(state) - BIAS + MOTION, frames[0].size_column, late_s))
         if len(found) == 1:
@@ -177,8 +180,8 @@ class Contours:
 
 def gathered(frames: Sequence[ContourFrame], state: Array) -> tuple[Array, Array, float]:
     """Information (COLUMNS, COLUMNS), of which only the lower triangle is filled, gradient (COLUMNS,) and cost of all
-    slices of some cameras at one instant. The surface's offset along each side is the most probable one, and
-    marginalised."""
+    slices of some cameras at one instant. The surface's offset along each side is marginalised, about a Gauss-Newton
+    step from none."""
     information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
     sides = np.zeros((SIDES * len(frames[0].surface.row), COLUMNS + 2))
     predicted = [frame.add_sides(state, sides) for frame in frames]
@@ -192,11 +195,12 @@ def gathered(frames: Sequence[ContourFrame], state: Array) -> tuple[Array, Array
 
 def compressed(information: Array, pull: Array, cost: float, size: int, size_column: int, late_s: float = 0.0) -> Rows:
     """Rows of whitened errors with this information (COLUMNS, COLUMNS), of which the lower triangle is read, gradient
-    (COLUMNS,) and cost in all, from images `late_s` later than the state."""
+    (COLUMNS,) and cost in all, from images `late_s` later than the state, which then has a velocity after the pose."""
     error, own = residual.compressed(information, pull, cost, _RIDGE)
     jacobian = np.zeros((COLUMNS + 1, size))
     jacobian[:, :POSE], jacobian[:, size_column:size_column + SHAPE] = own[:, :POSE], own[:, POSE:]
-    jacobian[:, POSE:2 * POSE] = late_s * own[:, :POSE]  # its velocity moves it meanwhile
+    if late_s:  # its velocity moves it meanwhile
+        jacobian[:, POSE:2 * POSE] = late_s * own[:, :POSE]
     return Rows(error, jacobian, UNIT)
 
 
@@ -244,7 +248,8 @@ def slices_of(surface: Surface, state: Array, covariance: Array, pose: Array, in
 def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance, spread_variance, clutter, found):
     """Fill `found` with the probability that each edge is the hand's. Returns -2 log likelihood over its least, the
     weight 1/px^2, the weighted mean error px, and the probability that any is. Edges that are far apart and equally
-        probable add the variance between them (probabilistic data association, Bar-Shalom and Tse 1975)."""
+    probable add the variance between them to the weight's, which the likelihood does not know (probabilistic data
+    association, Bar-Shalom and Tse 1975)."""
     missed = MISSED[behind]
     total, peak = missed, missed
     for k in range(count):

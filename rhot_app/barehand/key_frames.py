@@ -6,6 +6,7 @@ pose is unknown (Schur complement). So a pose that shows a joint bent counts, an
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -72,6 +73,14 @@ def normal_equations(frames: Sequence[ContourFrame], state: Array, model: HandMo
     return information, pull, cost
 
 
+def _once(frame: ContourFrame) -> ContourFrame:
+    """The frame as one observation: key frames are too far apart to be `repeated`."""
+    out = copy.copy(frame)
+    out.shape_variance, out.side_sd = frame.shape_variance / frame.repeated, frame.side_sd / np.sqrt(frame.repeated)
+    out.repeated = 1.0
+    return out
+
+
 def marginal(information: Array) -> Array:
     """(FOREARM_TURN, FOREARM_TURN) of the shape, the frame's own numbers unknown."""
     coupled = information[np.ix_(OWN, SHARED)]
@@ -95,7 +104,7 @@ class KeyFrames:
     def offer(self, tracker: BareHandTracker) -> None:
         """Keep the tracker's newest frames if they tell more of the shape than one that is kept."""
         knot = tracker.filter.newest
-        frames = tuple(frame for frame in tracker.frames if frame is not None)
+        frames = tuple(_once(frame) for frame in tracker.frames if frame is not None)
         if not frames or abs(knot.t_s - self._last_s) < APART_S:
             return
         self._last_s = knot.t_s

@@ -224,6 +224,7 @@ class BareHandTracker:
         t_s, late = 1e-9 * (t_ns - self._epoch_ns), late_s or {}
         prediction, since_s = self.filter.predict(t_s), t_s - self.filter.newest.t_s
         self.take(images, t_s)
+        self.frames = [frame if c in images else None for c, frame in enumerate(self.frames)]
         seen = self._silhouettes(images)
         start = None
         if seen is not None and (self._fresh or self._doubtful(seen, prediction, t_s)):

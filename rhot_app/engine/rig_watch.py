@@ -6,11 +6,13 @@ thread of its own (`benchmarks/self_calibration.py`).
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections import deque
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from rhot_app.barehand.key_frames import KeyFrame
 from rhot_app.calibration.verdict import Finding, Grade, judge
@@ -28,6 +30,8 @@ from rhot_app.tracking.refinement.refined_rig import (
 )
 from rhot_app.tracking.refinement.rig_refinement import Gathered, RigRefiner
 from rhot_app.tracking.tracker import CameraObservations, KeepsKeyFrames, Tracker
+
+log = logging.getLogger(__name__)
 
 JUDGE_NS = 10_000_000_000
 
@@ -105,11 +109,13 @@ class HandWatch:
         self._rig = rig
         self._newest: Adapted | None = None
         self._judged_ns = self._solved_ns = -JUDGE_NS
-        self._enough = False
+        self._enough, self._run = False, 0
         self._thread: threading.Thread | None = None
 
     def restart(self) -> None:
         """A new run begins."""
+        self._run += 1
+        self._judged_ns = self._solved_ns = -JUDGE_NS
         self._newest, self._enough = None, False
 
     def advice(self, tracker: Tracker, now_ns: int) -> list[Advice]:
@@ -131,7 +137,8 @@ class HandWatch:
         kept = _kept(tracker)
         if kept and now_ns - self._solved_ns >= JUDGE_NS and (self._thread is None or not self._thread.is_alive()):
             self._solved_ns = now_ns
-            self._thread = threading.Thread(target=self._solve, args=(kept,), name="adapting the hand", daemon=True)
+            self._thread = threading.Thread(target=self._solve, args=(kept, self._run), name="adapting the hand",
+                                            daemon=True)
             self._thread.start()
         found = self._newest
         if found is None:
@@ -145,8 +152,14 @@ class HandWatch:
         return {"known": True, **verdict.to_json(), "rows": _hand_rows(self._rig.hand, found.hand),
                 "document": msgspec.to_builtins(msgspec.structs.replace(self._rig, hand=found.hand))}
 
-    def _solve(self, kept: list[KeyFrame]) -> None:
-        self._newest = adapt(self._rig.hand, kept)
+    def _solve(self, kept: list[KeyFrame], run: int) -> None:
+        try:
+            found = adapt(self._rig.hand, kept)
+        except np.linalg.LinAlgError:  # more key frames may mend it
+            log.exception("the hand was not adapted")
+            return
+        if run == self._run:
+            self._newest = found
 
 
 def _kept(tracker: Tracker) -> list[KeyFrame]:

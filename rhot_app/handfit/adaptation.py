@@ -79,6 +79,7 @@ def adapt(base: HandAnatomy, key_frames: Sequence[KeyFrame],
         problem = _Problem(shapes, shape, [[_expected(frame, sd_px, shapes, shape) for frame in one.frames]
                                            for one in key_frames])
         found, _ = minimise(_Iterate(problem, np.zeros(FOREARM_TURN), states), _STEPS, _LEAST_GAIN)
+        shape = shape.copy()
         shape[:FOREARM_TURN] = np.clip(shape[:FOREARM_TURN] + found.step, -SHAPE_LIMIT[:FOREARM_TURN],
                                        SHAPE_LIMIT[:FOREARM_TURN])
         states = found.states
@@ -106,7 +107,7 @@ def _with_sd(hand: HandAnatomy, length_sd: Array, radius_sd: Array) -> HandAnato
 
 
 def _expected(frame: ContourFrame, sd_px: float, shapes: Shapes, shape: Array) -> ContourFrame:
-    """The same edges about the surface of another shape. A key frame is seen once, not `repeated` times.
+    """The same edges about the surface of another shape.
 
     An edge behind which the picture shows the hand is no silhouette here: in a gap between two fingers that is as
     narrow as the lens' blur, edges are displaced by half a pixel.
@@ -117,7 +118,6 @@ def _expected(frame: ContourFrame, sd_px: float, shapes: Shapes, shape: Array) -
     out.edges = frame.edges._replace(inside=np.where(gap, 0.0, frame.edges.inside))
     out.surface = shapes.surface(shape)
     out.expected_sd = np.minimum(frame.expected_sd, sd_px)
-    out.shape_variance = frame.shape_variance / frame.repeated
     return out
 
 

@@ -36,13 +36,15 @@ RISING: Final = "index_mcp_flexion", (0.5 * FLAT_DEG["index_mcp_flexion"], 0.25 
 finger that is bent 45 degrees to the table square to its line of sight: it looks the same if bent more or less."""
 
 
+LOCKED_DEG: Final[dict[str, float | tuple[float, float]]] = {
+    name: FLAT_DEG.get(name, 0.0) for name in ANGLES if name not in FREE} | dict([RISING])
+"""What a tracker's `locked_deg` says of the mouse's hand."""
+
+
 def with_mouse_model(rig: Rig, plane: PalmPlane | None) -> Rig:
     """The rig with an estimator that knows the mouse's hand. `plane`: on which the palm lies; None: two cameras see
     where."""
-    locked: dict[str, float | tuple[float, float]] = {name: FLAT_DEG.get(name, 0.0) for name in ANGLES
-                                                      if name not in FREE}
-    locked |= [RISING]
-    tracker = msgspec.structs.replace(rig.tracker, kind="estimator", locked_deg=locked, palm_plane=plane)
+    tracker = msgspec.structs.replace(rig.tracker, kind="estimator", locked_deg=dict(LOCKED_DEG), palm_plane=plane)
     return msgspec.structs.replace(rig, tracker=tracker)
 
 

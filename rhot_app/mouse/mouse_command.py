@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import EngineError, OutputError, RecordingError, SimulatorError
+from rhot_app.errors import EngineError, OutputError, RecordingError, SimulatorError, input_file
 
 if TYPE_CHECKING:
     from rhot_app.engine.client import EngineClient
@@ -52,10 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--directory", type=Path, metavar="DIR", help="private directory of the engine's sockets")
     parser.add_argument("--simulated", action="store_true",
                         help="start a simulated rig whose hand works the mouse, and end it afterwards")
-    parser.add_argument("--log", type=Path, metavar="LOG",
+    parser.add_argument("--log", type=input_file, metavar="LOG",
                         help="print the mouse's states of this raw log, and end; of a bare hand with its "
                              "recorded slices")
-    parser.add_argument("--rig", type=Path, metavar="FILE",
+    parser.add_argument("--rig", type=input_file, metavar="FILE",
                         help="track the --log with this rig instead of the one it was recorded with")
     parser.add_argument("--bare", action="store_true",
                         help="with --simulated or --measure: a hand without markers, tracked by its contours")
@@ -115,6 +115,8 @@ def _check(args: argparse.Namespace) -> None:
         raise OutputError("--measure runs on the twin by itself; leave --simulated, --log, --osc and --pointer out.")
     if args.log is not None and (args.simulated or args.directory is not None or args.seconds is not None):
         raise OutputError("--log reads a recording to its end; leave --simulated, --directory and --seconds out.")
+    if args.log is not None and (args.pointer or args.osc is not None):
+        raise OutputError("--log is read as fast as it can be, too fast for --pointer and --osc; leave them out.")
     if args.rig is not None and args.log is None:
         raise OutputError("--rig is for a --log; a running engine has its own rig.")
     if (args.bare or args.cameras == 1) and not (args.measure or args.simulated):
@@ -248,30 +250,30 @@ def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterat
 
     from rhot_app.engine.client import EngineClient
     from rhot_app.engine.process import ensure_engine, stop_engine
-    from rhot_app.mouse.play import SetUp, tracked_rig
+    from rhot_app.mouse.play import SetUp, tracked_rig, twin_scene
     from rhot_app.mouse.pointer import MouseSettings
     from rhot_app.mouse.script import motion_file, resting
     from rhot_app.project import load_rig, save_rig
     from rhot_app.simulator.nodes.remote import TwinRemote
     from rhot_app.simulator.scene.motion import Sway
-    from rhot_app.simulator.scene.scene import make_scene, twin_defaults
     from rhot_app.simulator.scene.scene_description import BareHandShow, EmptyShow, HandShow
     from rhot_node.files import write_document
 
     show = BareHandShow if bare else HandShow
+    set_up = SetUp("contours", cameras, facing="back") if bare else SetUp("markers", cameras)
     with tempfile.TemporaryDirectory(prefix="rhot-mouse-") as name, contextlib.ExitStack() as stack:
         place = Path(name)
-        rig, rest, scene = place / "rig.json", place / "rest.json", make_scene(twin_defaults(), seed)
-        write_document(rest, motion_file(resting(REST_S), scene.hand, MouseSettings(), Sway()))
+        rig, rest, scene = place / "rig.json", place / "rest.json", twin_scene(set_up, seed)
+        write_document(rest, motion_file(resting(REST_S), scene.hand, MouseSettings(), Sway(), facing=set_up.facing))
         twin = subprocess.Popen([sys.executable, "-m", "rhot_app.simulator.nodes.live", "--motion", str(rest),
-                                 *(["--bare"] if bare else []), "--seed", str(seed), "--directory", str(place), "--rig",
-                                 str(rig)], stdout=subprocess.PIPE)
+                                 *(["--bare", "--back"] if bare else []), "--seed", str(seed), "--directory",
+                                 str(place), "--rig", str(rig)], stdout=subprocess.PIPE)
         stack.callback(twin.wait)
         stack.callback(twin.terminate)
         assert twin.stdout is not None
         if not twin.stdout.readline():
             raise SimulatorError("the simulated rig did not start; its own words stand above.")
-        save_rig(rig, tracked_rig(load_rig(rig), SetUp("contours" if bare else "markers", cameras), scene))
+        save_rig(rig, tracked_rig(load_rig(rig), set_up, scene))
         stack.callback(stop_engine, place / "engine")
         ensure_engine(rig, place / "engine", start=True)
         with EngineClient(place / "engine") as client, TwinRemote(place) as remote:
@@ -319,7 +321,8 @@ def _measure(args: argparse.Namespace) -> int:
     from rhot_app.mouse.report import report
     from rhot_app.progress import ProgressLine
 
-    chosen = SetUp("contours" if args.bare else "markers", args.cameras, args.pictures)
+    chosen = SetUp("contours", args.cameras, args.pictures, "back") if args.bare else SetUp(
+        "markers", args.cameras, args.pictures)
     figures = [measures(args.seed, args.places, set_up=one, watch=lambda title: ProgressLine(f"rendering {title}"))
                for one in dict.fromkeys((SetUp(pictures=args.pictures), chosen))]
     print(json.dumps(figures) if args.json else report(figures))

@@ -163,7 +163,7 @@ def _find(image, slices, hand, rest, mean, sd, gain, noise, profile, ours, slope
             strength[s, place] = slope[i] if brighter >= 0.0 else -slope[i]
             inside[s, place] = _mean_beside(ours, i, -1, first, last)
             outside[s, place] = _mean_beside(ours, i, 1, first, last)
-            if mean.shape[0] and inside[s, place] > 0.5 > outside[s, place]:
+            if mean.shape[0] and i - 5 >= first and inside[s, place] > 0.5 > outside[s, place]:
                 along = i - half - BEYOND
                 shift, sd_px = _half_hand(mean, gain, noise, profile, i, cx + along * nx, cy + along * ny, nx, ny)
                 if sd_px < SHADED_PX:

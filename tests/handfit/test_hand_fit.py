@@ -349,6 +349,20 @@ def test_fitting_without_anchors_or_pictures_says_what_to_do():
         fit.fitted_to_contours()
 
 
+def test_contours_tell_lengths():
+    """They show where fingertips end: the lengths are then better known than from people's hands."""
+    _, pose, images = drawn()
+    fit = begun()
+    fit.undo()
+    fit.add_pictures(dict(enumerate(images)), pose)
+    fit.freedom = "lengths"
+    lengths = [one for one in fit.numbers if one.kind == "length"]
+    before = np.array([fit.sd(one) for one in lengths])
+    fit.take(fit.fitted_to_contours(), "fitting to contours")
+    after = np.array([fit.sd(one) for one in lengths])
+    assert np.all(after <= before) and np.median(after) < 0.9 * np.median(before)
+
+
 def test_contours_bring_a_hand_to_its_place():
     rig, pose, images = drawn()
     fit = begun()

@@ -95,19 +95,20 @@ class Finder:
         """See whether a hand in `state` may have gone elsewhere in `dt_s` (`BareHandTracker.relocate`)."""
         self._begin(self._relocate, maps, state.copy(), covariance.copy(), dt_s, self._run)
 
-    def follow(self, maps: Maps, dt_s: float) -> bool:
-        """Move the hand to where it covers the foreground better, if it has come to cover it worse than of late; it is
-        then looked for as far as hands go in `dt_s`. What was found is compared in the newest maps. Whether it was
-        moved."""
-        hand, knot = self._hand, self._hand.filter.newest
+    def follow(self, maps: Maps, t_s: float, dt_s: float) -> bool:
+        """Move the hand to where it covers the foreground of `t_s` better, if it has come to cover it worse than of
+        late; it is then looked for as far as hands go in `dt_s`. What was found is compared in the newest maps. Whether
+        it was moved."""
+        hand = self._hand
+        state, covariance = hand.filter.predict(t_s)
         seen, moved = maps.silhouettes(hand), self.moved()
-        covered = hand.covered(seen, knot.state)
+        covered = hand.covered(seen, state)
         worse = hand.cover != 0.0 and covered < hand.cover - COVER_DROP
-        if worse and moved is not None and hand.score_of(seen, moved) > hand.score_of(seen, knot.state) + LEAST_GAIN:
-            hand.restart(knot.t_s, moved)
+        if worse and moved is not None and hand.score_of(seen, moved) > hand.score_of(seen, state) + LEAST_GAIN:
+            hand.restart(t_s, moved)
             return True
         if worse:
-            self.relocate(maps, knot.state, knot.covariance, dt_s)
+            self.relocate(maps, state, covariance, dt_s)
         hand.cover += (COVER_SHARE if hand.cover else 1.0) * (covered - hand.cover)
         return False
 

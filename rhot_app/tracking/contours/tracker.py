@@ -62,7 +62,7 @@ class ContourEstimator:
         self.key_frames.clear()
         if self._markers is not None:
             self._markers.reset()
-        self._hand.frames, self._hand.cover = [None] * len(self._names), 0.0
+        self._hand.frames, self._hand.cover, self._hand.tracking = [None] * len(self._names), 0.0, False
         self._requests = Requests(self._hand, self._predict)
         self._cameras = self._requests.cameras
         self._evidence, self._maps = Evidence(self._hand, self._cameras), NewestMaps(self._cameras)
@@ -110,7 +110,7 @@ class ContourEstimator:
         hand.start(HandPose(world, hand.model.pose_prior.mean.copy()), 0)
         contour = asked(hand, 0, *hand.filter.predict(0.0), STEP_M)
         contour.observe(edges_of(len(contour.slices), np.zeros(1, np.int64), np.array([[0.0, 1.0, 9.0, 1.0, 0.0]])))
-        hand.frames[0], hand.cover = contour, 1e9  # so that it is looked for elsewhere
+        hand.frames[0] = contour
         hand.filter.add(0.0, [contour, *hand.known])
         state = hand.filter.newest.state
         hand.process.difference(state, state)  # compiled here, for `MarkersOfHand.choose`
@@ -210,7 +210,8 @@ class ContourEstimator:
         self._maps_ns = maps.t_ns
         if not self._evidence.confirmed and self._evidence.seen_ns > max(self._epoch_ns, maps.t_ns - SAME_MAPS_NS):
             self._confirm(maps)
-        if self._finder.follow(maps, 1e-9 * self._cameras[0].period_ns):
+        t_s = self._seconds(max(maps.t_ns, self._time_ns()))
+        if self._finder.follow(maps, t_s, 1e-9 * min(camera.period_ns for camera in self._cameras)):
             self._requests.renew()
 
     def _confirm(self, maps: Maps) -> None:

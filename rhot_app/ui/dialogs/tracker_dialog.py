@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.hand.anthropometry import scaled_hand
-from rhot_app.mouse.model import table_plane, with_mouse_model
+from rhot_app.mouse.model import LOCKED_DEG, table_plane, with_mouse_model
 from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, estimator_obstacle, observation_obstacle
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
@@ -146,12 +146,14 @@ class TrackerDialog(QDialog):
             self._rig.tracker, kind=kind, ik=self.ik_box.currentData(), variant=self.variant_box.currentData(),
             limits=self.limits_box.currentData(), float_scale=self.size_check.isChecked(),
             observe="markers" if kind == "classic" else self.observe_box.currentData())
-        if self.flat_check.isChecked() == bool(settings.locked_deg):
+        flat, table = settings.locked_deg == LOCKED_DEG, table_plane(self._rig)
+        if self.flat_check.isChecked() == flat:
             return settings
-        if settings.locked_deg:
-            return msgspec.structs.replace(settings, locked_deg={}, palm_plane=None)
+        if flat:  # a plane that was written by hand stays
+            plane = None if settings.palm_plane == table else settings.palm_plane
+            return msgspec.structs.replace(settings, locked_deg={}, palm_plane=plane)
         rig = msgspec.structs.replace(self._rig, tracker=settings)
-        return with_mouse_model(rig, table_plane(rig)).tracker
+        return with_mouse_model(rig, settings.palm_plane or table).tracker
 
     def _choose(self) -> None:
         settings = self.chosen
@@ -233,7 +235,7 @@ class TrackerDialog(QDialog):
         self.variant_box.setCurrentIndex(self.variant_box.findData(settings.variant))
         self.limits_box.setCurrentIndex(self.limits_box.findData(settings.limits))
         self.size_check.setChecked(settings.float_scale)
-        self.flat_check.setChecked(bool(settings.locked_deg))
+        self.flat_check.setChecked(settings.locked_deg == LOCKED_DEG)
         self.observe_box.setCurrentIndex(self.observe_box.findData(settings.observe))
         unsaid = not settings.landmarks and all(marker.shape == "landmark" for marker in self._rig.markers.markers)
         self.observe_words.setText(LANDMARKS_ONLY if unsaid and settings.observe != "contours"
