@@ -112,6 +112,8 @@ def _search(hand: HandAnatomy, rig: Rig, state: FitState, k: int, spread: Array,
     frames = []
     for number, (_, image) in enumerate(sorted(instant.images.items())):
         frame = tracker.expected(number, bare, covariance, step_m)
+        # two pictures do not tell a side's offset from a bent finger: each slice counts by itself
+        frame.shape_variance, frame.side_sd = frame.shape_variance + frame.side_sd**2, np.zeros_like(frame.side_sd)
         frame.observe(find_edges(image, frame.slices, *learnt[number]))
         frames.append(frame)
     return Contour(state.shape, tuple(frames))

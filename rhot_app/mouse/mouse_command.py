@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--log", type=input_file, metavar="LOG",
                         help="print the mouse's states of this raw log, and end; of a bare hand with its "
                              "recorded slices")
-    parser.add_argument("--rig", type=input_file, metavar="FILE",
+    parser.add_argument("--rig", type=Path, metavar="FILE",
                         help="track the --log with this rig instead of the one it was recorded with")
     parser.add_argument("--bare", action="store_true",
                         help="with --simulated or --measure: a hand without markers, tracked by its contours")

@@ -286,7 +286,6 @@ class MainWindow(QMainWindow):
         self.dialogs.follow_rig(self.controller)
         self.pages.setCurrentIndex(0 if rig is None else 1)
         self.docks.put_away("no rig", rig is None)
-        self.advice.set_reserved(rig is not None)
         self._show_rig_name()
         for action in self._rig_actions():
             action.setEnabled(rig is not None)

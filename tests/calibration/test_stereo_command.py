@@ -175,10 +175,12 @@ def test_a_mistake_is_a_sentence(pictures: Path, arguments: tuple[str, ...], mes
 
 def test_a_folder_that_is_not_there_is_named_before_the_work(tmp_path: Path,
                                                              capsys: pytest.CaptureFixture[str]) -> None:
-    out = tmp_path / "no" / "rig.json"
+    out, table, rig = tmp_path / "no" / "rig.json", tmp_path / "t.csv", tmp_path / "r.json"
+    table.touch()
+    rig.touch()
     for kind in (["stereo", "--left", "a*", "--right", "b*", "--board", "9x6", "--square-mm", "30"],
                  ["intrinsics", "--images", "a*", "--board", "9x6", "--square-mm", "30"],
-                 ["depth", "--table", "t.csv", "--rig", "r.json"]):
+                 ["depth", "--table", str(table), "--rig", str(rig)]):
         assert main(["calibrate", *kind, "--out", str(out)]) == 2
         assert f"there is no folder {out.parent}" in capsys.readouterr().err
     assert not out.parent.exists()

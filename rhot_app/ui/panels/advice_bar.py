@@ -36,8 +36,7 @@ _Line = tuple[QWidget, ShapeMark, QLabel, QPushButton]
 
 
 class AdviceBar(QWidget):
-    """The gravest sentences in two lines that are always there; below them one that lasts, in lines of its own. On the
-    start page, where nothing can be moved, the lines are as many as the sentences (`set_reserved`).
+    """The gravest sentences in two lines that are always there; below them one that lasts, in lines of its own.
 
     What does not fit stands in the menu of `more`.
     """
@@ -55,7 +54,6 @@ class AdviceBar(QWidget):
         self._shown: list[Notice] | None = None
         self._all: list[Notice] = []
         self._lines: list[_Line] = []
-        self._reserved = True
         self._on_line: list[Notice | None] = [None] * (SHOWN + 1)
         self._upper = QWidget()
         column = QVBoxLayout(self._upper)
@@ -124,11 +122,6 @@ class AdviceBar(QWidget):
                 button.setVisible(bool(notice.action))
         self._fit_height()
 
-    def set_reserved(self, on: bool) -> None:
-        """Whether RESERVED lines are always there."""
-        self._reserved = on
-        self._fit_height()
-
     @property
     def line_px(self) -> int:
         """Height of one line: of text, or of a button beside it."""
@@ -137,12 +130,9 @@ class AdviceBar(QWidget):
 
     def _fit_height(self) -> None:
         """Show as many sentences as the reserved lines hold; toolbars do not ask how tall wrapped text gets."""
-        width = self._upper.width()
-        needs = [self._height_of(k, width) for k, notice in enumerate(self._on_line[:-1]) if notice is not None]
-        lines = RESERVED * [self.line_px] if self._reserved else needs or [self.line_px]
-        room = sum(lines) + (len(lines) - 1) * _GAP_PX
+        room = RESERVED * self.line_px + (RESERVED - 1) * _GAP_PX
         self._upper.setFixedHeight(room)
-        left, full = room, False
+        width, left, full = self._upper.width(), room, False
         hidden: list[Notice] = [notice for notice in self._all if notice not in (self._shown or [])]
         for k, ((line, *_), notice) in enumerate(zip(self._lines[:-1], self._on_line, strict=False)):
             needed = self._height_of(k, width)
