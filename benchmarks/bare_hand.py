@@ -75,7 +75,7 @@ def moved(camera: CameraModel, rng: np.random.Generator) -> CameraModel:
 def iteration_ms(tracker: BareHandTracker, images: list[np.ndarray]) -> dict[str, float]:
     """Processor time of one search of all images and one Gauss-Newton step, by the parts of Rehg's table 4.1."""
     knot, residuals = tracker.filter.newest, [Contours([one for one in tracker.frames if one is not None]),
-                                              *tracker.known]
+                                              *tracker.constraints]
     frames = {c: frame for c, frame in enumerate(tracker.frames) if frame is not None}
 
     def rows() -> tuple[np.ndarray, ...]:

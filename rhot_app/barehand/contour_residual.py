@@ -32,12 +32,12 @@ SHAPE_SD_M = 0.7e-3
 """m: standard deviation of a finger's skin about the model's surface: creases, joints, nails and pads."""
 
 FLESHY = 2.0
-"""The same of palm and forearm, of that of a finger: their flesh has no capsules of its own (1.0 to 1.4 mm between the
-twin's hand and the tracker's, 0.7 mm on fingers)."""
+"""By how much that of palm and forearm is larger: their flesh has no capsules of its own. Measured between the twin's
+hand and the tracker's: 1.0 to 1.4 mm, and 0.7 mm on fingers."""
 
 COMMON = 0.5
-"""Part of its variance that is common to one side of a capsule (0.5 mm between such sides of the twin's fingers, 0.5 mm
-within one)."""
+"""Part of the variance that is common to one side of a capsule. Measured so, too: 0.5 mm between the sides of the
+fingers, and 0.5 mm within one."""
 
 MISSED = np.array([0.1, 0.4])
 """Probability that a silhouette, or an edge within the hand, is no edge of the image."""
@@ -54,13 +54,12 @@ UNSURE = 0.02
 SAME_TIME_S = 1e-3
 """s: images nearer in time count as of one instant: a hand at 2 m/s moves by 2 mm."""
 
-_STUDENT_4 = 0.375  # density at 0 of Student's t of 4 degrees of freedom
-_LEAST_CLUTTER = 1e-3  # edges per px
 SIDES = 4
 """Kinds of contour points of a capsule (`contours.SIDE` and the others)."""
 
+_STUDENT_4 = 0.375  # density at 0 of Student's t of 4 degrees of freedom
+_LEAST_CLUTTER = 1e-3  # edges per px
 _RIDGE = 1e-3  # 1/m^2 and 1/rad^2, as good as nothing
-
 
 Predicted = tuple[Array, Array, NDArray[np.bool_]]
 
@@ -119,8 +118,8 @@ class ContourFrame:
             if good[s]:
                 _, weight, mean, _ = _mix(self.edges.number[s], self.edges.offset[s], self.edges.sd[s],
                                           self.edges.inside[s], self.edges.outside[s], self.points.behind[s],
-                                          offset[s], self.shape_variance[s],
-                                          self.expected_sd[s] ** 2, self.clutter[s], found[s])
+                                          offset[s], self.shape_variance[s], self.expected_sd[s] ** 2,
+                                          self.clutter[s], found[s])
                 if weight > 0.0:
                     error[s] = mean
         return found, error

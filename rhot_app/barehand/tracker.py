@@ -158,7 +158,9 @@ class BareHandTracker:
                                    np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, np.full(3, FASTEST),
                                    FASTEST, self.shape_covariance, self.shape_s)
         self.filter = IteratedFilter(self.process)
-        self.known: list[Residual] = [JointLimits(self.model.limits), *([] if self.plane is None else [self.plane])]
+        self.constraints: list[Residual] = [JointLimits(self.model.limits)]
+        if self.plane is not None:
+            self.constraints.append(self.plane)
         self.tracking = False
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
@@ -277,7 +279,7 @@ class BareHandTracker:
         for number in range(passes):
             frames = [self._search(camera, image, state, covariance * 0.25**number, number == passes - 1,
                                    late_s.get(camera, 0.0)) for camera, image in images.items()]
-            residuals = [Contours(frames), *self.known, *extra]
+            residuals = [Contours(frames), *self.constraints, *extra]
             if number < passes - 1:
                 state = update(self.process, t_s, prediction, residuals, state, self.filter.partial).state
         return self.filter.add(t_s, residuals, prediction, state)

@@ -61,8 +61,8 @@ class SearchedNodes:
             searched_ns = t_ns + self.rounded_ns
             if len(request.slices):
                 found = find_edges(image, request.slices, known, noise_of(image))
-                told = replace(request, expected=None) if self.forget else request
-                self.give(EdgeFrame(camera, searched_ns, 0, t_ns + AGE_NS, 0.004, 0.001, told, found))
+                answered = replace(request, expected=None) if self.forget else request
+                self.give(EdgeFrame(camera, searched_ns, 0, t_ns + AGE_NS, 0.004, 0.001, answered, found))
             if request.map_step:
                 self.give(ForegroundFrame(camera, searched_ns, 0, t_ns + AGE_NS, request.map_step,
                                           foreground_map(image, known, request.map_step)))

@@ -67,7 +67,7 @@ def build_model(anatomy: HandAnatomy) -> HandModel:
 
 
 LOCKED_SD_RAD: Final = math.radians(2.0)
-"""rad: how far a joint is from where it is told to be held. Chosen: Rehg's are exact, a goniometer repeats to 5
+"""rad: how far a joint is from the angle at which it is held. Chosen: Rehg's are exact, a goniometer repeats to 5
 degrees, and a finger with that much freedom is still taken for its neighbour."""
 
 

@@ -99,12 +99,12 @@ def test_a_wrong_hand_file_is_mended_by_ten_poses() -> None:
     assert thumb.bones_sd_mm[1] == pytest.approx(found.length_sd[1] * thumb.bones_mm[1], rel=1e-3)
 
 
-def test_key_frames_foretell_how_certain_the_hand_will_be() -> None:
+def test_key_frames_predict_how_certain_the_hand_will_be() -> None:
     _, key_frames, _, _ = tracked()
-    foretold = phalanx_sd(key_frames.covariance)
+    predicted = phalanx_sd(key_frames.covariance)
     found = adapt(tracked()[0], key_frames.kept)
-    assert rms(foretold[0]) == pytest.approx(rms(found.length_sd), rel=0.3)
-    assert 0.5 * rms(found.radius_sd) < rms(foretold[1]) < rms(found.radius_sd)  # edges err alike in all of them
+    assert rms(predicted[0]) == pytest.approx(rms(found.length_sd), rel=0.3)
+    assert 0.5 * rms(found.radius_sd) < rms(predicted[1]) < rms(found.radius_sd)  # edges err alike in all of them
     assert key_frames.sufficient
     assert not KeyFrames(build_model(right_hand())).sufficient
 

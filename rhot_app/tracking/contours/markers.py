@@ -118,7 +118,7 @@ class MarkersOfHand:
         prediction = hand.filter.predict(t_s)
         found = self._residuals([frame], prediction, self._epoch_ns + round(1e9 * t_s))
         if found:
-            self.judge(found, hand.filter.add(t_s, [*found, *hand.known], prediction))
+            self.judge(found, hand.filter.add(t_s, [*found, *hand.constraints], prediction))
         return bool(found)
 
     def choose(self, frames: Sequence[CameraObservations], contours: Contours, predicted: Estimate,
@@ -131,7 +131,7 @@ class MarkersOfHand:
         if not found or wide is None:
             return predicted, found, predicted[0]
         again, stationary = self._residuals(frames, wide, t_ns), hand.process.stationary
-        residuals: list[Residual] = [*again, *hand.known]
+        residuals: list[Residual] = [*again, *hand.constraints]
         state = update(hand.process, t_s, wide, residuals, None, hand.filter.partial).state
         state = update(hand.process, t_s, wide, [*residuals, contours], state, hand.filter.partial).state
         away = hand.process.difference(state, predicted[0])[:POSE]
@@ -207,7 +207,7 @@ def weigh(hand: BareHandTracker, markers: MarkersOfHand | None, waiting: Mapping
     initial = prediction[0]
     if markers is not None:
         prediction, found, initial = markers.choose(marked, Contours(contours), prediction, t_s)
-    residuals: list[Residual] = [*found, Contours(contours), *hand.known]
+    residuals: list[Residual] = [*found, Contours(contours), *hand.constraints]
     for number in range(PASSES):
         for contour, spread in zip(contours, spreads, strict=True):
             contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)

@@ -111,7 +111,7 @@ class ContourEstimator:
         contour = asked(hand, 0, *hand.filter.predict(0.0), STEP_M)
         contour.observe(edges_of(len(contour.slices), np.zeros(1, np.int64), np.array([[0.0, 1.0, 9.0, 1.0, 0.0]])))
         hand.frames[0] = contour
-        hand.filter.add(0.0, [contour, *hand.known])
+        hand.filter.add(0.0, [contour, *hand.constraints])
         state = hand.filter.newest.state
         hand.process.difference(state, state)  # compiled here, for `MarkersOfHand.choose`
         self._finder.relocate(maps, hand.filter.newest.state, hand.filter.newest.covariance, 0.03)

@@ -25,12 +25,12 @@ twenty slices."""
 
 class Changes(QObject):
     """Makes one change of `fit` at a time. `changed`: the fit, or what may be done to it, is another one; `stepped`:
-    its instants may be others, too; `told`: there is another `message`, which is a problem if `bad`; `used`: the rig
+    its instants may be others, too; `said`: there is another `message`, which is a problem if `bad`; `used`: the rig
     has the hand."""
 
     changed = Signal()
     stepped = Signal()
-    told = Signal()
+    said = Signal()
     used = Signal()
 
     def __init__(self, fit: HandFit, kept: Kept, memory: Memory, window: QWidget) -> None:
@@ -48,7 +48,7 @@ class Changes(QObject):
     def tell(self, sentence: str, *, bad: bool = False) -> None:
         """What was done, or why it could not be done."""
         self.message, self.bad = sentence, bad
-        self.told.emit()
+        self.said.emit()
 
     # -- changes and steps back ------------------------------------------------------------------------------------
 

@@ -61,7 +61,7 @@ class HandFitWindow(QDialog):
         frame, changes, instants = self.frame, self._changes, self._instants
         changes.changed.connect(self.refresh)
         changes.stepped.connect(instants.show_list)
-        changes.told.connect(self._show_sentence)
+        changes.said.connect(self._show_sentence)
         changes.used.connect(self.used)
         for button, action in (
                 (frame.take_button, instants.take_pictures), (frame.open_button, instants.choose_pictures),

@@ -6,7 +6,7 @@ from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, Step
-from rhot_app.ui.wizards.steps.refined_steps import EngineFeed, MoveStep, propose
+from rhot_app.ui.wizards.steps.refined_steps import EngineFeed, MakeProposal, MoveStep, propose
 
 TITLE = "Use refined calibration"
 
@@ -27,11 +27,16 @@ class MovePage(Page):
 def make_plan(kit: Kit) -> Plan:
     """Move, compare, use it."""
     feed = EngineFeed(kit.connect, "refined")
-    move = MoveStep(feed)
+    return compared(kit, TITLE, feed, MoveStep(feed), propose,
+                    "The calibration in force still holds, or too little of the hand was seen.")
 
+
+def compared(kit: Kit, title: str, feed: EngineFeed, move: MoveStep, make: MakeProposal, nothing: str) -> Plan:
+    """Move the hand, compare what the engine made of it with what is in force, use it. `nothing`: why there may be no
+    proposal."""
     def proposal() -> Proposal | None:
         """What is in use stays: the engine begins anew with it."""
-        return accept.proposal if accept.state == "used" else propose(move.answer, kit.rig, kit.rig_path)
+        return accept.proposal if accept.state == "used" else make(move.answer, kit.rig, kit.rig_path)
 
-    accept = AcceptStep(proposal, "The calibration in force still holds, or too little of the hand was seen.")
-    return Plan(TITLE, (MovePage(move, feed), AcceptPage(accept, kit.scheme)), put_back=feed.stop)
+    accept = AcceptStep(proposal, nothing)
+    return Plan(title, (MovePage(move, feed), AcceptPage(accept, kit.scheme)), put_back=feed.stop)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -11,23 +9,14 @@ import msgspec
 from rhot_app.handfit.adaptation import REASON
 from rhot_app.project import Rig, parse_rig
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
-from rhot_app.ui.wizards.models.step import Step, StepView
-from rhot_app.ui.wizards.steps.refined_steps import ASK_S, Answer, EngineFeed, verdict_from
+from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.steps.refined_steps import ASK_S, Answer, MoveStep, verdict_from
 
 
-class ShowHandStep(Step):
+class ShowHandStep(MoveStep):
     """Shows how well the tracked hand's shape is known by now."""
 
     title = "Show the hand"
-
-    def __init__(self, feed: EngineFeed, clock: Callable[[], float] = time.monotonic) -> None:
-        self._feed, self._clock = feed, clock
-        self._begun_s = clock()
-
-    @property
-    def answer(self) -> Answer:
-        """The engine's newest."""
-        return self._feed.answer
 
     def view(self) -> StepView:
         """What to do, until the adapted hand may be used."""

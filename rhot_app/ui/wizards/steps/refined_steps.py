@@ -22,6 +22,7 @@ from rhot_app.ui.wizards.models.step import Step, StepView
 ASK_S = 1.0
 
 Answer = dict[str, Any]
+MakeProposal = Callable[[Answer, Rig, Path | None], Proposal | None]
 
 
 class EngineFeed:
