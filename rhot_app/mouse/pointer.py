@@ -79,8 +79,8 @@ class MouseState:
         return button in self.pressed
 
 
-GAP_NS: Final = 100_000_000
-"""ns: states farther apart are of different stays of the hand: three frames of a camera at 30 Hz."""
+GAP_NS: Final = 250_000_000
+"""ns: states farther apart are of different stays of the hand. Rehg's mouse had 10 images a second; one may be lost."""
 
 
 class _Rest:

@@ -19,6 +19,13 @@ def rested(settings: MouseSettings | None = None, **how) -> Mouse:
     return mouse
 
 
+def test_ten_states_a_second_suffice_for_a_rest() -> None:
+    """As many images as Rehg's mouse had."""
+    mouse = Mouse()
+    states = [mouse.feed(hand_state(number)) for number in range(0, 61, 10)]
+    assert states[0].cursor is None and states[-1].cursor == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+
+
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_the_palm_moves_the_foot_and_nothing_else(side: str) -> None:
     mouse = rested(side=side)
