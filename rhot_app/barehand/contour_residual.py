@@ -12,6 +12,7 @@ long as the hand shows the same side: images within that time count as one.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -149,6 +150,15 @@ class ContourFrame:
             self.surface, *predicted, p.capsule, p.kind, p.behind, self.shape_variance, self.side_sd, e.number,
             e.offset, e.sd, e.inside, e.outside, self.expected_sd, self.clutter, aside, information, pull, self.seen,
             sides))
+
+
+def in_a_fit(frame: ContourFrame) -> ContourFrame:
+    """The frame for a fit of one shape to some instants, which are too far apart to be `repeated`. Each slice has all
+    of its variance by itself: an offset of a side that were free at every instant would hide the bend of a finger."""
+    out = copy.copy(frame)
+    out.shape_variance = (frame.shape_variance + frame.side_sd**2) / frame.repeated
+    out.side_sd, out.repeated = np.zeros_like(frame.side_sd), 1.0
+    return out
 
 
 class Contours:

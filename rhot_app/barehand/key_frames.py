@@ -6,14 +6,14 @@ pose is unknown (Schur complement). So a pose that shows a joint bent counts, an
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import COLUMNS, ContourFrame, JointLimits, gathered
+from rhot_app.barehand.contour_residual import COLUMNS, ContourFrame, JointLimits, gathered, in_a_fit
+from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
 from rhot_app.barehand.tracker import FOREARM_SD, LENGTH_SD, RADIUS_SD, SIZE_SD, BareHandTracker
 from rhot_app.hand.model import HandModel
@@ -27,6 +27,10 @@ second."""
 
 APART_S = 0.1
 """s: frames nearer in time show the same pose: a hand moves within 1/15 s (`hand_process.FASTEST`)."""
+
+TOGETHER = 0.025 / STEP_M
+"""Slices that count as one observation: where the surface is wrong, it is so along a phalanx, 25 mm, in all key frames.
+As more they would give lengths that are two to three standard deviations off (`benchmarks/hand_adaptation.py`)."""
 
 SHAPE_SD = np.concatenate([SIZE_SD, np.full(15, LENGTH_SD), np.full(15, RADIUS_SD), FOREARM_SD[:1]])
 """(FOREARM_TURN,) standard deviations of the shape's numbers in adults, relative to a hand file."""
@@ -56,7 +60,9 @@ def normal_equations(frames: Sequence[ContourFrame], state: Array, model: HandMo
     """Information (COLUMNS, COLUMNS), gradient (COLUMNS,) and cost of a key frame's edges and of the priors of its own
     numbers; nothing of the shape's prior."""
     information, pull, cost = gathered(frames, state)
-    information += np.tril(information, -1).T
+    cost /= TOGETHER
+    information = (information + np.tril(information, -1).T) / TOGETHER
+    pull /= TOGETHER
     angles, prior, bend = slice(6, POSE), model.pose_prior, state[BIAS + FOREARM_TURN:BIAS + SHAPE]
     away = prior.mean - state[ANGLES:VELOCITY]
     information[angles, angles] += prior.information
@@ -71,14 +77,6 @@ def normal_equations(frames: Sequence[ContourFrame], state: Array, model: HandMo
     pull[last] -= bend / _BEND_SD**2
     cost += float(away @ prior.information @ away + limits.error @ limits.error + np.sum((bend / _BEND_SD) ** 2))
     return information, pull, cost
-
-
-def _once(frame: ContourFrame) -> ContourFrame:
-    """The frame as one observation: key frames are too far apart to be `repeated`."""
-    out = copy.copy(frame)
-    out.shape_variance, out.side_sd = frame.shape_variance / frame.repeated, frame.side_sd / np.sqrt(frame.repeated)
-    out.repeated = 1.0
-    return out
 
 
 def marginal(information: Array) -> Array:
@@ -104,7 +102,7 @@ class KeyFrames:
     def offer(self, tracker: BareHandTracker) -> None:
         """Keep the tracker's newest frames if they tell more of the shape than one that is kept."""
         knot = tracker.filter.newest
-        frames = tuple(_once(frame) for frame in tracker.frames if frame is not None)
+        frames = tuple(in_a_fit(frame) for frame in tracker.frames if frame is not None)
         if not frames or abs(knot.t_s - self._last_s) < APART_S:
             return
         self._last_s = knot.t_s

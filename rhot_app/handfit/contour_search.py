@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import MISSED
+from rhot_app.barehand.contour_residual import MISSED, in_a_fit
 from rhot_app.barehand.contours import SILHOUETTE, STEP_M
 from rhot_app.barehand.surface import FOREARM_TURN, SHAPE
 from rhot_app.barehand.tracker import START_PASSES, START_SD, BareHandTracker
@@ -111,9 +111,7 @@ def _search(hand: HandAnatomy, rig: Rig, state: FitState, k: int, spread: Array,
     covariance[np.ix_(theirs, theirs)] = spread[np.ix_(ours, ours)]
     frames = []
     for number, (_, image) in enumerate(sorted(instant.images.items())):
-        frame = tracker.expected(number, bare, covariance, step_m)
-        # two pictures do not tell a side's offset from a bent finger: each slice counts by itself
-        frame.shape_variance, frame.side_sd = frame.shape_variance + frame.side_sd**2, np.zeros_like(frame.side_sd)
+        frame = in_a_fit(tracker.expected(number, bare, covariance, step_m))
         frame.observe(find_edges(image, frame.slices, *learnt[number]))
         frames.append(frame)
     return Contour(state.shape, tuple(frames))
