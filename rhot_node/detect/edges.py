@@ -82,7 +82,7 @@ def find_edges(image: Image, slices: Array, foreground: Foreground, noise: float
     edges = Edges(np.zeros(n, np.int64), *(np.zeros((n, EDGES_MAX)) for _ in range(5)))
     longest = 2 * math.ceil(slices[:, 4].max()) + 1 + 2 * BEYOND if n else 1
     _find(image, slices, foreground.hand, foreground.rest, foreground.mean, foreground.sd,
-          gain_of(image, foreground), noise, np.empty((longest, 4)), np.empty(longest), np.empty(longest), *edges)
+          gain_of(image, foreground), noise, np.empty((4, longest)), np.empty(longest), np.empty(longest), *edges)
     return edges
 
 
@@ -93,25 +93,35 @@ def noise_of(image: Image) -> float:
     return max(1.0, float(np.median(deviation)) / (0.6745 * math.sqrt(1.5)))
 
 
-@njit(cache=True)
-def _sample(image, x, y, out, weight):
-    """Add `weight` times the bilinear value at (x, y) to `out` (3,). False outside of the image."""
-    column, row = math.floor(x), math.floor(y)
-    if column < 0 or row < 0 or column + 1 >= image.shape[1] or row + 1 >= image.shape[0]:
-        return False
+@njit(cache=True, error_model="numpy")
+def _bilinear(image, x, y):
+    """The colour at (x, y), which is within the image by a pixel."""
+    column, row = int(x), int(y)
     fx, fy = x - column, y - row
-    for k in range(3):
-        top = image[row, column, k] * (1.0 - fx) + image[row, column + 1, k] * fx
-        bottom = image[row + 1, column, k] * (1.0 - fx) + image[row + 1, column + 1, k] * fx
-        out[k] += weight * (top * (1.0 - fy) + bottom * fy)
-    return True
+    a, b, c, d = (1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy
+    upper, lower = image[row], image[row + 1]
+    return (a * upper[column, 0] + b * upper[column + 1, 0] + c * lower[column, 0] + d * lower[column + 1, 0],
+            a * upper[column, 1] + b * upper[column + 1, 1] + c * lower[column, 1] + d * lower[column + 1, 1],
+            a * upper[column, 2] + b * upper[column + 1, 2] + c * lower[column, 2] + d * lower[column + 1, 2])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _across(image, x, y, nx, ny):
+    """The colour at (x, y), a mean over three pixels across the direction (nx, ny); NaN unless all are in the image."""
+    ax, ay = abs(nx), abs(ny)
+    if not (ay <= x < image.shape[1] - 1 - ay and ax <= y < image.shape[0] - 1 - ax):
+        return np.nan, np.nan, np.nan
+    r, g, b = _bilinear(image, x, y)
+    r1, g1, b1 = _bilinear(image, x - ny, y + nx)
+    r2, g2, b2 = _bilinear(image, x + ny, y - nx)
+    return 0.5 * r + 0.25 * (r1 + r2), 0.5 * g + 0.25 * (g1 + g2), 0.5 * b + 0.25 * (b1 + b2)
+
+
+@njit(cache=True, error_model="numpy")
 def _find(image, slices, hand, rest, mean, sd, gain, noise, profile, ours, slope, count, offset, spread, strength,
           inside, outside):
     noise_slope = noise * _TAPS_NOISE
-    derivative = np.empty((profile.shape[0], 4))
+    derivative = np.empty(profile.shape)
     for s in range(slices.shape[0]):
         cx, cy, nx, ny = slices[s, 0], slices[s, 1], slices[s, 2], slices[s, 3]
         half = math.ceil(slices[s, 4])
@@ -120,27 +130,15 @@ def _find(image, slices, hand, rest, mean, sd, gain, noise, profile, ours, slope
         for i in range(length):
             along = i - half - BEYOND
             x, y = cx + along * nx, cy + along * ny
-            profile[i, 0] = profile[i, 1] = profile[i, 2] = 0.0
-            good = _sample(image, x, y, profile[i], 0.5)
-            good = good and _sample(image, x - ny, y + nx, profile[i], 0.25)
-            good = good and _sample(image, x + ny, y - nx, profile[i], 0.25)
-            ours[i] = profile[i, 3] = 0.0
-            if good:
-                first, last = min(first, i), i
-                ours[i] = foreground_at(image, int(y + 0.5), int(x + 0.5), hand, rest, mean, sd, gain)
-                profile[i, 3] = FOREGROUND_STEP * ours[i]
-        for i in range(length):
-            slope[i] = 0.0
-            if i - _HALF < first or i + _HALF > last:
+            r, g, b = _across(image, x, y, nx, ny)
+            if math.isnan(r):
                 continue
-            total = 0.0
-            for k in range(4):
-                value = 0.0
-                for j in range(2 * _HALF + 1):
-                    value += _TAPS[j] * profile[i + j - _HALF, k]
-                derivative[i, k] = value
-                total += value * value
-            slope[i] = math.sqrt(total)
+            first, last = min(first, i), i
+            ours[i] = foreground_at(image, int(y + 0.5), int(x + 0.5), hand, rest, mean, sd, gain)
+            profile[0, i], profile[1, i], profile[2, i], profile[3, i] = r, g, b, FOREGROUND_STEP * ours[i]
+        slope[:length] = 0.0
+        if last - first >= 2 * _HALF:
+            _slopes(profile[:, first:last + 1], derivative[:, first + _HALF:], slope[first + _HALF:])
         found = 0
         for i in range(BEYOND, length - BEYOND):
             if slope[i] < SIGNIFICANT * noise_slope or slope[i] < slope[i - 1] or slope[i] <= slope[i + 1]:
@@ -159,7 +157,7 @@ def _find(image, slices, hand, rest, mean, sd, gain, noise, profile, ours, slope
             shift = 0.5 * (slope[i + 1] - slope[i - 1]) / max(bend, 1e-9)
             offset[s, place] = i - half - BEYOND + min(max(shift, -0.5), 0.5)
             spread[s, place] = min(max(0.7 * noise_slope / max(bend, 1e-9), _LEAST_SD), _MOST_SD)
-            brighter = derivative[i, 0] + derivative[i, 1] + derivative[i, 2]
+            brighter = derivative[0, i] + derivative[1, i] + derivative[2, i]
             strength[s, place] = slope[i] if brighter >= 0.0 else -slope[i]
             inside[s, place] = _mean_beside(ours, i, -1, first, last)
             outside[s, place] = _mean_beside(ours, i, 1, first, last)
@@ -171,7 +169,24 @@ def _find(image, slices, hand, rest, mean, sd, gain, noise, profile, ours, slope
         count[s] = found
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _slopes(profile, derivative, slope):
+    """Fill the `derivative` (4, n) of a profile (4, n + 2 _HALF), and add its length to `slope` (n,)."""
+    n = profile.shape[1] - 2 * _HALF
+    for k in range(4):
+        out = derivative[k]
+        out[:n] = 0.0
+        for j in range(1, _HALF + 1):  # the taps are odd
+            tap, after, before = _TAPS[_HALF + j], profile[k, _HALF + j:], profile[k, _HALF - j:]
+            for i in range(n):
+                out[i] += tap * (after[i] - before[i])
+        for i in range(n):
+            slope[i] += out[i] * out[i]
+    for i in range(n):
+        slope[i] = math.sqrt(slope[i])
+
+
+@njit(cache=True, error_model="numpy")
 def _half_hand(mean, gain, noise, profile, i, x, y, nx, ny):
     """Where, px from sample `i` of the profile, which is at (x, y), hand and background each have half of a pixel, and
     its standard deviation px; infinite where there is no such place or noise hides it.
@@ -182,20 +197,18 @@ def _half_hand(mean, gain, noise, profile, i, x, y, nx, ny):
     variance, prior = 0.5 * noise * noise, 1.0 / SHADE_SD**2
     hand, ff = np.zeros(3), prior
     for k in range(3):
-        hand[k] = (profile[i - 5, k] + profile[i - 4, k] + profile[i - 3, k]) / 3.0
+        hand[k] = (profile[k, i - 5] + profile[k, i - 4] + profile[k, i - 3]) / 3.0
         ff += hand[k] * hand[k] / variance
     part, spread, behind = np.empty(2 * _BLEND_REACH + 4), np.empty(2 * _BLEND_REACH + 4), np.empty(3)
     for n in range(part.shape[0]):
         j = n - _BLEND_REACH - 1
-        behind[:] = 0.0
-        if not (_sample(mean, x + j * nx, y + j * ny, behind, 0.5)
-                and _sample(mean, x + j * nx - ny, y + j * ny + nx, behind, 0.25)
-                and _sample(mean, x + j * nx + ny, y + j * ny - nx, behind, 0.25)):
+        behind[0], behind[1], behind[2] = _across(mean, x + j * nx, y + j * ny, nx, ny)
+        if math.isnan(behind[0]):
             return 0.0, math.inf
         fg, gg, f_side, g_side = prior, prior, 0.0, 0.0
         for k in range(3):
             colour = gain[k] * behind[k]
-            above = profile[i + j, k] - colour
+            above = profile[k, i + j] - colour
             fg += hand[k] * colour / variance
             gg += colour * colour / variance
             f_side += hand[k] * above / variance
@@ -216,7 +229,7 @@ def _half_hand(mean, gain, noise, profile, i, x, y, nx, ny):
     return nearest, sd_px
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _mean_beside(ours, i, direction, first, last):
     total, number = 0.0, 0
     for k in range(2, 6):

@@ -6,6 +6,7 @@ What was not learnt has the density of any colour, so it decides nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -40,6 +41,7 @@ _SAMPLES = 1200  # pixels of which the exposure is estimated, about
 _DARK, _BRIGHT = 16.0, 240.0  # of 255: less is noise, more is clipped
 _GAIN_LOG, _GAIN_BINS = 0.7, 70  # exposures differ by a factor of 2 at most; bins of 2 %
 _LEAST_SAMPLES = 70  # the median of so many ratios errs by 15 % of one ratio's standard deviation
+_BEYOND_SD = 8.0  # a colour so far from the background is 10^7 times less probable there than an unusual one
 _FOREIGN = 4.0  # standard deviations of the background
 _OPEN_PX, _LEAST_PIXELS = 3, 400  # smaller patches of skin are none
 _LEAST_SD = 2.0  # of 255: quantisation and compression, below which no background is known
@@ -207,21 +209,24 @@ def _gain(image, mean, gain):
         gain[k] = np.exp(np.median(ratio[:used, k][kept]))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def foreground_at(image, row, column, hand, rest, mean, sd, gain):
     """Probability that a pixel shows the hand, in an image `gain` (3,) times brighter than the background's."""
     r, g, b = image[row, column, 0], image[row, column, 1], image[row, column, 2]
     index = (np.int64(r) // _BIN * BINS + np.int64(g) // _BIN) * BINS + np.int64(b) // _BIN
     ours, theirs = hand[index], rest[index]
-    if mean.shape[0]:
-        squared, density = 0.0, 1.0
-        for k in range(3):
-            own = sd[row, column, k] * max(gain[k], np.float32(1.0))
-            z = (image[row, column, k] - gain[k] * mean[row, column, k]) / own
-            squared += z * z
-            density *= _INVERSE_ROOT_2PI / own
-        theirs = (1.0 - UNUSUAL) * density * np.exp(-0.5 * squared) + UNUSUAL * theirs
-    return ours / (ours + theirs)
+    if mean.shape[0] == 0:
+        return ours / (ours + theirs)
+    squared, density = 0.0, 1.0
+    for k in range(3):
+        precision = 1.0 / (sd[row, column, k] * max(gain[k], np.float32(1.0)))
+        z = (image[row, column, k] - gain[k] * mean[row, column, k]) * precision
+        squared += z * z
+        density *= _INVERSE_ROOT_2PI * precision
+    background = UNUSUAL * theirs
+    if squared < _BEYOND_SD**2:
+        background += (1.0 - UNUSUAL) * density * math.exp(-0.5 * squared)
+    return ours / (ours + background)
 
 
 @njit(cache=True)
