@@ -11,6 +11,7 @@ from bare_scenes import DISTANCE_M, left_hand, model_and_surface, poses, rig_of,
 from pictures import look_at, picture, taken, wall
 from scipy.stats import chi2
 
+from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.errors import RigError
 from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
 from rhot_app.geometry.camera import CameraModel
@@ -21,7 +22,7 @@ from rhot_app.project import Rig, TrackerSettings, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.contours.finder import Finder
 from rhot_app.tracking.contours.markers import MarkersOfHand
-from rhot_app.tracking.tracker import ShowsContours
+from rhot_app.tracking.tracker import CameraFrame, ShowsContours
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 from rhot_node.files import resource_path
@@ -88,6 +89,29 @@ def test_a_hand_is_found_followed_and_lost(film, forget: bool) -> None:
         number += 1
     assert nodes.tracker.seen() == []
     assert nodes.states[-1].condition is Condition.LOST and np.isnan(nodes.states[-1].joint_positions).all()
+
+
+class EdgesLast(SearchedNodes):
+    """The last camera's edges come after its map."""
+
+    def give(self, frame: CameraFrame) -> None:
+        last = len(self.foreground) - 1
+        if isinstance(frame, EdgeFrame) and frame.camera == last:
+            self.held = frame
+            return
+        super().give(frame)
+        if isinstance(frame, ForegroundFrame) and frame.camera == last and self.held is not None:
+            held, self.held = self.held, None
+            super().give(held)
+
+    held: EdgeFrame | None = None
+
+
+def test_maps_that_come_before_the_last_edges_confirm_the_hand(film) -> None:
+    rig = bare_rig(film[0][0])
+    nodes = EdgesLast(make_tracker(rig), known(film), len(rig.markers.ids))
+    follow(nodes, film)
+    assert error_mm(nodes.states[-1], poses("grasp", TIMES)[-1]) < 5.0
 
 
 def test_slices_lie_across_the_contour_of_the_next_frame(film) -> None:

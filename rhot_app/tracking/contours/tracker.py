@@ -67,6 +67,7 @@ class ContourEstimator:
         self._cameras = self._requests.cameras
         self._evidence, self._maps = Evidence(self._hand, self._cameras), NewestMaps(self._cameras)
         self._waiting: dict[int, tuple[EdgeFrame, ContourFrame]] = {}
+        self._unjudged: Maps | None = None
         self._epoch_ns = 0
         self._maps_ns = self._agreed_ns = NEVER
         self._tracking = self._ever = False
@@ -136,6 +137,7 @@ class ContourEstimator:
                 due = self._take_edges(frame) or due
             else:
                 self._take_map(frame)
+            self._judge()
         if not due or self._latest is None:
             return None
         self._sequence += 1
@@ -199,13 +201,21 @@ class ContourEstimator:
         return True
 
     def _take_map(self, frame: ForegroundFrame) -> None:
-        """Judge the track by the foreground of one frame, or look for the hand in it."""
+        """See whether the hand is on the foreground of one frame, or look for it there."""
         maps = self._maps.take(frame)
         if not self._tracking:
             self._begin(maps)
             return
         self._evidence.take_map(frame, self._predict(max(frame.t_row0_master_ns, self._time_ns()))[0])
-        if maps is None or maps.t_ns == self._maps_ns or self._waiting:
+        self._unjudged = maps or self._unjudged
+
+    def _judge(self) -> None:
+        """Judge the track by the newest maps of all cameras, once no edges wait to be weighed."""
+        maps = self._unjudged
+        if maps is None or self._waiting or not self._tracking:
+            return
+        self._unjudged = None
+        if maps.t_ns == self._maps_ns:
             return
         self._maps_ns = maps.t_ns
         if not self._evidence.confirmed and self._evidence.seen_ns > max(self._epoch_ns, maps.t_ns - SAME_MAPS_NS):
@@ -256,7 +266,7 @@ class ContourEstimator:
         if self._markers is not None:
             self._markers.begin(t_ns)
         self._epoch_ns, self._maps_ns, self._agreed_ns = t_ns, NEVER, NEVER
-        self._tracking, self._waiting = True, {}
+        self._tracking, self._waiting, self._unjudged = True, {}, None
         self._evidence.begin(t_ns)
         self._requests.begin(t_ns)
 
