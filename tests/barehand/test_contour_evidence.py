@@ -20,7 +20,7 @@ from rhot_app.project import Rig
 from rhot_app.tracking.contours import finder as finder_module
 from rhot_app.tracking.contours.finder import Finder
 from rhot_app.tracking.contours.markers import MarkersOfHand
-from rhot_app.tracking.contours.requests import asked, matched
+from rhot_app.tracking.contours.requests import Requests, asked, matched
 from rhot_app.tracking.contours.sized_markers import BesideContours
 from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
@@ -56,6 +56,19 @@ def test_recorded_slices_that_the_hand_does_not_cross_say_nothing(hand: BareHand
     edges = find_edges(images[0], beside, skin_foreground(), 2.0)
     assert matched(hand, EdgeFrame(0, 0, 0, 0, 0.0, 0.0, SliceRequest(0, beside), edges), state_of(pose),
                    covariance) is None
+
+
+def test_more_slices_than_a_request_has_are_thinned_out(hand: BareHandTracker, monkeypatch: pytest.MonkeyPatch) -> None:
+    pose, covariance = poses("grasp", (0.5,))[0], 1e-6 * np.eye(hand.process.size)
+    every = asked(hand, 0, state_of(pose), covariance, STEP_M)
+    monkeypatch.setattr("rhot_app.tracking.contours.requests.SLICES_MAX", 100)
+    requests = Requests(hand, lambda _: (state_of(pose), covariance))
+    requests.ask(0, 0)
+    request, = requests.take()
+    assert 50 < len(request.slices) <= 100 < len(every.slices)
+    edges = find_edges(scene(pose)[1][0], request.slices, skin_foreground(), 2.0)
+    contour = requests.contour(EdgeFrame(0, 0, 0, 0, 0.0, 0.0, request, edges))
+    assert contour is not None and set(contour.points.capsule) == set(every.points.capsule), "all of the hand is searched"
 
 
 def test_phalanges_follow_the_contours_at_the_same_pace_beside_markers(hand: BareHandTracker) -> None:

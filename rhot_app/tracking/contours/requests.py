@@ -4,6 +4,7 @@ hand as it is predicted for each camera's next frame."""
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -133,11 +134,9 @@ class Requests:
         camera.target_ns = t_row0_ns + round(camera.period_ns)
         state, covariance = self._predict(camera.target_ns + self._middle_ns(number))
         contour = asked(self._hand, number, state, covariance, STEP_M)
-        if len(contour.slices) > SLICES_MAX:
-            contour = asked(self._hand, number, state, covariance, STEP_M * len(contour.slices) / SLICES_MAX)
         camera.searched = len(contour.slices) > 0
         self._requests = [one for one in self._requests if one.camera != number]
-        self._requests.append(SliceRequest(number, contour.slices[:SLICES_MAX], STEP, _Expected(self._place, contour)))
+        self._requests.append(SliceRequest(number, contour.slices, STEP, _Expected(self._place, contour)))
 
     def contour(self, frame: EdgeFrame) -> ContourFrame | None:
         """The contour on the slices that were searched, with their edges: as it was expected, or in a log as it is now.
@@ -155,8 +154,6 @@ class Requests:
     def _searched(self, frame: EdgeFrame) -> ContourFrame | None:
         expected = frame.request.expected
         if isinstance(expected, _Expected):
-            if len(expected.contour.slices) != len(frame.request.slices):
-                return None
             contour = copy.copy(expected.contour)  # for this frame
             contour.observe(frame.edges)
             return contour
@@ -168,11 +165,13 @@ class Requests:
 
 
 def asked(hand: BareHandTracker, camera: int, state: Array, covariance: Array, step_m: float) -> ContourFrame:
-    """The slices across the contours of a hand in `state`, whose centres lie in the image, rounded as they are sent."""
+    """The slices across the contours of a hand in `state`, whose centres lie in the image, rounded as they are sent; of
+    more than a request may have, every second or third."""
     frame, model = hand.expected(camera, state, covariance, step_m), hand.cameras[camera]
     x, y = frame.slices[:, 0], frame.slices[:, 1]
-    kept = (x >= 0.0) & (y >= 0.0) & (x <= model.width - 1) & (y <= model.height - 1)
-    return _on(hand, camera, frame, np.flatnonzero(kept), unpack_slices(pack_slices(frame.slices[kept])))
+    kept = np.flatnonzero((x >= 0.0) & (y >= 0.0) & (x <= model.width - 1) & (y <= model.height - 1))
+    kept = kept[::max(math.ceil(len(kept) / SLICES_MAX), 1)]
+    return _on(hand, camera, frame, kept, unpack_slices(pack_slices(frame.slices[kept])))
 
 
 def matched(hand: BareHandTracker, frame: EdgeFrame, state: Array, covariance: Array) -> ContourFrame | None:
