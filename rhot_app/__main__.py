@@ -56,8 +56,8 @@ SUBCOMMANDS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code: 2 for a mistake that has a sentence, 3 for work done on a log that could
-    be read in part only, 130 when interrupted."""
+    """Run one command; returns its exit code: 2 for a mistake that has a sentence, 3 for work of which a part could
+    not be done, as with a log that can be read in part only, 130 when interrupted."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     take_losses()
     try:

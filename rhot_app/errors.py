@@ -66,7 +66,8 @@ _losses: dict[str, str] = {}  # by file
 
 
 def note_loss(path: str, sentence: str) -> None:
-    """Something was read of `path`, but not all: the command says so at its end and exits with code 3."""
+    """Something came of `path`, but not all that was asked for: the command says so at its end and exits with code 3.
+    """
     _losses[path] = sentence
 
 

@@ -64,7 +64,7 @@ class HandFollower:
         """Follow a hand from a pose on (`BareHandTracker.start`)."""
         self.tracker.start(pose, t_ns)
         self._following, self._seen_ns = True, t_ns
-        self.starts += 1
+        self._started()
 
     def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
         """The state after one image (H, W, 3) RGB of each camera, None where it has none, of master times `t_ns`.
@@ -86,10 +86,15 @@ class HandFollower:
             self.step_s.append(time.perf_counter() - begun)
             self.key_frames.offer(self.tracker)
         else:
-            self.starts += 1
-            self._proposed = None
+            self._started()
         self._count += 1
         return replace(state, sequence=self._count - 1)
+
+    def _started(self) -> None:
+        """A hand was found. It may be another one than before, and has its own key frames."""
+        self.starts += 1
+        self._proposed = None
+        self.key_frames.clear()
 
     def _found(self, images: Sequence[Image | None], t_ns: int) -> bool:
         if any(image is None for image in images) or t_ns < self._empty_until_ns:

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.follower import HandFollower
 from rhot_app.barehand.overlay import overlay
-from rhot_app.errors import ExportError, RecordingError, TrackingError
+from rhot_app.errors import ExportError, RecordingError, note_loss
 from rhot_app.export.export import check_place, format_of, make_writer, whole_file
 from rhot_app.export.pictures import check_pictures, whole_pictures
 from rhot_app.export.plan import Plan
 from rhot_app.export.states import BLOCK, states_of
-from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.handfit.adaptation import REASON, Adapted, adapt
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
@@ -44,7 +43,7 @@ class BareHandSummary:
     """What came of a run. `frame_sets`: states, one after every set of frames; `tracked` of them show the hand;
     `starts`: how often it was found; `lost`: intervals without a hand, s from the first state. `step_s` (K,): times
     that the tracked steps took. `left_out`: frames outside the time that all videos show. `adapted`: the hand that was
-    written, None where none was asked for."""
+    written, None without."""
 
     frame_sets: int
     tracked: int
@@ -91,8 +90,9 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
 
     `foreground`: as learnt of each camera's background, or None. `empty_s`: so long no hand is looked for. `out`: a
     table of the states (docs/export.md). `pictures`: an .avi or .mp4 file, or a folder of PNG files, with what was
-    found. `hand_file`: where the rig's hand, adapted to this one, is written; what was there is kept beside it. Files
-    appear when they are whole. Raises RecordingError, ExportError, TrackingError.
+    found. `hand_file`: where the rig's hand, adapted to the one that was found last, is written; what was there is kept
+    beside it; a loss is noted where too little was seen of it (`errors.note_loss`). Files appear when they are whole.
+    Raises RecordingError, ExportError.
     """
     for video in videos:
         if out is not None:
@@ -124,19 +124,16 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
                 drawn.add(side_by_side(run, frames, state))
         if table is not None:
             table.finish()
-    adapted = None if hand_file is None else adapted_hand(run, rig.hand)
-    if hand_file is not None and adapted is not None:
+    adapted = None
+    if hand_file is not None and run.key_frames.sufficient:
+        adapted = adapt(rig.hand, run.key_frames.kept)
         accept_hand(hand_file, adapted.hand, REASON)
+    elif hand_file is not None:
+        note_loss(str(hand_file), f"{hand_file}: not written, the hand was not adapted. Since it was found last, the "
+                                  "videos tell too little of its lengths. Show it from all sides, and bend and spread "
+                                  "every finger; a hand that is hardly tracked tells nothing.")
     return BareHandSummary(len(spent), sum(tracked for _, tracked in spent), run.starts, lost_intervals(spent),
                            np.array(run.step_s), frames_left_out(videos), adapted)
-
-
-def adapted_hand(run: HandFollower, base: HandAnatomy) -> Adapted:
-    """The hand `base` adapted to the one that was tracked. Raises TrackingError where too little was seen of it."""
-    if not run.key_frames.sufficient:
-        raise TrackingError("The hand was not adapted: the videos tell too little of its lengths. Show it from all "
-                            "sides, and bend and spread every finger; a hand that is hardly tracked tells nothing.")
-    return adapt(base, run.key_frames.kept)
 
 
 def lost_intervals(spent: Sequence[tuple[int, bool]]) -> tuple[tuple[float, float], ...]:

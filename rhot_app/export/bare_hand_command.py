@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
                            pictures=args.overlay, again=args.again, hand_file=args.adapt, progress=line.report)
     line.finish()
     document = summary.document() | {"out": args.out and str(args.out), "overlay": args.overlay and str(args.overlay),
-                                     "hand_file": args.adapt and str(args.adapt)}
+                                     "hand_file": str(args.adapt) if args.adapt and summary.adapted else None}
     print(json.dumps(document) if args.json else "\n".join(sentences(document)))
     return 0
 

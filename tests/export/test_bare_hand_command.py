@@ -15,14 +15,16 @@ import pytest
 from numpy.typing import NDArray
 
 from rhot_app.__main__ import main
+from rhot_app.barehand.follower import HandFollower
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.export.bare_hand import lost_intervals
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.skeleton import JOINTS
-from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, save_rig
+from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, load_rig, save_rig
 from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
 from rhot_app.simulator.bare_hand.sequence import BareHandFrame, BareHandOptions, bare_hand_frames, bare_hand_rig
 from rhot_app.sources.frame_sets import frame_sets, frames_left_out, on_one_clock, open_video
+from rhot_node.detect.foreground import learn_background, skin_foreground
 from rhot_node.detect.image import from_bgr
 from rhot_node.video.avi import Stamp, append_picture, begin_video, encode_picture, finish_video
 from rhot_node.wire.codec import encode
@@ -116,12 +118,39 @@ def test_a_hand_in_two_videos_is_a_table_and_a_film(recorded: Recorded, tmp_path
     assert sorted(path.name for path in tmp_path.iterdir()) == ["hand.avi", "hand.csv"], "nothing else is left"
 
 
+def test_a_hand_that_is_found_again_has_its_own_key_frames(recorded: Recorded,
+                                                           monkeypatch: pytest.MonkeyPatch) -> None:
+    def find(tracker: BareHandTracker, _: object, t_ns: int) -> bool:
+        tracker.start(there[0].truth.pose, t_ns)
+        return True
+
+    away, there = recorded.frames[:EMPTY], recorded.frames[EMPTY:]
+    empty = [[frame.images[c] for frame in away] for c in range(2)]
+    followed = HandFollower(load_rig(recorded.rig), [learn_background(skin_foreground(), one) for one in empty],
+                            known_size=True)
+    followed.start(there[0].truth.pose, 0)
+    shown = [*there[:4], *away, *[there[0]] * 2]
+    for number, frame in enumerate(shown):
+        if number == len(shown) - 2:
+            monkeypatch.setattr(BareHandTracker, "find", find)
+        state = followed.step(frame.images, [round(1e9 * number / FPS)] * 2)
+        if number == 3:
+            assert state.tracked and followed.key_frames.kept
+    assert state.tracked and followed.starts == 2 and not followed.key_frames.kept
+
+
 def test_videos_without_a_hand_say_so(recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     name, path = next(iter(recorded.videos.items()))
     empty = write_video(tmp_path / "empty.avi", [frame.images[0] for frame in recorded.frames[:EMPTY]])
-    assert main(["bare-hand", "--rig", str(recorded.rig), "--video", f"{name}={empty}", "--background",
-                 f"{name}={path}"]) == 0
+    arguments = ["bare-hand", "--rig", str(recorded.rig), "--video", f"{name}={empty}", "--background",
+                 f"{name}={path}"]
+    assert main(arguments) == 0
     assert "No hand was found" in capsys.readouterr().out
+    out, mine = tmp_path / "hand.csv", tmp_path / "mine.json"
+    assert main([*arguments, "--out", str(out), "--adapt", str(mine)]) == 3, "of what was asked for, a part is there"
+    said = capsys.readouterr()
+    assert f"Written: {out}" in said.out and str(mine) not in said.out and out.exists() and not mine.exists()
+    assert f"{mine}: not written" in said.err and "bend and spread every finger" in said.err
 
 
 @pytest.mark.parametrize(("more", "says"), [
