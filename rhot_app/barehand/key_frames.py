@@ -32,6 +32,10 @@ TOGETHER = 0.025 / STEP_M
 """Slices that count as one observation: where the surface is wrong, it is so along a phalanx, 25 mm, in all key frames.
 As more they would give lengths that are two to three standard deviations off (`benchmarks/hand_adaptation.py`)."""
 
+EDGE_BIAS_PX = 0.12
+"""px: by how much the edges along a phalanx are off in all images alike, before a learnt background: rms over the sides
+of drawn hands. More key frames do not lessen it."""
+
 SHAPE_SD = np.concatenate([SIZE_SD, np.full(15, LENGTH_SD), np.full(15, RADIUS_SD), FOREARM_SD[:1]])
 """(FOREARM_TURN,) standard deviations of the shape's numbers in adults, relative to a hand file."""
 
@@ -130,7 +134,18 @@ class KeyFrames:
     @property
     def covariance(self) -> Array:
         """(FOREARM_TURN, FOREARM_TURN) of the shape that a solution with these key frames would have."""
-        return np.asarray(np.linalg.inv(self._information))
+        return with_edge_bias(self._information, list(self.kept), self._model)
+
+
+def with_edge_bias(information: Array, key_frames: Sequence[KeyFrame], model: HandModel) -> Array:
+    """(FOREARM_TURN, FOREARM_TURN) covariance of the shape of a hand `model`, from the `information` of the key frames
+    and the error that all their edges have in common, which is in the radii."""
+    covariance = np.asarray(np.linalg.inv(information))
+    scales = [frame.points.scale for one in key_frames for frame in one.frames]
+    if scales:
+        own = range(RADIUS, RADIUS + 15)
+        covariance[own, own] += (EDGE_BIAS_PX / float(np.median(np.concatenate(scales))) / model.radii.ravel()) ** 2
+    return covariance
 
 
 def phalanx_sd(covariance: Array) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import SILHOUETTE
-from rhot_app.barehand.key_frames import OWN, SHAPE_SD, SHARED, KeyFrame, normal_equations, phalanx_sd
+from rhot_app.barehand.key_frames import OWN, SHAPE_SD, SHARED, KeyFrame, normal_equations, phalanx_sd, with_edge_bias
 from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
 from rhot_app.estimation.least_squares import minimise
 from rhot_app.hand.anatomy import HandAnatomy
@@ -35,10 +35,6 @@ EDGE_SD_PX = 4.0, 2.0, 1.0
 """px: how far from the contour an edge is expected at most, in each of three solutions. 5 % of a phalanx are 2 px. Each
 solution has the surface of the hand file that the one before led to: two phalanges meet with one radius, to which the
 first surface is an approximation."""
-
-EDGE_BIAS_PX = 0.12
-"""px: by how much the edges along a phalanx are off in all images alike, before a learnt background: rms over the sides
-of drawn hands. More key frames do not lessen it."""
 
 _DIGITS = 4  # of mm
 _STEPS, _LEAST_GAIN = 20, 1e-2  # of a cost in which one standard deviation costs 1
@@ -84,10 +80,7 @@ def adapt(base: HandAnatomy, key_frames: Sequence[KeyFrame],
                                        SHAPE_LIMIT[:FOREARM_TURN])
         states = found.states
     assert found is not None
-    covariance = np.asarray(np.linalg.inv(found.reduced(0.0)[0]))
-    scale = float(np.median(np.concatenate([frame.points.scale for one in key_frames for frame in one.frames])))
-    own = range(RADIUS, RADIUS + 15)
-    covariance[own, own] += (EDGE_BIAS_PX / scale / shapes.model(shape).radii.ravel()) ** 2
+    covariance = with_edge_bias(found.reduced(0.0)[0], key_frames, shapes.model(shape))
     length_sd, radius_sd = phalanx_sd(covariance)
     hand = _with_sd(shapes.anatomy(shape), length_sd.reshape(5, 3), radius_sd.reshape(5, 3))
     return Adapted(hand, length_sd, radius_sd, np.array(states), shape, covariance)
