@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ImageFrame, SliceRequest
 from rhot_app.objects.observations import ObjectFrame
 from rhot_app.state import HandState, SeenContour
+
+if TYPE_CHECKING:
+    from rhot_app.barehand.key_frames import KeyFrames
 
 Array = NDArray[np.float64]
 
