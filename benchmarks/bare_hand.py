@@ -2,9 +2,10 @@
 
     python benchmarks/bare_hand.py [--frames 60] [--seeds 3] [--only NAMES]
 
-The names are matched, feature, shape, mismatched, one and lost. `shape`: bones wrong by 5 % and radii by 8 %.
+The names are matched, feature, shape, mismatched, one, lost and edges. `shape`: bones wrong by 5 % and radii by 8 %.
 `mismatched`: the cameras' calibration is wrong, too, and nothing is given. `lengths %` is what is left of the bones'
-error at the end, rms.
+error at the end, rms. `edges`: how far the outline's edges are from the true contour, by what is learnt: one by one,
+and the means along a side of a phalanx over all frames (`edges.SHADED_PX`, `key_frames.EDGE_BIAS_PX`).
 
 Times are of the process, in one thread, so that a busy machine changes them little. `ms an iteration` is what the
 thesis's table 4.1 has, 146 ms: slices, edges on them, Jacobian and solution, of all cameras. `ms a step` is the last
@@ -33,6 +34,7 @@ from pictures import picture, two_cameras, wall  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
 
 from rhot_app.barehand.contour_residual import Contours  # noqa: E402
+from rhot_app.barehand.contours import SILHOUETTE  # noqa: E402
 from rhot_app.barehand.surface import FINGER_SIZE, LENGTH, RADIUS, SHAPE, WHOLE, surface_of  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
 from rhot_app.estimation.filter import gauss_newton_step  # noqa: E402
@@ -44,7 +46,7 @@ from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.model import build_model  # noqa: E402
 from rhot_app.hand.motion.hand_process import BIAS  # noqa: E402
 from rhot_app.simulator.scene.motion import load_motion  # noqa: E402
-from rhot_node.detect.edges import find_edges  # noqa: E402
+from rhot_node.detect.edges import find_edges, noise_of  # noqa: E402
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground  # noqa: E402
 
 FPS = 60.0
@@ -151,6 +153,40 @@ def run(case: str, motion: str, seed: int, frames: int) -> dict[str, float]:
             "ms": float(np.median(taken)), "p99 ms": float(np.percentile(taken, 99)), "found": float(found)}
 
 
+def edges(motion: str, seed: int, frames: int) -> dict[str, float]:
+    """Errors of the outline's edges, rms px, and their squares by the stated variances, on average."""
+    cameras, rig_hand = two_cameras(), right_hand()
+    tracker = BareHandTracker(rig_of(cameras, rig_hand))
+    walls = [wall(camera, 10 * seed + c, False) for c, camera in enumerate(cameras)]
+    moving = load_motion(motion, tracker.model, np.array([0.0, 0.0, 0.55]), seed)
+    found: dict[str, list[tuple[float, ...]]] = {"skin": [], "background": []}
+    for k in range(frames):
+        pose = moving.pose(4.0 * k / FPS)
+        tracker.start(pose, 0)
+        state, covariance = tracker.filter.newest.state, 1e-6 * np.eye(tracker.process.size)
+        for c, camera in enumerate(cameras):
+            image = picture(tracker.surface, pose.world_from_palm, pose.angles, camera, walls[c], 1000 * seed + k)
+            frame = tracker.expected(c, state, covariance)
+            true, _, good = frame.predict(state)
+            outline = np.flatnonzero(good & (frame.points.behind == SILHOUETTE))
+            for name, known in (("skin", learn_skin(image)), ("background", learn_background(
+                    skin_foreground(), [np.clip(walls[c], 0, 255).astype(np.uint8)]))):
+                seen = find_edges(image, frame.slices, known, noise_of(image))
+                for s in outline[seen.number[outline] > 0]:
+                    off = seen.offset[s, :seen.number[s]] - true[s]
+                    e = int(np.argmin(np.abs(off)))
+                    if abs(off[e]) < 3.0:
+                        found[name].append((off[e], seen.sd[s, e], c, frame.points.capsule[s], frame.points.kind[s]))
+    figures = {}
+    for name, rows in found.items():
+        error, sd, *side = np.array(rows).T
+        _, which, count = np.unique(side, axis=1, return_inverse=True, return_counts=True)
+        means = (np.bincount(which.ravel(), error) / count)[count >= frames]
+        figures |= {f"{name}: px": float(np.sqrt(np.mean(error**2))), f"{name}: squared by sd": float(
+            np.mean((error / sd) ** 2)), f"{name}: along sides px": float(np.sqrt(np.mean(means**2)))}
+    return figures
+
+
 def main() -> int:
     """Run all cases and print their table."""
     parser = arguments(__doc__)
@@ -158,7 +194,8 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--only", default="matched,feature,shape,mismatched,one,lost")
     args = parser.parse_args()
-    found = {case: [run(case, MOTIONS[seed % len(MOTIONS)], seed, args.frames) for seed in range(args.seeds)]
+    found = {case: [edges(MOTIONS[seed % len(MOTIONS)], seed, args.frames) if case == "edges" else
+                    run(case, MOTIONS[seed % len(MOTIONS)], seed, args.frames) for seed in range(args.seeds)]
              for case in args.only.split(",")}
     rows = []
     for case, runs in found.items():

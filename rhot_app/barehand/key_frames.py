@@ -34,7 +34,8 @@ As more they would give lengths that are two to three standard deviations off (`
 
 EDGE_BIAS_PX = 0.12
 """px: by how much the edges along a phalanx are off in all images alike, before a learnt background: rms over the sides
-of drawn hands. More key frames do not lessen it."""
+of drawn hands in 30 frames (`python benchmarks/bare_hand.py --only edges --frames 30`, "along sides"). More key frames
+do not lessen it."""
 
 SHAPE_SD = np.concatenate([SIZE_SD, np.full(15, LENGTH_SD), np.full(15, RADIUS_SD), FOREARM_SD[:1]])
 """(FOREARM_TURN,) standard deviations of the shape's numbers in adults, relative to a hand file."""

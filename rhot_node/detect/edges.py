@@ -40,8 +40,8 @@ SHADE_SD = 0.3
 to the limb."""
 
 SHADED_PX = 0.5
-"""px: by how much shading and low contrast displace the steepest place: 0.4 to 0.7 px, rms over the sides of the
-phalanges of drawn hands."""
+"""px: standard deviation by which shading and low contrast displace the steepest place: 0.49 px rms on the outlines of
+drawn hands (`python benchmarks/bare_hand.py --only edges`, "skin")."""
 
 _BLEND_REACH = 3  # px from the steepest place to where hand and background are half and half
 _BLEND_SMOOTHED = 0.61  # noise of a mean of three with weights 1/4, 1/2, 1/4
@@ -156,7 +156,7 @@ def _find(image, slices, hand, rest, mean, sd, gain, noise, profile, ours, slope
             bend = 2.0 * slope[i] - slope[i - 1] - slope[i + 1]
             shift = 0.5 * (slope[i + 1] - slope[i - 1]) / max(bend, 1e-9)
             offset[s, place] = i - half - BEYOND + min(max(shift, -0.5), 0.5)
-            spread[s, place] = min(max(0.7 * noise_slope / max(bend, 1e-9), _LEAST_SD), _MOST_SD)
+            spread[s, place] = min(math.hypot(0.7 * noise_slope / max(bend, 1e-9), SHADED_PX), _MOST_SD)
             brighter = derivative[0, i] + derivative[1, i] + derivative[2, i]
             strength[s, place] = slope[i] if brighter >= 0.0 else -slope[i]
             inside[s, place] = _mean_beside(ours, i, -1, first, last)

@@ -8,7 +8,7 @@ import pytest
 from bare_scenes import DISTANCE_M, poses, rig_of, right_hand, scene, state_of
 from pictures import two_cameras
 
-from rhot_app.barehand.contours import STEP_M
+from rhot_app.barehand.contours import SILHOUETTE, STEP_M
 from rhot_app.barehand.observations import EdgeFrame, SliceRequest
 from rhot_app.barehand.start import Found
 from rhot_app.barehand.surface import SHAPE, WHOLE
@@ -25,8 +25,8 @@ from rhot_app.tracking.contours.sized_markers import BesideContours
 from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_node.detect.edges import find_edges
-from rhot_node.detect.foreground import skin_foreground
+from rhot_node.detect.edges import find_edges, noise_of
+from rhot_node.detect.foreground import learn_skin, skin_foreground
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 
@@ -68,7 +68,22 @@ def test_more_slices_than_a_request_has_are_thinned_out(hand: BareHandTracker, m
     assert 50 < len(request.slices) <= 100 < len(every.slices)
     edges = find_edges(scene(pose)[1][0], request.slices, skin_foreground(), 2.0)
     contour = requests.contour(EdgeFrame(0, 0, 0, 0, 0.0, 0.0, request, edges))
-    assert contour is not None and set(contour.points.capsule) == set(every.points.capsule), "all of the hand is searched"
+    assert contour is not None, "it is matched"
+    assert set(contour.points.capsule) == set(every.points.capsule), "all of the hand is searched"
+
+
+def test_edges_of_a_hand_before_an_unknown_wall_are_as_certain_as_they_state(hand: BareHandTracker) -> None:
+    pose, squares = poses("grasp", (0.5,))[0], []
+    for camera, image in enumerate(scene(pose)[1]):
+        contour = asked(hand, camera, state_of(pose), 1e-6 * np.eye(hand.process.size), STEP_M)
+        true, _, good = contour.predict(state_of(pose))
+        edges = find_edges(image, contour.slices, learn_skin(image), noise_of(image))
+        for s in np.flatnonzero(good & (contour.points.behind == SILHOUETTE) & (edges.number > 0)):
+            off = edges.offset[s, :edges.number[s]] - true[s]
+            nearest = int(np.argmin(np.abs(off)))
+            if abs(off[nearest]) < 3.0:
+                squares.append((off[nearest] / edges.sd[s, nearest]) ** 2)
+    assert len(squares) > 300 and 0.5 < np.mean(squares) < 1.5, "shading displaces them by half a pixel"
 
 
 def test_phalanges_follow_the_contours_at_the_same_pace_beside_markers(hand: BareHandTracker) -> None:
