@@ -35,11 +35,12 @@ RENEW_NS = 300_000_000
 """A node that is asked for a map alone is asked again after this long: three times before its request ends."""
 
 ALIKE = 0.9
-"""Cosine of the largest angle between a recorded slice and the normal of the contour on it, 26 degrees."""
+"""Cosine of the largest angle between a recorded slice and the normal of the contour on it, 26 degrees. Chosen: a slice
+that is more oblique is a tenth longer than the way across the contour."""
 
 BESIDE_PX = 2.0
 """px: a recorded slice crosses the contour if one of its points is no farther beyond the slice's end: the points are
-2 mm apart, which is about as many pixels."""
+half of STEP_M apart, 2 mm, which is about as many pixels."""
 
 _PERIOD_S = 1.0 / 30.0  # of a camera of which one frame has come
 
