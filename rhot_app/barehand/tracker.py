@@ -101,8 +101,10 @@ SAME_POSE_S = 1.0
 """s: images within this time show the hand in much the same pose, and count as one for its phalanges: a grasp takes a
 second. Errors of edges and of the surface last as long, and would move the lengths otherwise."""
 
-RELOCATION_LOG_ODDS = 5.0
-"""Log odds by which a pose that was searched for must be better than the predicted one: 150 to 1."""
+RELOCATION_LOG_ODDS = 20.0
+"""Log odds by which a pose that was searched for must be better than the predicted one: twice what the surface's own
+error changes them by. 0.5 mm along each side of a finger and 1 mm along the palm (`contour_residual.COMMON`) are 10
+before two cameras."""
 
 SEARCHED_S = 0.2
 """s: a hand is searched for anew at least so often, which is how long a wrong pose may last. Chosen: about a

@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 
 from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.kinematics import forward
 from rhot_app.hand.landmarks import COMMON_M
+from rhot_app.hand.model import build_model
+from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.hand.skeleton import JOINTS
+from rhot_app.project import PalmPlane
 from rhot_app.simulator.nodes.landmark_detector import (
     DISTANCE_M,
     EPOCH_NS,
@@ -19,6 +23,7 @@ from rhot_app.simulator.nodes.landmark_detector import (
     landmark_rig,
     moving_hand,
 )
+from rhot_app.tracking.markers import acquisition
 from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.trackers import make_tracker
@@ -184,3 +189,28 @@ def test_without_errors_the_hand_is_where_it_is():
     exact = LandmarkErrors(0.0, 0.0, 0.0, 0.0)
     errors, _, _ = off(states_of(RIG, detected_landmarks(RIG, hand(), 1, exact)), hand())
     assert rms_mm(errors) < 1.0
+
+
+def on_its_plane(world):
+    return PalmOnPlane(PalmPlane(tuple(world[:3, 2].tolist()), float(world[:3, 2] @ world[:3, 3])))
+
+
+def test_landmarks_of_one_camera_begin_on_the_palms_plane(monkeypatch):
+    model, truth = compile_markers(RIG), hand()
+    plane, frame = on_its_plane(truth.worlds[0]), MarkerFrame(model, detected_landmarks(RIG, truth, 1)[0])
+    before = frame.covariances.copy()
+    pose = acquisition.pose_on_plane(plane, frame, model.process())
+    joints = forward(build_model(RIG.hand), pose).joints
+    assert np.median(np.linalg.norm(joints - truth.joints()[0], axis=1)) < 0.01
+    assert np.array_equal(frame.covariances, before), "the detector's noise is added once, when the frame is weighed"
+    tried = []
+
+    def fail_sometimes(*arguments):
+        tried.append(arguments)
+        if len(tried) % 2:
+            raise np.linalg.LinAlgError
+        return update(*arguments)
+
+    update = acquisition.update
+    monkeypatch.setattr(acquisition, "update", fail_sometimes)
+    assert acquisition.pose_on_plane(plane, frame, model.process()) is not None, "of the others, one is right"

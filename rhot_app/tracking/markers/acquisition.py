@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections import deque
 from typing import NamedTuple
@@ -169,16 +170,22 @@ def pose_on_plane(plane: PalmOnPlane, frame: MarkerFrame, process: HandProcess) 
     angles, worn = np.clip(process.mean, m.limits[:, 0], m.limits[:, 1]), np.empty((len(seen), 3))
     forward_arrays(m.dh, np.eye(4), angles, empty_frames(m.dh), worn)
     middle = worn[seen].mean(axis=0)
+    frame, turns = copy.copy(frame), plane.turns(TURNS)
+    frame.add_landmark_noise(process.start(rigid(turns[0], place), angles, TRIED_SD)[0])
     best: tuple[float, Array] | None = None
-    for turn in plane.turns(TURNS):
+    for turn in turns:
         prior = process.start(rigid(turn, place - turn @ middle), angles, TRIED_SD)
-        state = update(process, 0.0, prior, [frame, plane]).state
+        try:
+            state = update(process, 0.0, prior, [frame, plane]).state
+        except np.linalg.LinAlgError:  # turned so, the hand cannot be where the markers are
+            continue
         away = process.difference(state, prior[0])[:POSE]
         cost = stack([frame.linearise(state), plane.linearise(state)], process.size, weigh=True)[3]
         cost += float(away @ np.linalg.solve(prior[1][:POSE, :POSE], away))
         if best is None or cost < best[0]:
             best = cost, state
-    assert best is not None
+    if best is None:
+        return None
     state, world = best[1], np.eye(4)
     world[:3] = state[:ANGLES].reshape(3, 4)
     metres_per_px = float(rotation[2] @ place + shift[2]) / m.intrinsics[frame.camera, 0]
