@@ -30,7 +30,7 @@ LEAST_GAIN = RELOCATION_LOG_ODDS * CORRELATED
 """Log odds of pixels by which another pose must cover the foreground better (`barehand.tracker`)."""
 
 SAME_MAPS_NS = 100_000_000
-"""ns: maps of different cameras farther apart are of different moments."""
+"""ns: maps of different cameras farther apart are of different moments, unless slow cameras have none nearer."""
 
 _ROUNDS = 60  # of the search about what was found, in the newest maps: half of `start.LAST_ROUNDS`, for it is near
 
@@ -56,12 +56,17 @@ class NewestMaps:
         self._cameras = cameras
         self._maps: list[ForegroundFrame | None] = [None] * len(cameras)
 
+    @property
+    def same_ns(self) -> float:
+        """How far apart maps of one moment are at most, ns."""
+        return max(SAME_MAPS_NS, 0.5 * max(camera.period_ns for camera in self._cameras))
+
     def take(self, frame: ForegroundFrame) -> Maps | None:
         """Take one in. The maps of all cameras that deliver frames, of about its moment; None while one is missing."""
         self._maps[frame.camera], t_ns = frame, frame.t_row0_master_ns
         maps: list[ForegroundFrame | None] = []
         for camera, one in zip(self._cameras, self._maps, strict=True):
-            fresh = one is not None and abs(t_ns - one.t_row0_master_ns) < SAME_MAPS_NS
+            fresh = one is not None and abs(t_ns - one.t_row0_master_ns) <= self.same_ns
             if camera.delivers(t_ns) and not fresh:
                 return None
             maps.append(one if fresh else None)
