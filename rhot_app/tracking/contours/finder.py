@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.follower import CONFUSED_M
 from rhot_app.barehand.observations import ForegroundFrame
 from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, search, silhouettes
 from rhot_app.barehand.start import STEP, find_in_maps
@@ -18,6 +19,7 @@ from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import COVER_DROP, COVER_SHARE, RELOCATION_LOG_ODDS, SEARCHED_S, BareHandTracker
 from rhot_app.hand.motion.hand_process import FASTEST, POSE
 from rhot_app.hand.skeleton import HandPose
+from rhot_app.tracking.contours.evidence import joints_of
 from rhot_app.tracking.contours.requests import CameraFrames
 
 Array = NDArray[np.float64]
@@ -106,17 +108,20 @@ class Finder:
     def follow(self, maps: Maps, t_s: float, dt_s: float) -> bool:
         """Look anew, now and then and when it has come to cover the foreground of `t_s` worse than of late, whether the
         hand covers it better in another pose, as far as hands go in `dt_s`. A change that was found is compared in the
-        newest maps, into which the hand has moved meanwhile. Whether it was moved."""
+        newest maps, into which the hand has moved meanwhile. Whether it was moved: edges tell better how, unless they
+        take one finger for another."""
         hand = self._hand
         state, covariance = hand.filter.predict(t_s)
         seen, change = maps.silhouettes(hand), self.change()
+        covered = hand.covered(seen, state)
+        worse = covered < hand.cover - COVER_DROP
         if change is not None:
             moved = hand.process.retract(state, change)
-            if hand.score_of(seen, moved) > hand.score_of(seen, state) + LEAST_GAIN:
+            apart_m = np.linalg.norm(joints_of(hand, moved) - joints_of(hand, state), axis=1).max()
+            if (worse or apart_m > CONFUSED_M) and hand.score_of(seen, moved) > hand.score_of(seen, state) + LEAST_GAIN:
                 hand.filter.start(t_s, moved, _widened(covariance, change))
                 return True
-        covered = hand.covered(seen, state)
-        if covered < hand.cover - COVER_DROP or t_s - self._searched_s > SEARCHED_S:
+        if worse or t_s - self._searched_s > SEARCHED_S:
             self.relocate(maps, state, covariance, dt_s)
             self._searched_s = t_s
         hand.cover += (COVER_SHARE if hand.cover else 1.0) * (covered - hand.cover)
