@@ -117,8 +117,9 @@ class Finder:
         worse = covered < hand.cover - COVER_DROP
         if change is not None:
             moved = hand.process.retract(state, change)
-            apart_m = np.linalg.norm(joints_of(hand, moved) - joints_of(hand, state), axis=1).max()
-            if (worse or apart_m > CONFUSED_M) and hand.score_of(seen, moved) > hand.score_of(seen, state) + LEAST_GAIN:
+            way = joints_of(hand, moved) - joints_of(hand, state)
+            confused = np.linalg.norm(way - way.mean(axis=0), axis=1).max() > CONFUSED_M
+            if (worse or confused) and hand.score_of(seen, moved) > hand.score_of(seen, state) + LEAST_GAIN:
                 hand.filter.start(t_s, moved, _widened(covariance, change))
                 return True
         if worse or t_s - self._searched_s > SEARCHED_S:
