@@ -119,7 +119,9 @@ class Finder:
             moved = hand.process.retract(state, change)
             way = joints_of(hand, moved) - joints_of(hand, state)
             confused = np.linalg.norm(way - way.mean(axis=0), axis=1).max() > CONFUSED_M
-            if (worse or confused) and hand.score_of(seen, moved) > hand.score_of(seen, state) + LEAST_GAIN:
+            gain = hand.score_of(seen, moved) - hand.score_of(seen, state)
+            gain += CORRELATED * (hand.prior_of(moved) - hand.prior_of(state))
+            if (worse or confused) and gain > LEAST_GAIN:
                 hand.filter.start(t_s, moved, _widened(covariance, change))
                 return True
         if worse or t_s - self._searched_s > SEARCHED_S:
