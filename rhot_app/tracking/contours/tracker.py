@@ -181,7 +181,7 @@ class ContourEstimator:
             return False
         self._waiting[frame.camera] = frame, contour
         answering = [number for number, camera in enumerate(self._cameras) if camera.answers(frame.t_row0_master_ns)]
-        return all(number in self._waiting for number in answering) and self._weigh() or due
+        return (all(number in self._waiting for number in answering) and self._weigh()) or due
 
     def _weigh(self) -> bool:
         """Weigh the edges that wait, and ask for those of the next frames. Whether a state is due."""
@@ -212,7 +212,8 @@ class ContourEstimator:
         if maps is None or maps.t_ns == self._maps_ns or self._waiting:
             return
         self._maps_ns = maps.t_ns
-        if not self._evidence.confirmed and self._evidence.seen_ns > max(self._epoch_ns, maps.t_ns - self._maps.same_ns):
+        shown_ns = max(self._epoch_ns, maps.t_ns - self._maps.same_ns)
+        if not self._evidence.confirmed and self._evidence.seen_ns > shown_ns:
             self._confirm(maps)
         t_s = self._seconds(max(maps.t_ns, self._time_ns()))
         if self._finder.follow(maps, t_s, 1e-9 * min(camera.period_ns for camera in self._cameras)):
