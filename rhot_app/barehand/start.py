@@ -152,10 +152,7 @@ def bend_fingers(surface: Surface, world: Array, angles: Array, model: HandModel
     choices: list[tuple[slice | list[int], list[Array] | Array]] = []
     if turns:
         choices.append((ANGLE_SLICES[0], thumbs))
-    for flexions in FLEXIONS[1:]:
-        free = [k for k, flexion in enumerate(flexions) if flexion not in held]
-        if free:
-            choices.append(([flexions[k] for k in free], np.radians(_CURLS_DEG)[:, free]))
+    choices += [(list(flexions), np.radians(_CURLS_DEG)) for flexions in FLEXIONS[1:] if not held & set(flexions)]
     for where, options in [*choices, *choices]:
         steps = np.zeros((1 + len(options), 27))
         for k, option in enumerate(options):
