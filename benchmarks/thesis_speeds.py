@@ -24,7 +24,6 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
@@ -34,11 +33,20 @@ from bare_scenes import model_and_surface, rig_of, right_hand  # noqa: E402
 from pictures import look_at, picture  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
 
+from rhot_app.barehand.surface import SHAPE  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
-from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, FLEXIONS, HandPose  # noqa: E402
-from rhot_app.project import PalmPlane, TrackerSettings  # noqa: E402
+from rhot_app.hand.motion.hand_process import (  # noqa: E402
+    ANGLES,
+    BIAS,
+    FASTEST,
+    PALM_SPREAD,
+    POSE,
+    VELOCITY,
+    HandProcess,
+)
+from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS, HandPose  # noqa: E402
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground  # noqa: E402
 
 DISTANCE_M, BASELINE_M = 1.52, 0.46
@@ -50,6 +58,8 @@ AMPLITUDE_M = 0.08  # half of the way to and fro; so the hand stays within the p
 LOST_M = 0.02  # neighbouring knuckles are so far apart
 SLOWEST_M_S, FASTEST_M_S, PRECISION = 0.01, 4.0, 1.1
 IMAGES = 60  # each of them may lose the hand, so slow and fast hands have as many
+HEIGHT = 7  # the palm's y in a state, whose first numbers are world_from_palm (3, 4)
+LOCKED_SD = 1e-4  # m and rad: as good as nothing
 THESIS_MM_S = 63.0  # 2.5 in/s, section 4.3.5
 
 TABLE = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
@@ -100,13 +110,39 @@ def pose_at(t_s: float, speed_m_s: float, direction_rad: float) -> HandPose:
     return HandPose(world, angles)
 
 
-def mouse_tracker(pose: HandPose) -> TrackerSettings:
-    """The thesis's 3-D mouse: its palm slides on the table, and joints that it does not let move are as in `pose`."""
-    free = {*FLEXIONS[1], ANGLE_SLICES[0].start, ANGLE_SLICES[4].start}
-    locked = {name: float(np.degrees(pose.angles[k])) for k, name in enumerate(ANGLES) if k not in free}
-    normal = TABLE[:, 2]
-    return TrackerSettings("estimator", observe="contours", locked_deg=locked, palm_plane=PalmPlane(
-        tuple(normal), float(normal @ pose.world_from_palm[:3, 3])))
+class MouseProcess(HandProcess):
+    """The hand's process with what the thesis's 3-D mouse does not let move held at a pose, as good as exactly: the
+    palm's height, two of its rotations, and the locked joints."""
+
+    def __init__(self, tracker: BareHandTracker, pose: HandPose) -> None:
+        prior = tracker.model.pose_prior
+        super().__init__(tracker.surface.dh, tracker.model.limits, prior.mean, np.linalg.inv(prior.information),
+                         PALM_SPREAD, np.full(3, FASTEST), FASTEST, tracker.shape_covariance, tracker.shape_s)
+        free = {*FLEXIONS[1], ANGLE_SLICES[0].start, ANGLE_SLICES[4].start}
+        self._still_joints = [k for k in range(21) if k not in free]
+        numbers = np.array([1, 3, 5, *(6 + k for k in self._still_joints)])
+        self._still = np.concatenate([POSE * order + numbers for order in range(3)])
+        self._still_angles = ANGLES + np.array(self._still_joints)
+        self._still_motion = VELOCITY - POSE + self._still[len(numbers):]
+        self._rest = pose
+        self._lock(np.zeros(BIAS + SHAPE), self.stationary)
+
+    def _lock(self, state: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        state[HEIGHT] = self._rest.world_from_palm[1, 3]
+        state[self._still_angles] = self._rest.angles[self._still_joints]
+        state[self._still_motion] = 0.0
+        covariance[self._still], covariance[:, self._still] = 0.0, 0.0
+        covariance[self._still, self._still] = LOCKED_SD**2
+        return state, covariance
+
+    def start(self, world: np.ndarray, angles: np.ndarray, place_sd: tuple[float, float]) -> tuple[
+            np.ndarray, np.ndarray]:
+        """See `HandProcess`."""
+        return self._lock(*super().start(world, angles, place_sd))
+
+    def predict(self, state: np.ndarray, covariance: np.ndarray, dt_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """See `Process`."""
+        return self._lock(*super().predict(state, covariance, dt_s))
 
 
 def held(case: Case, mode: str, speed_m_s: float, seed: int) -> bool:
@@ -116,10 +152,10 @@ def held(case: Case, mode: str, speed_m_s: float, seed: int) -> bool:
     cameras = cameras_of(case)
     walls = [np.full((camera.height, camera.width, 3), CLOTH) for camera in cameras]
     known = [learn_background(skin_foreground(), [one.astype(np.uint8)]) for one in walls]
-    rig = rig_of(cameras, right_hand())
+    tracker = BareHandTracker(rig_of(cameras, right_hand()), mode="feature" if mode == "features" else "contour",
+                              foreground=known)
     if case.constrained:
-        rig = msgspec.structs.replace(rig, tracker=mouse_tracker(pose_at(0.0, speed_m_s, direction)))
-    tracker = BareHandTracker(rig, mode="feature" if mode == "features" else "contour", foreground=known)
+        tracker.process = tracker.filter.process = MouseProcess(tracker, pose_at(0.0, speed_m_s, direction))
     for k in range(-REST_IMAGES, IMAGES):
         t_s = k / REST_HZ if k < 0 else k / case.rate_hz
         pose = pose_at(max(t_s, 0.0), speed_m_s, direction)
