@@ -146,10 +146,11 @@ def bend_fingers(surface: Surface, world: Array, angles: Array, model: HandModel
     """The angles (21,) with each finger as it is, open, relaxed or closed, and the thumb as it is, relaxed or to either
     side, whichever the foreground says, one after the other, twice. What the hand holds stays as it is."""
     angles, held = angles.copy(), set(model.locked)
+    turns = [k for k in (0, 1) if k not in held]  # of the thumb, about its root
     thumbs = [model.pose_prior.mean[ANGLE_SLICES[0]] + aside * np.eye(5)[which]
-              for which, aside in ((0, 0.0), *product((0, 1), (-_ASIDE, _ASIDE)))]
+              for which, aside in ((0, 0.0), *product(turns, (-_ASIDE, _ASIDE)))]
     choices: list[tuple[slice | list[int], list[Array] | Array]] = []
-    if not held & {0, 1}:
+    if turns:
         choices.append((ANGLE_SLICES[0], thumbs))
     choices += [(list(flexions), np.radians(_CURLS_DEG)) for flexions in FLEXIONS[1:] if not held & set(flexions)]
     for where, options in [*choices, *choices]:

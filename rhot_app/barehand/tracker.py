@@ -302,6 +302,11 @@ class BareHandTracker:
         world[:3] = state[:ANGLES].reshape(3, 4)
         return score(self.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE], seen)[0]
 
+    def prior_of(self, state: Array) -> float:
+        """Log probability density of the joint angles in `state`, but for a constant."""
+        prior, angles = self.model.pose_prior, state[ANGLES:VELOCITY]
+        return -0.5 * float((angles - prior.mean) @ prior.information @ (angles - prior.mean))
+
     def covered(self, seen: Silhouettes, state: Array) -> float:
         """Log odds of the hand in `state` by the foreground, per pixel of the hand."""
         world = np.eye(4)

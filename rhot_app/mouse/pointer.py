@@ -83,11 +83,21 @@ GAP_NS: Final = 250_000_000
 """ns: states farther apart are of different stays of the hand. Rehg's mouse had 10 images a second; one may be lost."""
 
 
-class _Rest:
-    """The mean of a value over the first half second in which it was known without a gap; each part of a hand has its
-    own."""
+STILL_M: Final = 0.01
+"""m: a hand that is held still moves no farther: three standard deviations between two instants of one held in the air,
+whose sway is 2 mm and 1.2 degrees (resources/motions/tap.json)."""
 
-    def __init__(self) -> None:
+STILL: Final = 0.1
+"""rad: the same of its angles."""
+
+
+class _Rest:
+    """The mean of a value over the first half second in which it was known without a gap and still; each part of a hand
+    has its own."""
+
+    def __init__(self, still: float | Array) -> None:
+        """`still`: as of the value, how far it moves at most."""
+        self._still = still
         self._first_ns = self._last_ns = -GAP_NS
         self._values: list[Array] = []
         self.mean: Array | None = None  # None until it is taken
@@ -96,7 +106,8 @@ class _Rest:
         """One more known value."""
         if self.mean is not None:
             return
-        if not self._values or not 0 <= t_ns - self._last_ns < GAP_NS:
+        gap = not 0 <= t_ns - self._last_ns < GAP_NS
+        if not self._values or gap or bool(np.any(np.abs(value - self._values[0]) > self._still)):
             self._first_ns, self._values = t_ns, []
         self._last_ns = t_ns
         self._values.append(value)
@@ -118,8 +129,9 @@ class Mouse:
 
     def rest(self) -> None:
         """Take the next half second as the hand's rest; the buttons are released."""
-        self._palm, self._index = _Rest(), _Rest()
-        self._fingers = {button: _Rest() for button in BUTTONS}
+        self._palm = _Rest(np.array([STILL, STILL, STILL, STILL_M]))  # of each row of the pose
+        self._index = _Rest(STILL_M)
+        self._fingers = {button: _Rest(STILL) for button in BUTTONS}
         self._pressed: frozenset[str] = frozenset()
 
     def feed(self, state: HandState) -> MouseState:

@@ -114,6 +114,31 @@ def test_maps_that_come_before_the_last_edges_confirm_the_hand(film) -> None:
     assert error_mm(nodes.states[-1], poses("grasp", TIMES)[-1]) < 5.0
 
 
+def test_slow_cameras_find_and_follow_a_hand(film) -> None:
+    """Of a hand that is found after the first camera's frame, the second one's edges come first."""
+    rig = bare_rig(film[0][0])
+    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
+    for number in range(13):
+        nodes.step(number, film[0][1 if number >= 3 else 2], times_ns=[FIRST_NS + 4 * number * PERIOD_NS] * 2)
+    assert nodes.states[-1].tracked and error_mm(nodes.states[-1], poses("grasp", TIMES)[0]) < 5.0
+    assert nodes.states[-1].t_master_ns == FIRST_NS + 4 * number * PERIOD_NS, "no camera's edges wait for a frame"
+
+
+def test_a_finger_that_is_taken_for_another_is_found_again(film, monkeypatch) -> None:
+    pose = poses("grasp", TIMES)[0]
+    curled = pose.angles.copy()
+    curled[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
+    rig = bare_rig(film[0][0])
+    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
+    with monkeypatch.context() as patched:
+        patched.setattr(Finder, "found", lambda _: (HandPose(pose.world_from_palm, curled), FIRST_NS))
+        for number in range(20):
+            nodes.step(number, film[0][1])
+    tip = forward(model_and_surface()[0], pose).joints[INDEX_TIP]
+    assert nodes.states[-1].tracked
+    assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.01
+
+
 def test_slices_lie_across_the_contour_of_the_next_frame(film) -> None:
     rig = bare_rig(film[0][0])
     nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
@@ -270,6 +295,7 @@ def test_landmarks_mend_a_finger_that_is_taken_for_its_neighbour(film, monkeypat
     curled = pose.angles.copy()
     curled[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
     rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
+    monkeypatch.setattr(Finder, "relocate", lambda *_: None)  # it would mend the finger, too
     nodes, number = SearchedNodes(make_tracker(rig), known(film), 21), 0
     with monkeypatch.context() as patched:
         patched.setattr(Finder, "found", lambda _: (HandPose(pose.world_from_palm, curled), FIRST_NS))

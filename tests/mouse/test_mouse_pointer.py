@@ -26,6 +26,14 @@ def test_ten_states_a_second_suffice_for_a_rest() -> None:
     assert states[0].cursor is None and states[-1].cursor == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
 
 
+def test_a_hand_that_jumps_is_not_at_rest() -> None:
+    """As one that was found wrongly at first."""
+    mouse = Mouse()
+    for number in range(REST + 5):
+        state = mouse.feed(hand_state(number, (0.05, 0.03, 0.0) if number < 5 else (0.0, 0.0, 0.0)))
+    assert state.cursor == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+
+
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_the_palm_moves_the_foot_and_nothing_else(side: str) -> None:
     mouse = rested(side=side)

@@ -11,12 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.follower import CONFUSED_M
 from rhot_app.barehand.observations import ForegroundFrame
 from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, search, silhouettes
 from rhot_app.barehand.start import STEP, find_in_maps
 from rhot_app.barehand.surface import SHAPE
-from rhot_app.barehand.tracker import COVER_DROP, COVER_SHARE, RELOCATION_LOG_ODDS, BareHandTracker
+from rhot_app.barehand.tracker import COVER_DROP, COVER_SHARE, RELOCATION_LOG_ODDS, SEARCHED_S, BareHandTracker
+from rhot_app.hand.motion.hand_process import FASTEST, POSE
 from rhot_app.hand.skeleton import HandPose
+from rhot_app.tracking.contours.evidence import joints_of
 from rhot_app.tracking.contours.requests import CameraFrames
 
 Array = NDArray[np.float64]
@@ -30,7 +33,7 @@ LEAST_GAIN = RELOCATION_LOG_ODDS * CORRELATED
 """Log odds of pixels by which another pose must cover the foreground better (`barehand.tracker`)."""
 
 SAME_MAPS_NS = 100_000_000
-"""ns: maps of different cameras farther apart are of different moments."""
+"""ns: maps of different cameras farther apart are of different moments, unless slow cameras have none nearer."""
 
 _ROUNDS = 60  # of the search about what was found, in the newest maps: half of `start.LAST_ROUNDS`, for it is near
 
@@ -56,12 +59,17 @@ class NewestMaps:
         self._cameras = cameras
         self._maps: list[ForegroundFrame | None] = [None] * len(cameras)
 
+    @property
+    def same_ns(self) -> float:
+        """How far apart maps of one moment are at most, ns."""
+        return max(SAME_MAPS_NS, 0.5 * max(camera.period_ns for camera in self._cameras))
+
     def take(self, frame: ForegroundFrame) -> Maps | None:
         """Take one in. The maps of all cameras that deliver frames, of about its moment; None while one is missing."""
         self._maps[frame.camera], t_ns = frame, frame.t_row0_master_ns
         maps: list[ForegroundFrame | None] = []
         for camera, one in zip(self._cameras, self._maps, strict=True):
-            fresh = one is not None and abs(t_ns - one.t_row0_master_ns) < SAME_MAPS_NS
+            fresh = one is not None and abs(t_ns - one.t_row0_master_ns) <= self.same_ns
             if camera.delivers(t_ns) and not fresh:
                 return None
             maps.append(one if fresh else None)
@@ -69,7 +77,7 @@ class NewestMaps:
 
 
 class Finder:
-    """`look` and `relocate` begin a search, `found` and `moved` give what came of it, once. One search at a time; all
+    """`look` and `relocate` begin a search, `found` and `change` give what came of it, once. One search at a time; all
     belong to the tracker's thread."""
 
     def __init__(self, hand: BareHandTracker) -> None:
@@ -78,13 +86,15 @@ class Finder:
         self._thread: threading.Thread | None = None
         self._newest: Maps | None = None
         self._found: tuple[int, HandPose, int] | None = None  # of which run
-        self._moved: tuple[int, Array | None] | None = None
+        self._change: tuple[int, Array] | None = None
         self._run = 0
+        self._searched_s = -np.inf
 
     def reset(self) -> None:
         """What is being looked for is not wanted any more."""
         self._run += 1
-        self._found = self._newest = self._moved = None
+        self._found = self._newest = self._change = None
+        self._searched_s = -np.inf
 
     def look(self, maps: Maps) -> None:
         """Look for a hand in these maps, or, while another search goes on, follow what it finds into them."""
@@ -96,19 +106,27 @@ class Finder:
         self._begin(self._relocate, maps, state.copy(), covariance.copy(), dt_s, self._run)
 
     def follow(self, maps: Maps, t_s: float, dt_s: float) -> bool:
-        """Move the hand to where it covers the foreground of `t_s` better, if it has come to cover it worse than of
-        late; it is then looked for as far as hands go in `dt_s`. What was found is compared in the newest maps. Whether
-        it was moved."""
+        """Look anew, now and then and when it has come to cover the foreground of `t_s` worse than of late, whether the
+        hand covers it better in another pose, as far as hands go in `dt_s`. A change that was found is compared in the
+        newest maps, into which the hand has moved meanwhile. Whether it was moved: edges tell better how, unless they
+        take one finger for another."""
         hand = self._hand
         state, covariance = hand.filter.predict(t_s)
-        seen, moved = maps.silhouettes(hand), self.moved()
+        seen, change = maps.silhouettes(hand), self.change()
         covered = hand.covered(seen, state)
-        worse = hand.cover != 0.0 and covered < hand.cover - COVER_DROP
-        if worse and moved is not None and hand.score_of(seen, moved) > hand.score_of(seen, state) + LEAST_GAIN:
-            hand.restart(t_s, moved)
-            return True
-        if worse:
+        worse = covered < hand.cover - COVER_DROP
+        if change is not None:
+            moved = hand.process.retract(state, change)
+            way = joints_of(hand, moved) - joints_of(hand, state)
+            confused = np.linalg.norm(way - way.mean(axis=0), axis=1).max() > CONFUSED_M
+            gain = hand.score_of(seen, moved) - hand.score_of(seen, state)
+            gain += CORRELATED * (hand.prior_of(moved) - hand.prior_of(state))
+            if (worse or confused) and gain > LEAST_GAIN:
+                hand.filter.start(t_s, moved, _widened(covariance, change))
+                return True
+        if worse or t_s - self._searched_s > SEARCHED_S:
             self.relocate(maps, state, covariance, dt_s)
+            self._searched_s = t_s
         hand.cover += (COVER_SHARE if hand.cover else 1.0) * (covered - hand.cover)
         return False
 
@@ -117,10 +135,10 @@ class Finder:
         found, self._found = self._found, None
         return None if found is None or found[0] != self._run else found[1:]
 
-    def moved(self) -> Array | None:
-        """The state where the hand may be, if it was found since it was asked for last."""
-        moved, self._moved = self._moved, None
-        return None if moved is None or moved[0] != self._run else moved[1]
+    def change(self) -> Array | None:
+        """The step in the tangent space to where the hand may be, if it was found since it was asked for last."""
+        change, self._change = self._change, None
+        return None if change is None or change[0] != self._run else change[1]
 
     def wait(self) -> None:
         """Until the search is over."""
@@ -144,7 +162,9 @@ class Finder:
         self._found = run, pose, maps.t_ns
 
     def _relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float, run: int) -> None:
-        self._moved = run, self._hand.relocate(maps.silhouettes(self._hand), (state, covariance), dt_s)
+        moved = self._hand.relocate(maps.silhouettes(self._hand), (state, covariance), dt_s)
+        if moved is not None:
+            self._change = run, self._hand.process.difference(moved, state)
 
     def _followed(self, pose: HandPose, maps: Maps) -> HandPose:
         """The pose in later maps, near to where it was."""
@@ -157,6 +177,16 @@ class Finder:
         world, angles, _ = search(hand.surface, pose.world_from_palm, pose.angles, covariance, hand.model.limits,
                                   np.zeros(SHAPE), seen, self._rng, _ROUNDS)
         return HandPose(world, angles)
+
+
+def _widened(covariance: Array, change: Array) -> Array:
+    """The covariance of a hand that was wrong by `change`: its pose errs by as much more, and its motion as a hand's
+    does whose pose varies so (`HandProcess.stationary`)."""
+    out = covariance.copy()
+    for order, scale in enumerate((1.0, FASTEST**2 / 3.0, FASTEST**4 / 3.0)):
+        place = range(POSE * order, POSE * (order + 1))
+        out[place, place] += scale * np.square(change[:POSE])
+    return out
 
 
 def _logged(search_for: Callable[..., None], *arguments: Any) -> None:

@@ -26,7 +26,7 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
 from rhot_app.tracking.contours.evidence import Evidence, joints_of, same_hand, seen_contour
-from rhot_app.tracking.contours.finder import LEAST_GAIN, SAME_MAPS_NS, Finder, Maps, NewestMaps
+from rhot_app.tracking.contours.finder import LEAST_GAIN, Finder, Maps, NewestMaps
 from rhot_app.tracking.contours.markers import MarkersOfHand, weigh
 from rhot_app.tracking.contours.requests import JUMP_NS, NEVER, Requests, asked
 from rhot_app.tracking.tracker import CameraObservations
@@ -173,16 +173,20 @@ class ContourEstimator:
 
     def _take_edges(self, frame: EdgeFrame) -> bool:
         """Weigh the edges of one frame once those of the other cameras are there: one camera alone tells distances
-        poorly. Ask for those of the next frames. Whether a state is due."""
-        if not self._tracking:
-            return False
-        contour = self._requests.contour(frame)
+        poorly. What waits is weighed without it if it is nearer to the frame before. Whether a state is due."""
+        contour = self._requests.contour(frame) if self._tracking else None
         if contour is None:
+            return False
+        apart_ns = max((frame.t_row0_master_ns - one.t_row0_master_ns for one, _ in self._waiting.values()), default=0)
+        due = apart_ns > 0.5 * self._cameras[frame.camera].period_ns and self._weigh()
+        if not self._tracking:
             return False
         self._waiting[frame.camera] = frame, contour
         answering = [number for number, camera in enumerate(self._cameras) if camera.answers(frame.t_row0_master_ns)]
-        if not all(number in self._waiting for number in answering):
-            return False
+        return (all(number in self._waiting for number in answering) and self._weigh()) or due
+
+    def _weigh(self) -> bool:
+        """Weigh the edges that wait, and ask for those of the next frames. Whether a state is due."""
         waiting, self._waiting = self._waiting, {}
         try:
             weigh(self._hand, self._markers, waiting, self._epoch_ns)
@@ -197,7 +201,7 @@ class ContourEstimator:
         if not self._evidence.confirmed:
             return False
         self.key_frames.offer(self._hand)
-        self._latest = frame
+        self._latest = max((one for one, _ in waiting.values()), key=lambda one: one.t_row0_master_ns)
         return True
 
     def _take_map(self, frame: ForegroundFrame) -> None:
@@ -218,7 +222,8 @@ class ContourEstimator:
         if maps.t_ns == self._maps_ns:
             return
         self._maps_ns = maps.t_ns
-        if not self._evidence.confirmed and self._evidence.seen_ns > max(self._epoch_ns, maps.t_ns - SAME_MAPS_NS):
+        shown_ns = max(self._epoch_ns, maps.t_ns - self._maps.same_ns)
+        if not self._evidence.confirmed and self._evidence.seen_ns > shown_ns:
             self._confirm(maps)
         t_s = self._seconds(max(maps.t_ns, self._time_ns()))
         if self._finder.follow(maps, t_s, 1e-9 * min(camera.period_ns for camera in self._cameras)):
@@ -227,7 +232,7 @@ class ContourEstimator:
     def _confirm(self, maps: Maps) -> None:
         """Have the hand looked for once more: two random searches agree on a wrong hand less often than one errs.
         Markers that show the same hand are as good."""
-        if maps.t_ns - self._agreed_ns < SAME_MAPS_NS:
+        if maps.t_ns - self._agreed_ns < self._maps.same_ns:
             self._evidence.confirmed = self._ever = True
             return
         found = self._finder.found()
