@@ -183,9 +183,14 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     palm_plane: PalmPlane | None = None
 
     @property
+    def by_markers(self) -> bool:
+        """Whether every hand is tracked by its markers or landmarks, and by nothing else."""
+        return self.kind == "estimator" and not self.contours
+
+    @property
     def smooths(self) -> bool:
         """Whether what is tracked can be smoothed afterwards."""
-        return self.kind == "estimator" and not self.contours
+        return self.by_markers
 
     @property
     def contours(self) -> bool:
@@ -345,15 +350,16 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                                      f"{roles[marker.marker]!r} on the hand; take it away, or name another marker")
 
     def _check_hands(self) -> None:
-        """Each hand of the rig has markers, and each marker a hand of the rig."""
+        """Each marker has a hand of the rig, and each hand that is tracked by its markers has some."""
         other = [(marker.role or "").startswith(OTHER_HAND) for marker in self.markers.markers]
         if self.other_hand is None and any(other):
             marker = self.markers.markers[other.index(True)]
             raise ValueError(f"marker {marker.id!r} has the role {marker.role!r}, which is on another hand; give the "
                              "rig that hand as other_hand, or the marker another role")
-        if self.other_hand is not None and not 0 < sum(other) < len(other):
+        if self.other_hand is not None and self.tracker.by_markers and not 0 < sum(other) < len(other):
             raise ValueError("the rig has a hand and an other_hand, but not both wear markers; those of other_hand "
-                             f"have roles that begin with \"{OTHER_HAND}\"")
+                             f"have roles that begin with \"{OTHER_HAND}\", or let bare hands be tracked "
+                             "(tracker.observe \"contours\")")
 
 
 class Obstacle(NamedTuple):
@@ -372,9 +378,6 @@ def estimator_obstacle(rig: Rig) -> Obstacle | None:
         return Obstacle("The estimator needs calibrated cameras; this rig takes distance from disparity alone "
                         "(depth.mode).",
                         "Use Calibrate, Put the cameras together, or the classic tracker (tracker.kind).")
-    if rig.tracker.contours and rig.other_hand is not None:
-        return Obstacle("The contours of one bare hand can be tracked, and this rig has two hands.",
-                        "Take other_hand out of the rig file, or track markers (tracker.observe).")
     text = next((node.name for node in rig.nodes if node.text_datagrams), None)
     if text is not None:
         return Obstacle(f"The estimator needs the time of every picture; node {text} sends text datagrams, which "

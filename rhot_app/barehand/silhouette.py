@@ -64,12 +64,12 @@ class Silhouettes(NamedTuple):
 
 def silhouettes(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequence[Array],
                 intrinsics: Sequence[Array]) -> Silhouettes:
-    """From foreground probabilities (h, w) of each camera (`foreground_map`)."""
+    """From foreground probabilities (h, w) of each camera (`foreground_map`), NaN where nothing is known."""
     height, width = max(one.shape[0] for one in maps), max(one.shape[1] for one in maps)
     odds = np.zeros((len(maps), height, width))
     for camera, one in enumerate(maps):
         sure = MISLABELLED + (1.0 - 2.0 * MISLABELLED) * np.asarray(one, dtype=np.float64)
-        odds[camera, :one.shape[0], :one.shape[1]] = np.log(sure / (1.0 - sure))
+        odds[camera, :one.shape[0], :one.shape[1]] = np.nan_to_num(np.log(sure / (1.0 - sure)))
     return Silhouettes(odds, step, np.array(poses), np.array(intrinsics))
 
 
@@ -158,8 +158,8 @@ def _arm(world, wrist, thick, bend, odds, step, pose, intrinsics, mask, a, b, sl
 
 @njit(cache=True)
 def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, parts):
-    """Log odds of a pose; `parts` (C, 3): of each camera the sum of log odds on the hand, its pixels, and the sum of
-    log odds in the ring about it. `mask` (h, w) is 0, and is so again afterwards."""
+    """Log odds of a pose; `parts` (C, 3): of each camera the sum of log odds on the hand, its pixels of which anything
+    is known, and the sum of log odds in the ring about it. `mask` (h, w) is 0, and is so again afterwards."""
     count = surface.row.shape[0]
     frames = np.empty((surface.dh.parent.shape[0], 3, 4))
     centres, radii = np.empty((count, 2, 3)), np.empty((count, 2))
@@ -196,7 +196,7 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
             for column in range(box[2], box[3] + 1):
                 value, o = mask[row, column], odds[camera, row, column]
                 mask[row, column] = 0
-                if value == 1:
+                if value == 1 and o != 0.0:  # of others it is not known what they show
                     own += o
                     area += 1.0
                 elif value == 2 and not (arm and _covers(cone, column, row)):
@@ -204,6 +204,18 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
         parts[camera, 0], parts[camera, 1], parts[camera, 2] = own, area, ring
         total += own - ring
     return total + max(arms.max(), 0.0)  # a sleeve is no foreground
+
+
+@njit(cache=True)
+def cover(centres, radii, pose, intrinsics, step, margin, mask):
+    """Mark in `mask` (h, w), every `step`-th pixel of an image, what capsules cover of it and `margin` pixels of the
+    mask about that."""
+    a, b, slope = np.empty(2), np.empty(2), np.empty((2, 3))
+    circles, box = np.empty(9), np.array([mask.shape[0], -1, mask.shape[1], -1])
+    for k in range(centres.shape[0]):
+        if _outline(centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1], pose, intrinsics, step, a, b, slope,
+                    circles):
+            _paint(circles, margin, 0.0, mask, box)
 
 
 def score(surface: Surface, world: Array, angles: Array, size: Array, images: Silhouettes) -> tuple[float, Array]:

@@ -28,7 +28,8 @@ from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.rig_arrays import without_objects
 from rhot_app.tracking.rig_objects import MarkersBeside, SmoothedObjects
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import TwoHands, require_estimator
+from rhot_app.tracking.trackers import require_estimator
+from rhot_app.tracking.two_hands import TwoHands
 
 Kept = TypeVar("Kept")
 

@@ -1,98 +1,20 @@
-"""The trackers that a rig can have, and two hands at once: an estimator for each, one state of both."""
+"""The trackers that a rig can have."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from rhot_app.errors import RigError
 from rhot_app.project import Rig, estimator_obstacle, observation_obstacle
-from rhot_app.state import HandState
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.contours.tracker import ContourEstimator
-from rhot_app.tracking.extrapolation import Extrapolator
+from rhot_app.tracking.contours.two_hands import TwoBareHands
 from rhot_app.tracking.markers.estimator import Estimator
-from rhot_app.tracking.rig_arrays import rigs_of_hands, without_objects
+from rhot_app.tracking.rig_arrays import without_objects
 from rhot_app.tracking.rig_objects import WithObjects
-from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.tracker import Tracker
+from rhot_app.tracking.two_hands import TwoHands
 
-Indices = NDArray[np.intp]
-Column = NDArray[Any]
-
-_PER_OBSERVATION = ("pixels", "covariances", "diameters", "qualities", "flags")
-_PER_MARKER = ("marker_positions", "marker_raw_positions", "marker_covariances", "marker_knowledge",
-               "epipolar_error_px")
-_PER_CAMERA = ("camera_pixels", "camera_flags")
-_WORK = ("triangulate", "filter", "solve")
-"""Stages that are gone through for one hand after the other."""
-
-_JUMP_NS = 1_000_000_000
-
-
-class TwoHands:
-    """Implements `Tracker` for a rig with an `other_hand`: states of its `hand`, whose `other` is of the other one.
-
-    The arrays of a state's markers are those of the whole rig; its `other` has its own markers only.
-    """
-
-    def __init__(self, rig: Rig, one_hand: Callable[[Rig], Tracker] = Estimator) -> None:
-        """`one_hand` makes the tracker of each hand. Raises RigError as it does."""
-        (first, own), (second, others) = rigs_of_hands(rig)
-        self._ids, self._own = rig.markers.ids, (own, others)
-        self._order = np.argsort(np.concatenate(self._own))
-        self._hand, self._other = one_hand(first), one_hand(second)
-        self._extrapolators = Extrapolator(first), Extrapolator(second)
-        self._sequence = 0
-        self._newest: list[CameraObservations | None] = [None] * len(rig.nodes)
-
-    def reset(self) -> None:
-        """Forget everything but the count of states."""
-        self._newest = [None] * len(self._newest)
-        self._hand.reset()
-        self._other.reset()
-
-    def ingest(self, observations: CameraObservations) -> None:
-        """Take one frame in; each hand gets the observations of its own markers."""
-        last = self._newest[observations.camera]
-        if last is None or not 0 <= last.t_row0_master_ns - observations.t_row0_master_ns < _JUMP_NS:
-            self._newest[observations.camera] = observations
-        for tracker, own in zip((self._hand, self._other), self._own, strict=True):
-            further = None if observations.further is None else observations.further.of(own)
-            columns = {name: getattr(observations, name)[own] for name in _PER_OBSERVATION}
-            tracker.ingest(replace(observations, further=further, **columns))
-
-    def newest_frames(self) -> tuple[CameraObservations | None, ...]:
-        """Each camera's newest frame, of all markers, None before its first."""
-        return tuple(self._newest)
-
-    def solve(self) -> HandState | None:
-        """The state after the frames since the last one, None without any."""
-        hand, other = self._hand.solve(), self._other.solve()
-        if hand is None or other is None:  # both or neither: they see the same frames
-            return None
-        self._sequence += 1
-        t_ns = max([state.t_master_ns for state in (hand, other) if state.tracked] or [hand.t_master_ns])
-        return self._merge(*(replace(extrapolator.at(state, t_ns) or state, t_master_ns=t_ns)
-                             for state, extrapolator in zip((hand, other), self._extrapolators, strict=True)))
-
-    def _merge(self, hand: HandState, other: HandState) -> HandState:
-        """The state of `hand` with the markers of both."""
-        arrays: dict[str, Any] = {name: self._gather(getattr(hand, name), getattr(other, name), axis)
-                                 for axis, names in enumerate((_PER_MARKER, _PER_CAMERA)) for name in names}
-        latency = hand.latency_s | {stage: hand.latency_s[stage] + other.latency_s[stage] for stage in _WORK}
-        return replace(hand, sequence=self._sequence - 1, marker_ids=self._ids, latency_s=latency,
-                       other=replace(other, sequence=self._sequence - 1), **arrays)
-
-    def _gather(self, hand: Column, other: Column, axis: int) -> Column:
-        """An array of both hands' markers in the rig's order; `axis` is that of the markers."""
-        return np.concatenate([hand, other], axis=axis).take(self._order, axis=axis)
-
-
-# -- Which tracker a rig gets ------------------------------------------------------------------------------------------
 
 def make_tracker(rig: Rig) -> Tracker:
     """A new tracker for `rig` and its objects. Raises RigError when the estimator cannot work with its markers, cameras
@@ -104,7 +26,7 @@ def make_tracker(rig: Rig) -> Tracker:
         require_estimator(rig)
         hand, own = without_objects(rig)
         if rig.tracker.contours:
-            tracker = ContourEstimator(hand)
+            tracker = ContourEstimator(hand) if rig.other_hand is None else TwoBareHands(hand)
         else:
             tracker = Estimator(hand) if rig.other_hand is None else TwoHands(hand)
     return WithObjects(rig, tracker, own) if rig.objects else tracker

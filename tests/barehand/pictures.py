@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numba import njit
@@ -11,6 +13,7 @@ from rhot_app.barehand.contours import camera_centre
 from rhot_app.barehand.surface import FOREARM, Surface, capsules_of, meet
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import inverse, rigid
+from rhot_app.hand.skeleton import HandPose
 
 Array = NDArray[np.float64]
 LIGHT = np.array([-0.4, -0.7, -0.59])
@@ -67,15 +70,31 @@ def picture(surface: Surface, world: Array, angles: Array, camera: CameraModel, 
             forearm_m: float = 0.4, blur_px: float = 0.8, noise: float = 2.0,
             paint: dict[int, tuple[float, float, float]] | None = None, exposure: float = 1.0) -> NDArray[np.uint8]:
     """(H, W, 3) RGB of a hand; `paint`: colours of fingertips by finger; `exposure`: as of `taken`."""
-    centres, radii = capsules_of(surface, world, angles)
-    for k in np.flatnonzero(surface.group == FOREARM):
-        line = centres[k, 1] - centres[k, 0]
-        centres[k, 1] = centres[k, 0] + line * forearm_m / np.linalg.norm(line)
+    centres, radii = _with_forearm(surface, world, angles, forearm_m)
     out, colours = background.copy(), np.tile(SKIN, (len(radii), 1))
     for finger, colour in (paint or {}).items():
         colours[np.flatnonzero(surface.group == finger)[-1]] = colour
     _cast(centres, radii, colours, camera, out)
     return taken(out, seed, blur_px, noise, exposure)
+
+
+def picture_of(hands: Sequence[tuple[Surface, HandPose]], camera: CameraModel, background: Array, seed: int,
+               forearm_m: float = 0.4) -> NDArray[np.uint8]:
+    """(H, W, 3) RGB of some hands, of which the nearer ones hide the others."""
+    out, shapes = background.copy(), [_with_forearm(surface, pose.world_from_palm, pose.angles, forearm_m)
+                                      for surface, pose in hands]
+    if shapes:
+        centres, radii = (np.concatenate(columns) for columns in zip(*shapes, strict=True))
+        _cast(centres, radii, np.tile(SKIN, (len(radii), 1)), camera, out)
+    return taken(out, seed)
+
+
+def _with_forearm(surface: Surface, world: Array, angles: Array, forearm_m: float) -> tuple[Array, Array]:
+    centres, radii = capsules_of(surface, world, angles)
+    for k in np.flatnonzero(surface.group == FOREARM):
+        line = centres[k, 1] - centres[k, 0]
+        centres[k, 1] = centres[k, 0] + line * forearm_m / np.linalg.norm(line)
+    return centres, radii
 
 
 def person(camera: CameraModel, background: Array, place: Array) -> Array:

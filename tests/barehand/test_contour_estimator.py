@@ -7,7 +7,7 @@ from collections.abc import Callable
 import msgspec
 import numpy as np
 import pytest
-from bare_scenes import DISTANCE_M, left_hand, model_and_surface, poses, rig_of, right_hand, scene
+from bare_scenes import DISTANCE_M, model_and_surface, poses, rig_of, right_hand, scene
 from pictures import look_at, picture, taken, wall
 from scipy.stats import chi2
 
@@ -342,17 +342,10 @@ def test_a_fingertip_that_contradicts_the_contours_makes_its_finger_uncertain(fi
         assert np.mean(others == Knowledge.MEASURED) > 0.9, "the rest is as certain as before"
 
 
-def with_second_hand(rig: Rig) -> Rig:
-    markers = msgspec.structs.replace(rig.markers, markers=(
-        msgspec.structs.replace(rig.markers.markers[0], role="other_index_tip"), *rig.markers.markers[1:]))
-    return msgspec.structs.replace(rig, markers=markers, other_hand=left_hand())
-
-
 @pytest.mark.parametrize(("change", "sentence"), [
     (lambda rig: with_tracker(rig, "classic"), ""),
     (lambda rig: msgspec.structs.replace(rig, depth=msgspec.structs.replace(rig.depth, mode="disparity")),
      "needs calibrated cameras"),
-    (with_second_hand, "contours of one bare hand.*Take other_hand out"),
     (lambda rig: msgspec.structs.replace(rig, tracker=TrackerSettings("estimator", observe="landmarks_and_contours")),
      "RHOT six.*has none. Give the rig a set with landmarks"),
 ])

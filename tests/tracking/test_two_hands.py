@@ -16,7 +16,8 @@ from rhot_app.project import OTHER_HAND, Rig, TrackerSettings, parse_rig
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.trackers import TwoHands, make_tracker
+from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.two_hands import TwoHands
 from rhot_node.files import resource_path
 
 RIGHT, LEFT = model_rig("rhot8"), model_rig("rhot8", side="left")

@@ -107,17 +107,17 @@ class Evidence:
 
 
 def on_foreground(hand: BareHandTracker, frame: ForegroundFrame, state: Array) -> tuple[float, float]:
-    """Part of the 21 joints of a hand in `state` that lie in a camera's image, and of these, that lie on foreground."""
+    """Part of the 21 joints of a hand in `state` that lie in a camera's image where anything is known of it, and of
+    these, that lie on foreground."""
     camera = hand.cameras[frame.camera]
     places = camera.project(joints_of(hand, state))
     with np.errstate(invalid="ignore"):
         inside = np.all((places > -0.5) & (places < [camera.width - 0.5, camera.height - 0.5]), axis=1)
-    if not inside.any():
-        return 0.0, 0.0
     rows, columns = frame.probability.shape
     x, y = (places[inside] // frame.step).astype(int).T
-    shown = frame.probability[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)] > 0.5
-    return float(np.mean(inside)), float(np.mean(shown))
+    shown = frame.probability[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)]
+    shown = shown[~np.isnan(shown)]
+    return len(shown) / len(places), float(np.mean(shown > 0.5)) if len(shown) else 0.0
 
 
 def same_hand(hand: BareHandTracker, state: Array, pose: HandPose) -> bool:

@@ -18,6 +18,7 @@ from rhot_app.barehand.observations import EdgeFrame, SliceRequest
 from rhot_app.barehand.start import STEP
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.motion.hand_process import MOTION
+from rhot_app.tracking.contours.occlusion import Capsules, visible
 from rhot_app.tracking.markers.estimator import WRONG_AFTER_PERIODS
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.detect.edges import Edges
@@ -90,10 +91,12 @@ class _Expected(NamedTuple):
 class Requests:
     """Requests about one hand; `cameras`: when the frames of each come."""
 
-    def __init__(self, hand: BareHandTracker, predict: Callable[[int], tuple[Array, Array]]) -> None:
-        """`predict`: the hand's state and covariance at a master time, ns."""
+    def __init__(self, hand: BareHandTracker, predict: Callable[[int], tuple[Array, Array]],
+                 beside: Callable[[int], Capsules | None], most: int = SLICES_MAX) -> None:
+        """`predict`: the hand's state and covariance at a master time, ns; `beside`: another hand then, which may hide
+        this one. `most`: slices of one request."""
         self.cameras = [CameraFrames() for _ in hand.cameras]
-        self._hand, self._predict = hand, predict
+        self._hand, self._predict, self._beside, self._most = hand, predict, beside, most
         self._requests: list[SliceRequest] = []
         self._place = object()
 
@@ -133,8 +136,8 @@ class Requests:
         """Have the node search the frame after the one at `t_row0_ns`, where the hand will be then."""
         camera = self.cameras[number]
         camera.target_ns = t_row0_ns + round(camera.period_ns)
-        state, covariance = self._predict(camera.target_ns + self._middle_ns(number))
-        contour = asked(self._hand, number, state, covariance, STEP_M)
+        t_ns = camera.target_ns + self._middle_ns(number)
+        contour = asked(self._hand, number, *self._predict(t_ns), STEP_M, self._beside(t_ns), self._most)
         camera.searched = len(contour.slices) > 0
         self._requests = [one for one in self._requests if one.camera != number]
         self._requests.append(SliceRequest(number, contour.slices, STEP, _Expected(self._place, contour)))
@@ -158,32 +161,40 @@ class Requests:
             contour = copy.copy(expected.contour)  # for this frame
             contour.observe(frame.edges)
             return contour
-        return matched(self._hand, frame, *self._predict(frame.t_row0_master_ns + self._middle_ns(frame.camera)))
+        t_ns = frame.t_row0_master_ns + self._middle_ns(frame.camera)
+        return matched(self._hand, frame, *self._predict(t_ns), self._beside(t_ns))
 
     def _middle_ns(self, camera: int) -> int:
         """From the exposure of row 0 to that of the middle row, ns."""
         return round(0.5e9 * self._hand.row_s[camera] * self._hand.cameras[camera].height)
 
 
-def asked(hand: BareHandTracker, camera: int, state: Array, covariance: Array, step_m: float) -> ContourFrame:
+def asked(hand: BareHandTracker, camera: int, state: Array, covariance: Array, step_m: float,
+          beside: Capsules | None = None, most: int = SLICES_MAX) -> ContourFrame:
     """The slices across the contours of a hand in `state`, whose centres lie in the image, rounded as they are sent; of
-    more than a request may have, every second or third."""
+    more than `most`, every second or third. Those that a hand `beside` it hides are left out."""
     frame, model = hand.expected(camera, state, covariance, step_m), hand.cameras[camera]
     x, y = frame.slices[:, 0], frame.slices[:, 1]
-    kept = np.flatnonzero((x >= 0.0) & (y >= 0.0) & (x <= model.width - 1) & (y <= model.height - 1))
-    kept = kept[::max(math.ceil(len(kept) / SLICES_MAX), 1)]
+    good = (x >= 0.0) & (y >= 0.0) & (x <= model.width - 1) & (y <= model.height - 1)
+    if beside is not None:
+        good &= visible(hand, frame, model, state, beside)
+    kept = np.flatnonzero(good)
+    kept = kept[::max(math.ceil(len(kept) / most), 1)]
     return _on(hand, camera, frame, kept, unpack_slices(pack_slices(frame.slices[kept])))
 
 
-def matched(hand: BareHandTracker, frame: EdgeFrame, state: Array, covariance: Array) -> ContourFrame | None:
+def matched(hand: BareHandTracker, frame: EdgeFrame, state: Array, covariance: Array,
+            beside: Capsules | None = None) -> ContourFrame | None:
     """The contour of a hand in `state` on the slices of a recorded request that cross it, with their edges; the frame
-    stays as it is. None without any."""
+    stays as it is. None without any. `beside`: as of `asked`."""
     expected, slices = hand.expected(frame.camera, state, covariance, 0.5 * STEP_M), frame.request.slices
     if not len(expected.slices) or not len(slices):
         return None
     apart = slices[:, None, :2] - expected.pixel[None]
     distance = np.hypot(*apart.transpose(2, 0, 1))
     distance += np.where(slices[:, 2:4] @ expected.normal.T < ALIKE, 1e6, 0.0)
+    if beside is not None:
+        distance += np.where(visible(hand, expected, hand.cameras[frame.camera], state, beside), 0.0, 1e6)
     nearest = np.argmin(distance, axis=1)
     order = np.argsort(expected.points.capsule[nearest], kind="stable")
     reach = distance[np.arange(len(slices)), nearest]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,9 +28,11 @@ from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
 from rhot_app.tracking.contours.evidence import Evidence, joints_of, same_hand, seen_contour
 from rhot_app.tracking.contours.finder import LEAST_GAIN, Finder, Maps, NewestMaps
 from rhot_app.tracking.contours.markers import MarkersOfHand, weigh
+from rhot_app.tracking.contours.occlusion import Capsules
 from rhot_app.tracking.contours.requests import JUMP_NS, NEVER, Requests, asked
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
+from rhot_node.wire.slices import SLICES_MAX
 
 Array = NDArray[np.float64]
 Estimate = tuple[Array, Array]
@@ -39,11 +41,14 @@ Estimate = tuple[Array, Array]
 class ContourEstimator:
     """Implements `Tracker` and `ImageTracking`: a state after the edges of every frame."""
 
-    def __init__(self, rig: Rig) -> None:
-        """Raises RigError when markers are observed and one has no place on the hand."""
-        self._rig = rig
+    def __init__(self, rig: Rig, hands: int = 1) -> None:
+        """`hands`: share the nodes' requests. Raises RigError when markers are observed and one has no place on the
+        hand."""
+        self._rig, self._most = rig, SLICES_MAX // hands
+        self.beside: Callable[[int], Capsules | None] = lambda _: None
+        self.overlaps = [False] * len(rig.nodes)  # in the image of a camera, with another hand
         self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale)
-        self._markers = MarkersOfHand(rig, self._hand) if rig.tracker.observe != "contours" else None
+        self._markers = MarkersOfHand(rig, self._hand) if _marked(rig) else None
         self._finder = Finder(self._hand)
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._names = tuple(node.name for node in rig.nodes)
@@ -63,7 +68,7 @@ class ContourEstimator:
         if self._markers is not None:
             self._markers.reset()
         self._hand.frames, self._hand.cover, self._hand.tracking = [None] * len(self._names), 0.0, False
-        self._requests = Requests(self._hand, self._predict)
+        self._requests = Requests(self._hand, self._predict, lambda t_ns: self.beside(t_ns), self._most)
         self._cameras = self._requests.cameras
         self._evidence, self._maps = Evidence(self._hand, self._cameras), NewestMaps(self._cameras)
         self._waiting: dict[int, tuple[EdgeFrame, ContourFrame]] = {}
@@ -125,6 +130,37 @@ class ContourEstimator:
     def wait(self) -> None:
         """Until the hand that is looked for is found or not."""
         self._finder.wait()
+
+    # -- beside another hand -------------------------------------------------------------------------------------------
+
+    @property
+    def hand(self) -> BareHandTracker:
+        """What follows it."""
+        return self._hand
+
+    @property
+    def tracking(self) -> bool:
+        """Whether a hand is followed, perhaps one that is not confirmed."""
+        return self._tracking
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether a hand is followed that was found twice."""
+        return self._tracking and self._evidence.confirmed
+
+    def state_at(self, t_ns: int) -> Array:
+        """Of the hand that is followed, at master time `t_ns` or at its newest instant."""
+        return self._predict(max(t_ns, self._time_ns()))[0]
+
+    def start(self, pose: HandPose, t_ns: int) -> None:
+        """Follow the hand from a pose on."""
+        self._start(pose, t_ns)
+
+    def give_up(self) -> None:
+        """Follow it no longer, and look for a hand."""
+        self._give_up()
+
+    # -- Tracker -------------------------------------------------------------------------------------------------------
 
     def solve(self) -> HandState | None:
         """The state after the frames since the last one; None when they tell nothing new."""
@@ -210,7 +246,7 @@ class ContourEstimator:
         if not self._tracking:
             self._begin(maps)
             return
-        self._evidence.take_map(frame, self._predict(max(frame.t_row0_master_ns, self._time_ns()))[0])
+        self._evidence.take_map(frame, self.state_at(frame.t_row0_master_ns))
         self._unjudged = maps or self._unjudged
 
     def _judge(self) -> None:
@@ -225,6 +261,8 @@ class ContourEstimator:
         shown_ns = max(self._epoch_ns, maps.t_ns - self._maps.same_ns)
         if not self._evidence.confirmed and self._evidence.seen_ns > shown_ns:
             self._confirm(maps)
+        if any(self.overlaps):  # what foreground is whose, it does not say
+            return
         t_s = self._seconds(max(maps.t_ns, self._time_ns()))
         if self._finder.follow(maps, t_s, 1e-9 * min(camera.period_ns for camera in self._cameras)):
             self._requests.renew()
@@ -326,6 +364,11 @@ class ContourEstimator:
             frame.t_row0_master_ns, Condition.LOST if self._ever else Condition.SEARCHING)
         return _published(hand, self._sequence - 1, frame, self.newest_frames(), self._rig.markers.ids, self._names,
                          time.perf_counter() - begun)
+
+
+def _marked(rig: Rig) -> bool:
+    """Whether the hand's markers are observed, of which it may have none beside another hand."""
+    return rig.tracker.observe != "contours" and len(rig.markers.markers) > 0
 
 
 def _published(hand: HandState, sequence: int, frame: CameraObservations | EdgeFrame,

@@ -158,7 +158,11 @@ class TrackerDialog(QDialog):
     def _choose(self) -> None:
         settings = self.chosen
         if settings != self._rig.tracker:
-            rig = msgspec.structs.replace(self._rig, tracker=settings)
+            try:
+                rig = msgspec.structs.replace(self._rig, tracker=settings)
+            except ValueError as exc:  # the rig cannot be tracked so, as two hands of which one has no markers
+                self._failed(f"{str(exc)[:1].upper()}{str(exc)[1:]}.")
+                return
             obstacle = observation_obstacle(rig)
             if obstacle is not None:
                 self._failed(f"{obstacle.why} {obstacle.remedy}")

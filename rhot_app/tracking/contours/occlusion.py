@@ -1,0 +1,79 @@
+"""What one hand covers of another in a camera's image: its contour, and its foreground."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_app.barehand.contour_residual import ContourFrame
+from rhot_app.barehand.contours import BESIDE_M, INNER, JUMP_M
+from rhot_app.barehand.silhouette import FOREARM_M, FOREARM_SPREAD, cover
+from rhot_app.barehand.surface import FOREARM, SHAPE, capsules_of, meet
+from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Capsules = tuple[Array, Array]
+"""`centres` (N, 2, 3) m and `radii` (N, 2) m of a hand and its forearm."""
+
+
+def capsules_in(hand: BareHandTracker, state: Array) -> Capsules:
+    """The capsules of a hand in `state`, with its forearm as far as the elbow."""
+    centres, radii = _own_capsules(hand, state)
+    for k in np.flatnonzero(hand.surface.group == FOREARM):
+        along = centres[k, 1] - centres[k, 0]
+        centres[k, 1] = centres[k, 0] + FOREARM_M / np.linalg.norm(along) * along
+        radii[k, 1] = radii[k, 0] + FOREARM_SPREAD * FOREARM_M
+    return centres, radii
+
+
+def visible(hand: BareHandTracker, frame: ContourFrame, camera: CameraModel, state: Array, other: Capsules) -> Mask:
+    """Which points (K,) of a hand's contour in `state` another hand does not hide. Where the other one is behind, the
+    contour is noted as one before skin."""
+    points = frame.points
+    centres, radii = _own_capsules(hand, state)
+    along = points.along[:, None]
+    ends, r = centres[points.capsule], radii[points.capsule]
+    way = (1.0 - along) * ends[:, 0] + along * ends[:, 1] - camera.centre
+    r_there = (1.0 - points.along) * r[:, 0] + points.along * r[:, 1]
+    far = np.sqrt(np.maximum(np.sum(way * way, axis=1) - r_there**2, 0.0))
+    beside = points.pixel + (BESIDE_M * points.scale)[:, None] * points.normal
+    met = _nearest(camera.centre, _rays(camera, beside), *other)
+    points.behind[np.isfinite(met)] = INNER
+    return np.asarray(met > far + JUMP_M)
+
+
+def covered(camera: CameraModel, other: Capsules, shape: tuple[int, int], step: int) -> Mask:
+    """Which of every `step`-th pixel, an array of `shape`, another hand covers, or may: its contour is known to about
+    one of them."""
+    mask = np.zeros(shape, np.uint8)
+    cover(*other, np.ascontiguousarray(camera.camera_from_world[:3]), camera.intrinsics, step, 1.0, mask)
+    return mask > 0
+
+
+def _own_capsules(hand: BareHandTracker, state: Array) -> Capsules:
+    world = np.eye(4)
+    world[:3] = state[:ANGLES].reshape(3, 4)
+    return capsules_of(hand.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE].copy())
+
+
+def _rays(camera: CameraModel, pixels: Array) -> Array:
+    """(K, 3) unit directions, world, of pixels (K, 2)."""
+    rays = np.column_stack([camera.undistort(pixels), np.ones(len(pixels))]) @ camera.world_from_camera[:3, :3].T
+    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+
+
+@njit(cache=True)
+def _nearest(o, rays, centres, radii):
+    """(K,) m: how far along each ray (K, 3) from `o` (3,) the nearest capsule is met; inf without any."""
+    found = np.full(rays.shape[0], np.inf)
+    for i in range(rays.shape[0]):
+        for k in range(centres.shape[0]):
+            t = meet(o[0], o[1], o[2], rays[i, 0], rays[i, 1], rays[i, 2], centres[k, 0], centres[k, 1], radii[k, 0],
+                     radii[k, 1])
+            if 0.0 < t < found[i]:
+                found[i] = t
+    return found

@@ -1,0 +1,265 @@
+"""Two bare hands at once: a `ContourEstimator` for each. The nodes search the contours of both.
+
+What one hand covers of an image says nothing of the other one. Each is looked for in the rest of the foreground, and
+its contour where the other one does not hide it. Two hands that come to be estimated in one place are one: the
+foreground decides which.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.barehand.key_frames import KeyFrames
+from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest
+from rhot_app.barehand.silhouette import CORRELATED, score
+from rhot_app.barehand.surface import SHAPE
+from rhot_app.barehand.tracker import RELOCATION_LOG_ODDS, START_SD, BareHandTracker
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
+from rhot_app.hand.skeleton import JOINT_SLICES
+from rhot_app.project import Rig
+from rhot_app.state import HandState, SeenContour
+from rhot_app.tracking.contours.evidence import APART_M, joints_of
+from rhot_app.tracking.contours.finder import LEAST_GAIN, SAME_MAPS_NS, Finder, Maps
+from rhot_app.tracking.contours.occlusion import Capsules, capsules_in, covered
+from rhot_app.tracking.contours.requests import JUMP_NS, NEVER
+from rhot_app.tracking.contours.tracker import ContourEstimator
+from rhot_app.tracking.two_hands import TwoHands
+from rhot_node.detect.edges import Edges
+
+Array = NDArray[np.float64]
+
+_OF_PALM = [0, *(joints.start for joints in JOINT_SLICES[1:])]  # wrist and knuckles
+
+
+class TwoBareHands(TwoHands):
+    """Implements `Tracker` and `ImageTracking` for a rig with an `other_hand`: a state after the edges of every
+    frame."""
+
+    def __init__(self, rig: Rig) -> None:
+        """Raises RigError as `ContourEstimator`."""
+        super().__init__(rig, lambda own: ContourEstimator(own, hands=2))
+        assert isinstance(self._hand, ContourEstimator) and isinstance(self._other, ContourEstimator)
+        self._both = self._hand, self._other
+        for hand in self._both:
+            hand.beside = partial(self._beside, hand)
+        self._cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
+        self._challengers = Finder(self._other.hand), Finder(self._hand.hand)
+        self._thick_m = 1e-3 * rig.hand.palm_thickness_mm
+        self._begin_again()
+
+    def reset(self) -> None:
+        """Forget everything but the count of states."""
+        super().reset()
+        self._begin_again()
+
+    def _begin_again(self) -> None:
+        self._asked: list[list[SliceRequest | None]] = [[None, None] for _ in self._newest]
+        self._maps: list[ForegroundFrame | None] = [None] * len(self._newest)
+        self._states: list[HandState | None] = [None, None]
+        self._published_ns = NEVER
+        self._gains: list[float | None] = [None, None]  # in log odds, if the other hand were where one is
+        for finder in self._challengers:
+            finder.reset()
+
+    # -- images --------------------------------------------------------------------------------------------------------
+
+    def ingest_image(self, frame: ImageFrame) -> None:
+        """Take the edges or the foreground of one frame in."""
+        if isinstance(frame, EdgeFrame):
+            self._take_edges(frame)
+            return
+        self._maps[frame.camera] = frame
+        t_ns = frame.t_row0_master_ns
+        if self._both[0].tracking and self._both[1].tracking:
+            self._keep_apart(t_ns)
+        for number in range(2):
+            self._challenge(number, t_ns)
+        shown = [self._shown_to(number, frame) for number in range(2)]
+        for hand, one in zip(self._both, shown, strict=True):
+            hand.ingest_image(one)
+
+    def _take_edges(self, frame: EdgeFrame) -> None:
+        """Give each hand the edges of its own slices; in a log, which does not say whose they are, all."""
+        own = frame.request.expected
+        if own is None:
+            for hand in self._both:
+                hand.ingest_image(frame)
+            return
+        first = 0
+        for hand, request in zip(self._both, own, strict=True):
+            if request is None or not len(request.slices):
+                continue
+            part = slice(first, first + len(request.slices))
+            first = part.stop
+            edges = Edges._make(column[part] for column in frame.edges)
+            hand.ingest_image(replace(frame, request=request, edges=edges))
+
+    def _shown_to(self, number: int, frame: ForegroundFrame) -> ForegroundFrame:
+        """The foreground for one hand: nothing is known where the other one may hide it."""
+        hand, t_ns = self._both[number], frame.t_row0_master_ns
+        hand.overlaps[frame.camera] = False
+        other = self._beside(hand, t_ns)
+        if other is None:
+            return frame
+        masked = self._without(other, frame)
+        if not hand.tracking:
+            return masked
+        camera = self._cameras[frame.camera]
+        places = [joints_of(one.hand, one.state_at(t_ns)) for one in (hand, self._both[1 - number])]
+        columns, rows = (camera.project(places[0]) // frame.step).T
+        inside = (columns >= 0) & (rows >= 0) & (columns < masked.probability.shape[1]) & (
+            rows < masked.probability.shape[0])
+        hand.overlaps[frame.camera] = bool(np.isnan(
+            masked.probability[rows[inside].astype(int), columns[inside].astype(int)]).any())
+        far = [float(np.linalg.norm(one[_OF_PALM].mean(axis=0) - camera.centre)) for one in places]
+        return masked if far[1] < far[0] else frame
+
+    def _without(self, other: Capsules, frame: ForegroundFrame) -> ForegroundFrame:
+        probability = frame.probability.copy()
+        probability[covered(self._cameras[frame.camera], other, probability.shape, frame.step)] = np.nan
+        return replace(frame, probability=probability)
+
+    def _beside(self, hand: ContourEstimator, t_ns: int) -> Capsules | None:
+        """The other hand, once it is confirmed."""
+        other = self._both[1] if hand is self._both[0] else self._both[0]
+        return capsules_in(other.hand, other.state_at(t_ns)) if other.confirmed else None
+
+    # -- which hand is which -------------------------------------------------------------------------------------------
+
+    def _keep_apart(self, t_ns: int) -> None:
+        """Where both are nearer to each other than a hand is thick, give the less probable one up, unless it shows
+        foreground that the other one does not."""
+        states = [one.state_at(t_ns) for one in self._both]
+        places = [joints_of(one.hand, state) for one, state in zip(self._both, states, strict=True)]
+        if _apart_m(*places) > self._thick_m:
+            return
+        maps = self._newest_maps(t_ns)
+        odds = [_log_odds(one.hand, state, maps) + RELOCATION_LOG_ODDS * one.confirmed
+                for one, state in zip(self._both, states, strict=True)]
+        worse = int(odds[0] >= odds[1])
+        one, better = self._both[worse], self._both[1 - worse]
+        rest = self._newest_maps(t_ns, capsules_in(better.hand, states[1 - worse]))
+        if _shown(one.hand, states[worse], rest) < LEAST_GAIN:
+            one.give_up()
+
+    def _challenge(self, number: int, t_ns: int) -> None:
+        """Once a hand is confirmed, see whether the other one explains the same foreground better: a left hand's back
+        looks much like a right hand's palm. Two that are confirmed can only have changed places."""
+        hand, other, finder = self._both[number], self._both[1 - number], self._challengers[number]
+        if not hand.confirmed:
+            self._gains[number] = None
+            finder.reset()
+        if not hand.confirmed or self._gains[number] is not None:
+            return
+        found = finder.found()
+        if found is None:
+            finder.look(self._newest_maps(t_ns, self._beside(hand, t_ns)))
+            return
+        pose, found_ns = found
+        state = hand.state_at(found_ns)
+        if _apart_m(joints_of(hand.hand, state), forward(other.hand.model, pose).joints) > APART_M:
+            return
+        maps = self._newest_maps(t_ns)
+        instead, _ = other.hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
+        gain = _log_odds(other.hand, instead, maps) - _log_odds(hand.hand, state, maps)
+        self._gains[number] = gain
+        others = self._gains[1 - number] if other.confirmed else 0.0
+        if others is not None and gain + others > RELOCATION_LOG_ODDS:
+            hand.give_up()
+            other.start(pose, found_ns)
+
+    def _newest_maps(self, t_ns: int, without: Capsules | None = None) -> Maps:
+        """The foreground of about `t_ns`, with nothing known where a hand is that is left out."""
+        maps = [one if one is not None and abs(t_ns - one.t_row0_master_ns) < SAME_MAPS_NS else None
+                for one in self._maps]
+        if without is not None:
+            maps = [None if one is None else self._without(without, one) for one in maps]
+        return Maps(t_ns, [None if one is None else one.probability for one in maps])
+
+    def requests(self) -> list[SliceRequest]:
+        """What the nodes shall search now, for both hands."""
+        changed = set()
+        for number, hand in enumerate(self._both):
+            for request in hand.requests():
+                self._asked[request.camera][number] = request
+                changed.add(request.camera)
+        found = []
+        for camera in sorted(changed):
+            own = [one for one in self._asked[camera] if one is not None]
+            found.append(SliceRequest(camera, np.vstack([one.slices for one in own]),
+                                      max(one.map_step for one in own), tuple(self._asked[camera])))
+        return found
+
+    def warm_up(self) -> None:
+        """See `ImageTracking`."""
+        for hand in self._both:
+            hand.warm_up()
+
+    def wait(self) -> None:
+        """Until the hands that are looked for are found or not."""
+        for one in (*self._both, *self._challengers):
+            one.wait()
+
+    # -- states --------------------------------------------------------------------------------------------------------
+
+    def solve(self) -> HandState | None:
+        """The state after the frames since the last one; None when they tell nothing new."""
+        fresh = [hand.solve() for hand in self._both]
+        self._states = [before if new is None else new for before, new in zip(self._states, fresh, strict=True)]
+        hand, other = self._states
+        if hand is None or other is None:  # both begin with the first frame
+            return None
+        tracked = hand.tracked or other.tracked
+        if not any(new is not None and new.tracked >= tracked for new in fresh):
+            return None
+        t_ns = max(state.t_master_ns for state in (hand, other) if state.tracked >= tracked)
+        if tracked and 0 <= self._published_ns - t_ns < JUMP_NS:
+            return None
+        self._published_ns = t_ns
+        received_ns = max(hand.t_receive_ns, other.t_receive_ns)
+        return self._merged_at(t_ns, replace(hand, t_receive_ns=received_ns), replace(other, t_receive_ns=received_ns))
+
+    def seen(self) -> list[SeenContour]:
+        """See `ShowsContours`; of both hands in one image."""
+        found: dict[str, SeenContour] = {}
+        for one in (contour for hand in self._both for contour in hand.seen()):
+            first = found.get(one.camera)
+            found[one.camera] = one if first is None else SeenContour(
+                one.camera, max(first.t_master_ns, one.t_master_ns),
+                *(np.concatenate([getattr(first, name), getattr(one, name)]) for name in _OF_CONTOUR))
+        return list(found.values())
+
+    @property
+    def key_frames(self) -> KeyFrames:
+        """Of the rig's first hand (`KeepsKeyFrames`)."""
+        return self._both[0].key_frames
+
+
+_OF_CONTOUR = "contour", "outline", "slices", "edges", "of_hand"
+
+
+def _apart_m(ours: Array, theirs: Array) -> float:
+    """How far apart the palms of two hands with joints (21, 3) m are."""
+    return float(np.linalg.norm((ours - theirs)[_OF_PALM].mean(axis=0)))
+
+
+def _log_odds(hand: BareHandTracker, state: Array, maps: Maps) -> float:
+    """Of a hand in `state`, by the foreground and by how hands are bent."""
+    bent = state[ANGLES:VELOCITY] - hand.model.pose_prior.mean
+    return hand.score_of(maps.silhouettes(hand), state) / CORRELATED - 0.5 * float(
+        bent @ hand.model.pose_prior.information @ bent)
+
+
+def _shown(hand: BareHandTracker, state: Array, maps: Maps) -> float:
+    """Log odds of the pixels that a hand in `state` covers; what lies about it does not count."""
+    world = np.eye(4)
+    world[:3] = state[:ANGLES].reshape(3, 4)
+    _, parts = score(hand.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE].copy(),
+                     maps.silhouettes(hand))
+    return float(parts[:, 0].sum())

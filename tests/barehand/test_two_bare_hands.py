@@ -1,0 +1,182 @@
+"""Two bare hands at once, with nodes that search drawn pictures: found, followed, lost, one before the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+import pytest
+from bare_scenes import DISTANCE_M, left_hand, model_and_surface, poses, rig_of, right_hand
+from pictures import picture_of, taken, two_cameras, wall
+
+from rhot_app.errors import RigError
+from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.skeleton import HandPose
+from rhot_app.project import Rig, TrackerSettings, load_rig, save_rig, with_tracker
+from rhot_app.state import Condition, HandState
+from rhot_app.tracking.contours.finder import Finder
+from rhot_app.tracking.trackers import make_tracker
+from rhot_node.detect.foreground import learn_background, skin_foreground
+from rhot_node.wire.slices import SLICES_MAX
+
+SIDES = "right", "left"
+ASIDE_M = 0.1
+CAMERAS = two_cameras(distance=DISTANCE_M)
+WALLS = [wall(camera, 10 * k + 1, False) for k, camera in enumerate(CAMERAS)]
+EMPTY = [taken(one, 0) for one in WALLS]
+
+
+def two_bare_hands(**settings: str) -> Rig:
+    return msgspec.structs.replace(rig_of(CAMERAS, right_hand()), other_hand=left_hand(),
+                                   tracker=TrackerSettings("estimator", **{"observe": "contours"} | settings))
+
+
+def at(side: str, place: Sequence[float], t_s: float = 0.0) -> HandPose:
+    """A hand in the motion that it makes, its palm's middle at `place` from the middle of the scene, m."""
+    pose = poses("spread" if side == "right" else "pinch", (t_s,), side)[0]
+    world = pose.world_from_palm.copy()
+    middle = forward(model_and_surface(side)[0], pose).joints[[0, 9]].mean(axis=0)
+    world[:3, 3] += np.array([0.0, -0.02, DISTANCE_M]) + place - middle
+    return HandPose(world, pose.angles)
+
+
+def shown(hands: dict[str, HandPose], number: int) -> list[np.ndarray]:
+    return [picture_of([(model_and_surface(side)[1], pose) for side, pose in hands.items()], camera, WALLS[c], number)
+            for c, camera in enumerate(CAMERAS)]
+
+
+def nodes_of(rig: Rig, *, forget: bool = False) -> SearchedNodes:
+    return SearchedNodes(make_tracker(rig), [learn_background(skin_foreground(), [one]) for one in EMPTY],
+                         len(rig.markers.ids), forget=forget)
+
+
+def states_of(state: HandState) -> dict[str, HandState]:
+    assert state.other is not None
+    return {"right": state, "left": state.other}
+
+
+def error_mm(state: HandState, side: str, pose: HandPose) -> float:
+    truth = forward(model_and_surface(side)[0], pose).joints
+    return 1e3 * float(np.mean(np.linalg.norm(state.joint_positions - truth, axis=1)))
+
+
+def given(patched: pytest.MonkeyPatch, hands: dict[str, HandPose], t_ns: int = FIRST_NS) -> None:
+    """Have each hand found there, instead of searching."""
+    found = {model_and_surface(side)[0].mirror: pose for side, pose in hands.items()}
+    patched.setattr(Finder, "_look", lambda *_: None)
+    patched.setattr(Finder, "found", lambda one: (found[one._hand.model.mirror], t_ns))
+
+
+HOME = {side: at(side, (sign * ASIDE_M, 0.0, 0.0)) for side, sign in zip(SIDES, (1.0, -1.0), strict=True)}
+
+
+@pytest.fixture(scope="module")
+def still() -> list[np.ndarray]:
+    return shown(HOME, 0)
+
+
+def until_tracked(nodes: SearchedNodes, images: list[np.ndarray], number: int) -> int:
+    first = number
+    while not nodes.states or not all(one.tracked for one in states_of(nodes.states[-1]).values()):
+        assert number < first + 40, "both are found"
+        nodes.step(number, images)
+        number += 1
+    return number
+
+
+@pytest.mark.parametrize("forget", [False, True], ids=["live", "from a log"])
+def test_both_are_found_and_one_leaves_and_comes_back(still: list[np.ndarray], forget: bool) -> None:
+    nodes, number = nodes_of(two_bare_hands(), forget=forget), 0
+    for _ in range(3):
+        nodes.step(number, EMPTY)
+        number += 1
+    assert nodes.states[-1].condition == nodes.states[-1].other.condition == Condition.SEARCHING
+    number = until_tracked(nodes, still, number)
+    for _ in range(12):
+        nodes.step(number, still)
+        number += 1
+    assert all(error_mm(one, side, HOME[side]) < 2.0 for side, one in states_of(nodes.states[-1]).items())
+    assert nodes.states[-1].other.t_master_ns == nodes.states[-1].t_master_ns
+    assert all(len(request.slices) > 300 for request in nodes.asked)
+    assert len(nodes.tracker.seen()) == len(CAMERAS)
+    for _ in range(20):
+        nodes.step(number, shown({"right": HOME["right"]}, 1))
+        number += 1
+        right = nodes.states[-1]
+        assert right.tracked and error_mm(right, "right", HOME["right"]) < 3.0, "it goes on undisturbed"
+    assert nodes.states[-1].other.condition is Condition.LOST
+    assert np.isnan(nodes.states[-1].other.joint_positions).all()
+    until_tracked(nodes, still, number)
+    times_ns = [state.t_master_ns for state in nodes.states if state.tracked]
+    assert (np.diff(times_ns) > 0).all()
+
+
+def test_a_hand_that_passes_before_the_other_is_undisturbed_and_both_go_on(monkeypatch) -> None:
+    """The left hand passes 6 cm before the right one, which rests."""
+    places = {"right": (0.0, 0.0, 0.03)}
+    nodes, number = nodes_of(two_bare_hands()), 0
+    hands = {"right": at("right", places["right"]), "left": at("left", (-0.13, 0.0, -0.03))}
+    with monkeypatch.context() as patched:
+        given(patched, hands)
+        number = until_tracked(nodes, shown(hands, 0), number)
+    monkeypatch.setattr(Finder, "_look", lambda *_: None)  # nothing is found anew meanwhile
+    for _ in range(6):
+        nodes.step(number, shown(hands, 0))
+        number += 1
+    errors = []
+    way = np.linspace(0.0, 1.0, 50)
+    for x_m in np.append(-0.13 + 0.26 * (3.0 * way**2 - 2.0 * way**3), np.full(6, 0.13)):
+        hands["left"] = at("left", (x_m, 0.0, -0.03))
+        nodes.step(number, shown(hands, number))
+        number += 1
+        states = states_of(nodes.states[-1])
+        assert all(one.tracked for one in states.values()), "lost"
+        errors.append([error_mm(one, side, hands[side]) for side, one in states.items()])
+    right, left = np.array(errors).T
+    assert np.median(left) < 2.0 and left.max() < 25.0, "the nearer one is tracked as if it were alone"
+    assert right[-1] < 0.5e3 * 0.13, "the one that was hidden is nearer to its own place than to the other one's"
+    assert nodes.states[-1].t_master_ns == FIRST_NS + (number - 1) * PERIOD_NS
+
+
+def test_hands_that_are_taken_for_each_other_change_places(still: list[np.ndarray], monkeypatch) -> None:
+    """The first search takes each one's back for the other one's palm."""
+    turned = {}
+    for side, other in zip(SIDES, SIDES[::-1], strict=True):
+        world = HOME[other].world_from_palm @ np.diag([1.0, -1.0, -1.0, 1.0])
+        turned[side] = HandPose(world, model_and_surface(side)[0].pose_prior.mean.copy())
+    nodes, number = nodes_of(two_bare_hands()), 0
+    with monkeypatch.context() as patched:
+        given(patched, turned)
+        number = until_tracked(nodes, still, number)
+    assert all(error_mm(one, side, HOME[side]) > 100.0 for side, one in states_of(nodes.states[-1]).items())
+    first = number
+    while any(not one.tracked or error_mm(one, side, HOME[side]) > 20.0
+              for side, one in states_of(nodes.states[-1]).items()):
+        assert number < first + 40
+        nodes.step(number, still)
+        number += 1
+
+
+def test_the_slices_of_both_fit_a_request(monkeypatch) -> None:
+    """Hands so near that each alone would ask for more than its half."""
+    near = {side: at(side, (x_m, 0.0, 0.28 - DISTANCE_M)) for side, x_m in zip(SIDES, (0.07, -0.07), strict=True)}
+    nodes = nodes_of(two_bare_hands())
+    monkeypatch.setattr("rhot_app.tracking.contours.requests.STEP_M", 1e-3)
+    given(monkeypatch, near)
+    for number in range(6):
+        nodes.step(number, shown(near, 0))
+    assert all(SLICES_MAX // 2 < len(request.slices) <= SLICES_MAX for request in nodes.asked)
+
+
+def test_a_rig_of_two_bare_hands_is_a_file_and_markers_need_a_wearer(tmp_path) -> None:
+    rig = two_bare_hands()
+    save_rig(tmp_path / "rig.json", rig)
+    assert load_rig(tmp_path / "rig.json") == rig
+    assert with_tracker(rig, "classic").other_hand is not None, "it tracks the first hand"
+    make_tracker(msgspec.structs.replace(rig, tracker=TrackerSettings("estimator", observe="both")))
+    text = (tmp_path / "rig.json").read_text().replace('"contours"', '"markers"')
+    (tmp_path / "rig.json").write_text(text)
+    with pytest.raises(RigError, match=r"not both wear markers.*bare hands"):
+        load_rig(tmp_path / "rig.json")
