@@ -58,11 +58,10 @@ def test_recorded_slices_that_the_hand_does_not_cross_say_nothing(hand: BareHand
                    covariance) is None
 
 
-def test_more_slices_than_a_request_has_are_thinned_out(hand: BareHandTracker, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_slices_than_a_request_has_are_thinned_out(hand: BareHandTracker) -> None:
     pose, covariance = poses("grasp", (0.5,))[0], 1e-6 * np.eye(hand.process.size)
     every = asked(hand, 0, state_of(pose), covariance, STEP_M)
-    monkeypatch.setattr("rhot_app.tracking.contours.requests.SLICES_MAX", 100)
-    requests = Requests(hand, lambda _: (state_of(pose), covariance))
+    requests = Requests(hand, lambda _: (state_of(pose), covariance), lambda _: None, 100)
     requests.ask(0, 0)
     request, = requests.take()
     assert 50 < len(request.slices) <= 100 < len(every.slices)

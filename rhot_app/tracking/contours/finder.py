@@ -33,7 +33,7 @@ LEAST_GAIN = RELOCATION_LOG_ODDS * CORRELATED
 """Log odds of pixels by which another pose must cover the foreground better (`barehand.tracker`)."""
 
 SAME_MAPS_NS = 100_000_000
-"""ns: maps of different cameras farther apart are of different moments, unless slow cameras have none nearer."""
+"""ns: what was seen so far apart may still be of one place of a hand that is looked for."""
 
 _ROUNDS = 60  # of the search about what was found, in the newest maps: half of `start.LAST_ROUNDS`, for it is near
 
@@ -61,8 +61,8 @@ class NewestMaps:
 
     @property
     def same_ns(self) -> float:
-        """How far apart maps of one moment are at most, ns."""
-        return max(SAME_MAPS_NS, 0.5 * max(camera.period_ns for camera in self._cameras))
+        """How far apart maps of one moment are at most, ns: half a period, but for jitter."""
+        return 0.75 * max(camera.period_ns for camera in self._cameras)
 
     def take(self, frame: ForegroundFrame) -> Maps | None:
         """Take one in. The maps of all cameras that deliver frames, of about its moment; None while one is missing."""

@@ -26,7 +26,7 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
 from rhot_app.tracking.contours.evidence import Evidence, joints_of, same_hand, seen_contour
-from rhot_app.tracking.contours.finder import LEAST_GAIN, Finder, Maps, NewestMaps
+from rhot_app.tracking.contours.finder import LEAST_GAIN, SAME_MAPS_NS, Finder, Maps, NewestMaps
 from rhot_app.tracking.contours.markers import MarkersOfHand, weigh
 from rhot_app.tracking.contours.occlusion import Capsules
 from rhot_app.tracking.contours.requests import JUMP_NS, NEVER, Requests, asked
@@ -149,8 +149,8 @@ class ContourEstimator:
         return self._tracking and self._evidence.confirmed
 
     def state_at(self, t_ns: int) -> Array:
-        """Of the hand that is followed, at master time `t_ns` or at its newest instant."""
-        return self._predict(max(t_ns, self._time_ns()))[0]
+        """Of the hand that is followed, at master time `t_ns`."""
+        return self._predict(t_ns)[0]
 
     def start(self, pose: HandPose, t_ns: int) -> None:
         """Follow the hand from a pose on."""
@@ -258,19 +258,18 @@ class ContourEstimator:
         if maps.t_ns == self._maps_ns:
             return
         self._maps_ns = maps.t_ns
-        shown_ns = max(self._epoch_ns, maps.t_ns - self._maps.same_ns)
+        shown_ns = max(self._epoch_ns, maps.t_ns - max(SAME_MAPS_NS, self._maps.same_ns))
         if not self._evidence.confirmed and self._evidence.seen_ns > shown_ns:
             self._confirm(maps)
         if any(self.overlaps):  # what foreground is whose, it does not say
             return
-        t_s = self._seconds(max(maps.t_ns, self._time_ns()))
-        if self._finder.follow(maps, t_s, 1e-9 * min(camera.period_ns for camera in self._cameras)):
+        if self._finder.follow(maps, self._seconds(maps.t_ns), 1e-9 * min(camera.period_ns for camera in self._cameras)):
             self._requests.renew()
 
     def _confirm(self, maps: Maps) -> None:
         """Have the hand looked for once more: two random searches agree on a wrong hand less often than one errs.
         Markers that show the same hand are as good."""
-        if maps.t_ns - self._agreed_ns < self._maps.same_ns:
+        if maps.t_ns - self._agreed_ns < SAME_MAPS_NS:
             self._evidence.confirmed = self._ever = True
             return
         found = self._finder.found()

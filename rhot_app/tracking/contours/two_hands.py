@@ -103,10 +103,10 @@ class TwoBareHands(TwoHands):
     def _shown_to(self, number: int, frame: ForegroundFrame) -> ForegroundFrame:
         """The foreground for one hand: nothing is known where the other one may hide it."""
         hand, t_ns = self._both[number], frame.t_row0_master_ns
-        hand.overlaps[frame.camera] = False
         other = self._beside(hand, t_ns)
-        if other is None:
+        if other is None:  # one that was lost beside this hand is there until it is found
             return frame
+        hand.overlaps[frame.camera] = False
         masked = self._without(other, frame)
         if not hand.tracking:
             return masked
