@@ -263,7 +263,7 @@ class ContourEstimator:
             self._confirm(maps)
         if any(self.overlaps):  # what foreground is whose, it does not say
             return
-        if self._finder.follow(maps, self._seconds(maps.t_ns), 1e-9 * min(camera.period_ns for camera in self._cameras)):
+        if self._finder.follow(maps, self._seconds(maps.t_ns), 1e-9 * min(one.period_ns for one in self._cameras)):
             self._requests.renew()
 
     def _confirm(self, maps: Maps) -> None:
