@@ -104,11 +104,11 @@ def warm_bare_hand(rig: Rig) -> None:
     """Compile what tracks a bare hand, and what fits one to pictures."""
     # not above: nothing of these files is compiled, so they decide no cache
     from rhot_app.handfit.session import warm_up
-    from rhot_app.tracking.contours.tracker import ContourEstimator
+    from rhot_app.tracking.contours.two_hands import TwoBareHands
 
     warm_up(rig, contours=True)
     settings = TrackerSettings(kind="estimator", observe="contours")
-    ContourEstimator(msgspec.structs.replace(rig, tracker=settings)).warm_up()
+    TwoBareHands(msgspec.structs.replace(rig, tracker=settings, other_hand=rig.hand)).warm_up()
 
 
 def warm_outputs(rig: Rig) -> None:

@@ -85,19 +85,23 @@ class _Hand:
         world, angles = np.eye(4), np.clip(numbers[ANGLES:VELOCITY], *self._limits.T)
         world[:3] = numbers[:ANGLES].reshape(3, 4)
         table, points = scaled_table(self._table, state.hand_scale), np.empty((len(self._table.point_row), 3))
+        before = np.empty_like(points)
+        forward_arrays(table, state.world_from_palm, state.angles, empty_frames(table), before)
         forward_arrays(table, world, angles, empty_frames(table), points)
+        points -= before  # the state's own points may be of another shape than the file's
         columns = self.columns if len(state.marker_ids) > len(self.columns) else np.arange(len(self.columns))
         positions, covariances = state.marker_positions.copy(), state.marker_covariances.copy()
         way_m = (dt_s * state.joint_velocity_sd + 0.5 * dt_s**2 * state.joint_acceleration_sd
                  + math.sqrt(3.0) * noise_sd[0])  # the palm's; fast fingers may add some millimetres
-        positions[columns] = points[26:]
+        positions[columns] += points[26:]
         covariances[columns] = _grown(covariances[columns], way_m[self._joints])
         pose_sd = np.sqrt(np.concatenate([np.diag(state.palm_covariance), state.angle_sd**2]))
         way = dt_s * state.velocity_sd + 0.5 * dt_s**2 * state.acceleration_sd + noise_sd
         growth = 1.0 + way / np.maximum(pose_sd, 1e-12)
         return replace(
             later, world_from_palm=world, angles=angles, velocity=numbers[VELOCITY:ACCELERATION],
-            acceleration=numbers[ACCELERATION:], joint_positions=points[:21], fingertip_positions=points[21:26],
+            acceleration=numbers[ACCELERATION:], joint_positions=state.joint_positions + points[:21],
+            fingertip_positions=state.fingertip_positions + points[21:26],
             marker_positions=positions, marker_covariances=covariances,
             joint_covariances=_grown(state.joint_covariances, way_m),
             fingertip_covariances=_grown(state.fingertip_covariances, way_m[_FINGERTIPS]),

@@ -105,10 +105,10 @@ def _scale(rig: Rig, frames: list[CameraObservations]) -> Scale:
     from rhot_app.tracking.refinement.refined_rig import Scale
     from rhot_app.tracking.trackers import make_tracker
 
-    floating = msgspec.structs.replace(rig, tracker=TrackerSettings(kind="estimator", float_scale=True))
     try:
+        floating = msgspec.structs.replace(rig, tracker=TrackerSettings(kind="estimator", float_scale=True))
         tracker = make_tracker(floating)
-    except RhotError:
+    except (RhotError, ValueError):  # a rig cannot be tracked so if one of its hands has no markers
         return Scale()
     since_ns, scale = frames[-1].t_row0_master_ns - round(1e9 * SCALE_S), Scale()
     for frame in frames:

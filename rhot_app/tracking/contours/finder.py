@@ -106,10 +106,10 @@ class Finder:
         self._begin(self._relocate, maps, state.copy(), covariance.copy(), dt_s, self._run)
 
     def follow(self, maps: Maps, t_s: float, dt_s: float) -> bool:
-        """Look anew, now and then and when it has come to cover the foreground of `t_s` worse than of late, whether the
-        hand covers it better in another pose, as far as hands go in `dt_s`. A change that was found is compared in the
-        newest maps, into which the hand has moved meanwhile. Whether it was moved: edges tell better how, unless they
-        take one finger for another."""
+        """Search anew every SEARCHED_S, and when the hand covers the foreground of `t_s` worse than of late. The search
+        asks whether another pose, as far away as hands go in `dt_s`, covers it better. A change that was found is
+        compared in the newest maps, into which the hand has moved meanwhile. Whether it was moved: edges tell better
+        how, unless they take one finger for another."""
         hand = self._hand
         state, covariance = hand.filter.predict(t_s)
         seen, change = maps.silhouettes(hand), self.change()

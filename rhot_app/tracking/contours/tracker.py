@@ -46,7 +46,6 @@ class ContourEstimator:
         hand."""
         self._rig, self._most = rig, SLICES_MAX // hands
         self.beside: Callable[[int], Capsules | None] = lambda _: None
-        self.overlaps = [False] * len(rig.nodes)  # in the image of a camera, with another hand
         self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale)
         self._markers = MarkersOfHand(rig, self._hand) if _marked(rig) else None
         self._finder = Finder(self._hand)
@@ -73,7 +72,7 @@ class ContourEstimator:
         self._evidence, self._maps = Evidence(self._hand, self._cameras), NewestMaps(self._cameras)
         self._waiting: dict[int, tuple[EdgeFrame, ContourFrame]] = {}
         self._unjudged: Maps | None = None
-        self._epoch_ns = 0
+        self._epoch_ns, self.overlaps = 0, [False] * len(self._names)
         self._maps_ns = self._agreed_ns = NEVER
         self._tracking = self._ever = False
         self._latest: CameraObservations | EdgeFrame | None = None
@@ -155,6 +154,11 @@ class ContourEstimator:
     def start(self, pose: HandPose, t_ns: int) -> None:
         """Follow the hand from a pose on."""
         self._start(pose, t_ns)
+
+    @property
+    def same_ns(self) -> float:
+        """How far apart maps of one moment are at most, ns."""
+        return self._maps.same_ns
 
     def give_up(self) -> None:
         """Follow it no longer, and look for a hand."""
@@ -261,7 +265,7 @@ class ContourEstimator:
         shown_ns = max(self._epoch_ns, maps.t_ns - max(SAME_MAPS_NS, self._maps.same_ns))
         if not self._evidence.confirmed and self._evidence.seen_ns > shown_ns:
             self._confirm(maps)
-        if any(self.overlaps):  # what foreground is whose, it does not say
+        if any(self.overlaps):  # in an image, with another hand: what foreground is whose, it does not say
             return
         if self._finder.follow(maps, self._seconds(maps.t_ns), 1e-9 * min(one.period_ns for one in self._cameras)):
             self._requests.renew()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,23 +17,32 @@ from numpy.typing import NDArray
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest
 from rhot_app.barehand.silhouette import CORRELATED, score
+from rhot_app.barehand.start import STEP
 from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import RELOCATION_LOG_ODDS, START_SD, BareHandTracker
 from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import Rig
 from rhot_app.state import HandState, SeenContour
 from rhot_app.tracking.contours.evidence import APART_M, joints_of
-from rhot_app.tracking.contours.finder import LEAST_GAIN, SAME_MAPS_NS, Finder, Maps
-from rhot_app.tracking.contours.occlusion import Capsules, capsules_in, covered
+from rhot_app.tracking.contours.finder import LEAST_GAIN, Finder, Maps
+from rhot_app.tracking.contours.occlusion import Capsules, capsules_in, covered, visible
 from rhot_app.tracking.contours.requests import JUMP_NS, NEVER
 from rhot_app.tracking.contours.tracker import ContourEstimator
 from rhot_app.tracking.two_hands import TwoHands
 from rhot_node.detect.edges import Edges
 
 Array = NDArray[np.float64]
+
+class _OfBoth(NamedTuple):
+    """The requests for one camera of which one for both hands was made; None of a hand that has asked for nothing."""
+
+    hand: SliceRequest | None
+    other: SliceRequest | None
+
 
 _OF_PALM = [0, *(joints.start for joints in JOINT_SLICES[1:])]  # wrist and knuckles
 
@@ -63,6 +73,7 @@ class TwoBareHands(TwoHands):
         self._maps: list[ForegroundFrame | None] = [None] * len(self._newest)
         self._states: list[HandState | None] = [None, None]
         self._published_ns = NEVER
+        self._beside_ns, self._looked_ns = [NEVER, NEVER], [NEVER, NEVER]
         self._gains: list[float | None] = [None, None]  # in log odds, if the other hand were where one is
         for finder in self._challengers:
             finder.reset()
@@ -90,6 +101,7 @@ class TwoBareHands(TwoHands):
         if own is None:
             for hand in self._both:
                 hand.ingest_image(frame)
+        if not isinstance(own, _OfBoth):  # or it was asked by a tracker before this one
             return
         first = 0
         for hand, request in zip(self._both, own, strict=True):
@@ -104,17 +116,21 @@ class TwoBareHands(TwoHands):
         """The foreground for one hand: nothing is known where the other one may hide it."""
         hand, t_ns = self._both[number], frame.t_row0_master_ns
         other = self._beside(hand, t_ns)
-        if other is None:  # one that was lost beside this hand is there until it is found
+        if other is None:  # one that was lost beside this hand is there still, for a while
+            if not 0 <= t_ns - self._beside_ns[number] < JUMP_NS:
+                hand.overlaps[frame.camera] = False
             return frame
+        self._beside_ns[number] = t_ns
         hand.overlaps[frame.camera] = False
         masked = self._without(other, frame)
         if not hand.tracking:
             return masked
         camera = self._cameras[frame.camera]
         places = [joints_of(one.hand, one.state_at(t_ns)) for one in (hand, self._both[1 - number])]
-        columns, rows = (camera.project(places[0]) // frame.step).T
-        inside = (columns >= 0) & (rows >= 0) & (columns < masked.probability.shape[1]) & (
-            rows < masked.probability.shape[0])
+        with np.errstate(invalid="ignore"):  # behind the camera
+            columns, rows = (camera.project(places[0]) // frame.step).T
+            inside = (columns >= 0) & (rows >= 0) & (columns < masked.probability.shape[1]) & (
+                rows < masked.probability.shape[0])
         hand.overlaps[frame.camera] = bool(np.isnan(
             masked.probability[rows[inside].astype(int), columns[inside].astype(int)]).any())
         far = [float(np.linalg.norm(one[_OF_PALM].mean(axis=0) - camera.centre)) for one in places]
@@ -159,7 +175,9 @@ class TwoBareHands(TwoHands):
             return
         found = finder.found()
         if found is None:
-            finder.look(self._newest_maps(t_ns, self._beside(hand, t_ns)))
+            if not 0 <= t_ns - self._looked_ns[number] < JUMP_NS:  # a search takes a processor
+                self._looked_ns[number] = t_ns
+                finder.look(self._newest_maps(t_ns, self._beside(hand, t_ns)))
             return
         pose, found_ns = found
         state = hand.state_at(found_ns)
@@ -176,7 +194,7 @@ class TwoBareHands(TwoHands):
 
     def _newest_maps(self, t_ns: int, without: Capsules | None = None) -> Maps:
         """The foreground of about `t_ns`, with nothing known where a hand is that is left out."""
-        maps = [one if one is not None and abs(t_ns - one.t_row0_master_ns) < SAME_MAPS_NS else None
+        maps = [one if one is not None and abs(t_ns - one.t_row0_master_ns) <= self._both[0].same_ns else None
                 for one in self._maps]
         if without is not None:
             maps = [None if one is None else self._without(without, one) for one in maps]
@@ -193,13 +211,19 @@ class TwoBareHands(TwoHands):
         for camera in sorted(changed):
             own = [one for one in self._asked[camera] if one is not None]
             found.append(SliceRequest(camera, np.vstack([one.slices for one in own]),
-                                      max(one.map_step for one in own), tuple(self._asked[camera])))
+                                      max(one.map_step for one in own), _OfBoth(*self._asked[camera])))
         return found
 
     def warm_up(self) -> None:
         """See `ImageTracking`."""
         for hand in self._both:
             hand.warm_up()
+        one, camera = self._both[0].hand, self._cameras[0]
+        world = camera.world_from_camera @ rigid(np.eye(3), np.array([0.0, 0.0, 0.5]))
+        state, covariance = one.process.start(world, one.model.pose_prior.mean.copy(), START_SD[:2])
+        capsules = capsules_in(one, state)
+        covered(camera, capsules, (60, 80), STEP)
+        visible(one, one.expected(0, state, covariance), camera, state, capsules)
 
     def wait(self) -> None:
         """Until the hands that are looked for are found or not."""
@@ -218,6 +242,8 @@ class TwoBareHands(TwoHands):
         tracked = hand.tracked or other.tracked
         if not any(new is not None and new.tracked >= tracked for new in fresh):
             return None
+        if any(state.tracked and not one.confirmed for state, one in zip((hand, other), self._both, strict=True)):
+            return None  # it was given up; its next state says so
         t_ns = max(state.t_master_ns for state in (hand, other) if state.tracked >= tracked)
         if tracked and 0 <= self._published_ns - t_ns < JUMP_NS:
             return None

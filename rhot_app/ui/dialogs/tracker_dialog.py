@@ -156,18 +156,30 @@ class TrackerDialog(QDialog):
         return with_mouse_model(rig, settings.palm_plane or table).tracker
 
     def _choose(self) -> None:
-        settings = self.chosen
+        try:
+            settings = self.chosen
+            rig = self._tracked_by(settings)
+            settings = rig.tracker
+        except ValueError as exc:  # the rig cannot be tracked so, as two hands of which one has no markers
+            self._failed(f"{str(exc)[:1].upper()}{str(exc)[1:]}.")
+            return
         if settings != self._rig.tracker:
-            try:
-                rig = msgspec.structs.replace(self._rig, tracker=settings)
-            except ValueError as exc:  # the rig cannot be tracked so, as two hands of which one has no markers
-                self._failed(f"{str(exc)[:1].upper()}{str(exc)[1:]}.")
-                return
             obstacle = observation_obstacle(rig)
             if obstacle is not None:
                 self._failed(f"{obstacle.why} {obstacle.remedy}")
                 return
             self._change(rig, f"choosing the tracker {settings_text(settings)}")
+
+    def _tracked_by(self, settings: TrackerSettings) -> Rig:
+        """The rig tracked so. Of the classic tracker, which leads on from markers only, a rig without markers on its
+        hands goes on to their contours. Raises ValueError for a rig that cannot be tracked so."""
+        try:
+            return msgspec.structs.replace(self._rig, tracker=settings)
+        except ValueError:
+            if self._rig.tracker.kind != "classic":
+                raise
+            contours = msgspec.structs.replace(settings, observe="contours")
+            return msgspec.structs.replace(self._rig, tracker=contours)
 
     def use_size(self) -> None:
         """Put the estimated size into the rig's hand."""
