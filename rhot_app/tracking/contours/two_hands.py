@@ -19,7 +19,7 @@ from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFram
 from rhot_app.barehand.silhouette import CORRELATED, score
 from rhot_app.barehand.start import STEP
 from rhot_app.barehand.surface import SHAPE
-from rhot_app.barehand.tracker import RELOCATION_LOG_ODDS, START_SD, BareHandTracker
+from rhot_app.barehand.tracker import RELOCATION_LOG_ODDS, SEARCHED_S, START_SD, BareHandTracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.kinematics import forward
@@ -87,10 +87,12 @@ class TwoBareHands(TwoHands):
             return
         self._maps[frame.camera] = frame
         t_ns = frame.t_row0_master_ns
-        if self._both[0].tracking and self._both[1].tracking:
-            self._keep_apart(t_ns)
-        for number in range(2):
-            self._challenge(number, t_ns)
+        apart_ns = [abs(t_ns - one.t_row0_master_ns) for one in self._maps if one is not None]
+        if not any(self._both[0].same_ns < apart < JUMP_NS for apart in apart_ns):  # all cameras' are of this moment
+            if self._both[0].tracking and self._both[1].tracking:
+                self._keep_apart(t_ns)
+            for number in range(2):
+                self._challenge(number, t_ns)
         shown = [self._shown_to(number, frame) for number in range(2)]
         for hand, one in zip(self._both, shown, strict=True):
             hand.ingest_image(one)
@@ -175,7 +177,7 @@ class TwoBareHands(TwoHands):
             return
         found = finder.found()
         if found is None:
-            if not 0 <= t_ns - self._looked_ns[number] < JUMP_NS:  # a search takes a processor
+            if not 0 <= t_ns - self._looked_ns[number] < 1e9 * SEARCHED_S:  # a search takes a processor
                 self._looked_ns[number] = t_ns
                 finder.look(self._newest_maps(t_ns, self._beside(hand, t_ns)))
             return
