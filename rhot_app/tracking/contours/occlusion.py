@@ -46,7 +46,7 @@ def visible(hand: BareHandTracker, frame: ContourFrame, camera: CameraModel, sta
     return np.asarray(met > far + JUMP_M)
 
 
-def covered(camera: CameraModel, other: Capsules, shape: tuple[int, int], step: int) -> Mask:
+def occluded_pixels(camera: CameraModel, other: Capsules, shape: tuple[int, int], step: int) -> Mask:
     """Which of every `step`-th pixel, an array of `shape`, another hand covers, or may: its contour is known to about
     one of them."""
     mask = np.zeros(shape, np.uint8)

@@ -29,13 +29,14 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState, SeenContour
 from rhot_app.tracking.contours.evidence import APART_M, joints_of
 from rhot_app.tracking.contours.finder import LEAST_GAIN, Finder, Maps
-from rhot_app.tracking.contours.occlusion import Capsules, capsules_in, covered, visible
+from rhot_app.tracking.contours.occlusion import Capsules, capsules_in, occluded_pixels, visible
 from rhot_app.tracking.contours.requests import JUMP_NS, NEVER
 from rhot_app.tracking.contours.tracker import ContourEstimator
 from rhot_app.tracking.two_hands import TwoHands
 from rhot_node.detect.edges import Edges
 
 Array = NDArray[np.float64]
+
 
 class _OfBoth(NamedTuple):
     """The requests for one camera of which one for both hands was made; None of a hand that has asked for nothing."""
@@ -59,7 +60,7 @@ class TwoBareHands(TwoHands):
         for hand in self._both:
             hand.beside = partial(self._beside, hand)
         self._cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
-        self._challengers = Finder(self._other.hand), Finder(self._hand.hand)
+        self._alternatives = Finder(self._other.hand), Finder(self._hand.hand)
         self._thick_m = 1e-3 * rig.hand.palm_thickness_mm
         self._begin_again()
 
@@ -75,7 +76,7 @@ class TwoBareHands(TwoHands):
         self._published_ns = NEVER
         self._beside_ns, self._looked_ns = [NEVER, NEVER], [NEVER, NEVER]
         self._gains: list[float | None] = [None, None]  # in log odds, if the other hand were where one is
-        for finder in self._challengers:
+        for finder in self._alternatives:
             finder.reset()
 
     # -- images --------------------------------------------------------------------------------------------------------
@@ -92,7 +93,7 @@ class TwoBareHands(TwoHands):
             if self._both[0].tracking and self._both[1].tracking:
                 self._keep_apart(t_ns)
             for number in range(2):
-                self._challenge(number, t_ns)
+                self._compare_sides(number, t_ns)
         shown = [self._shown_to(number, frame) for number in range(2)]
         for hand, one in zip(self._both, shown, strict=True):
             hand.ingest_image(one)
@@ -140,7 +141,7 @@ class TwoBareHands(TwoHands):
 
     def _without(self, other: Capsules, frame: ForegroundFrame) -> ForegroundFrame:
         probability = frame.probability.copy()
-        probability[covered(self._cameras[frame.camera], other, probability.shape, frame.step)] = np.nan
+        probability[occluded_pixels(self._cameras[frame.camera], other, probability.shape, frame.step)] = np.nan
         return replace(frame, probability=probability)
 
     def _beside(self, hand: ContourEstimator, t_ns: int) -> Capsules | None:
@@ -166,10 +167,10 @@ class TwoBareHands(TwoHands):
         if _shown(one.hand, states[worse], rest) < LEAST_GAIN:
             one.give_up()
 
-    def _challenge(self, number: int, t_ns: int) -> None:
+    def _compare_sides(self, number: int, t_ns: int) -> None:
         """Once a hand is confirmed, see whether the other one explains the same foreground better: a left hand's back
         looks much like a right hand's palm. Two that are confirmed can only have changed places."""
-        hand, other, finder = self._both[number], self._both[1 - number], self._challengers[number]
+        hand, other, finder = self._both[number], self._both[1 - number], self._alternatives[number]
         if not hand.confirmed:
             self._gains[number] = None
             finder.reset()
@@ -224,12 +225,12 @@ class TwoBareHands(TwoHands):
         world = camera.world_from_camera @ rigid(np.eye(3), np.array([0.0, 0.0, 0.5]))
         state, covariance = one.process.start(world, one.model.pose_prior.mean.copy(), START_SD[:2])
         capsules = capsules_in(one, state)
-        covered(camera, capsules, (60, 80), STEP)
+        occluded_pixels(camera, capsules, (60, 80), STEP)
         visible(one, one.expected(0, state, covariance), camera, state, capsules)
 
     def wait(self) -> None:
         """Until the hands that are looked for are found or not."""
-        for one in (*self._both, *self._challengers):
+        for one in (*self._both, *self._alternatives):
             one.wait()
 
     # -- states --------------------------------------------------------------------------------------------------------
