@@ -103,8 +103,8 @@ second. Errors of edges and of the surface last as long, and would move the leng
 
 RELOCATION_LOG_ODDS = 20.0
 """Log odds by which a pose that was searched for must be better than the predicted one: twice what the surface's own
-error changes them by. 0.5 mm along each side of a finger and 1 mm along the palm (`contour_residual.COMMON`) are 10
-before two cameras."""
+error changes them by. By estimate, 0.5 mm along each side of a finger and 1 mm along the palm
+(`contour_residual.COMMON`) are 10 before two cameras."""
 
 SEARCHED_S = 0.2
 """s: a hand is searched for anew at least so often, which is how long a wrong pose may last. Chosen: about a

@@ -10,6 +10,7 @@ import pytest
 from bare_scenes import DISTANCE_M, left_hand, model_and_surface, poses, rig_of, right_hand
 from pictures import picture_of, taken, two_cameras, wall
 
+from rhot_app.barehand.observations import EdgeFrame, SliceRequest
 from rhot_app.errors import RigError
 from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
 from rhot_app.hand.kinematics import forward
@@ -18,6 +19,7 @@ from rhot_app.project import Rig, TrackerSettings, load_rig, save_rig, with_trac
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.contours.finder import Finder
 from rhot_app.tracking.trackers import make_tracker
+from rhot_node.detect.edges import find_edges
 from rhot_node.detect.foreground import learn_background, skin_foreground
 from rhot_node.wire.slices import SLICES_MAX
 
@@ -153,6 +155,16 @@ def test_hands_that_are_taken_for_each_other_change_places(still: list[np.ndarra
         assert number < first + 40
         nodes.step(number, still)
         number += 1
+
+
+def test_edges_that_one_hand_alone_was_asked_about_are_left_out() -> None:
+    """The rig has got a second hand while answers were under way."""
+    tracker = make_tracker(two_bare_hands())
+    slices = np.tile([100.0, 100.0, 1.0, 0.0, 5.0], (3, 1))
+    edges = find_edges(EMPTY[0], slices, learn_background(skin_foreground(), [EMPTY[0]]), 2.0)
+    request = SliceRequest(0, slices, 8, ("a place", "a contour"))
+    tracker.ingest_image(EdgeFrame(0, FIRST_NS, 0, FIRST_NS, 0.0, 0.0, request, edges))
+    assert tracker.solve() is None
 
 
 def test_the_slices_of_both_fit_a_request(monkeypatch) -> None:

@@ -51,6 +51,18 @@ def test_everything_of_the_hand_moves_and_is_known_less_well(fast):
     np.testing.assert_allclose(*bones, atol=1e-9)
 
 
+def test_the_shape_of_a_state_stays_that_of_the_state(fast):
+    """A bare hand's phalanges have lengths of their own, not the file's."""
+    state = fast[-1]
+    way = np.array([0.0, 0.0, 0.01])
+    longer = replace(state, joint_positions=state.joint_positions + way,
+                     fingertip_positions=state.fingertip_positions + way)
+    t_ns, extrapolator = state.t_master_ns + AHEAD_NS, Extrapolator(RIG)
+    for name in ("joint_positions", "fingertip_positions"):
+        apart = getattr(extrapolator.at(longer, t_ns), name) - getattr(extrapolator.at(state, t_ns), name)
+        np.testing.assert_allclose(apart, np.broadcast_to(way, apart.shape), atol=1e-9)
+
+
 def test_the_velocity_is_that_of_the_places(fast):
     step_ns = 1_000_000
     extrapolator = Extrapolator(RIG)

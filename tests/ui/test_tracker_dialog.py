@@ -265,3 +265,12 @@ def test_an_old_rig_with_landmarks_says_what_it_tracks(opened):
     desk.until(lambda: load_rig(desk.path).tracker.observe == "landmarks" and dialog.close_button.isEnabled())
     assert "detector" in dialog.observe_words.text()
     assert settings_text(desk.dialog.chosen) == "estimator, landmarks, full, anatomical limits"
+
+
+def test_two_bare_hands_come_back_from_the_classic_tracker(opened):
+    """It tracks markers, of which they have none; the form does not show then what the estimator observes."""
+    rig = synthetic_rig()
+    hand = msgspec.structs.replace(rig.hand, side="left" if rig.hand.side == "right" else "right")
+    desk = opened(msgspec.structs.replace(rig, other_hand=hand, tracker=TrackerSettings(kind="classic")))
+    click_on_word(desk.dialog.kinds["estimator"])
+    desk.until(lambda: load_rig(desk.path).tracker == TrackerSettings(kind="estimator", observe="contours"))
