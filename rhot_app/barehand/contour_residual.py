@@ -24,7 +24,7 @@ from rhot_app.barehand.surface import FOREARM, PALM, SHAPE, Surface
 from rhot_app.estimation import residual
 from rhot_app.estimation.residual import UNIT, Rows
 from rhot_app.hand.limits import LIMIT_SD_RAD
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE
+from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
 from rhot_node.detect.edges import Edges
 
 Array = NDArray[np.float64]
@@ -162,54 +162,78 @@ def in_a_fit(frame: ContourFrame) -> ContourFrame:
 
 
 class Contours:
-    """Implements `Residual`: the frames of some cameras at one instant."""
+    """Implements `Residual`: the frames of some cameras, each at its own time.
 
-    def __init__(self, frames: Sequence[ContourFrame]) -> None:
-        self.frames = frames
+    Frames are moved to the state's instant by a `velocity` (POSE,) that is known before them, with its covariance. They
+    do not change it: if cameras disagree, surface and calibration are wrong by a part of a millimetre, and that within
+    milliseconds would be a great speed. Without it, the state's own velocity moves them.
+    """
+
+    def __init__(self, frames: Sequence[ContourFrame], velocity: tuple[Array, Array] | None = None) -> None:
+        self.frames = [frame for frame in frames if len(frame.slices)]
+        self._velocity = None if velocity is None else (velocity[0], _root(velocity[1]))
 
     def linearise(self, state: Array) -> Rows:
-        """For each instant of the frames, COLUMNS whitened rows of their information and one of the remaining cost.
-        Frames within SAME_TIME_S of the state count as of its instant."""
-        by_time: dict[int, list[ContourFrame]] = {}
-        for frame in self.frames:
-            late_s = float(frame.late_s.mean()) if len(frame.late_s) else 0.0
-            by_time.setdefault(round(0.5 * late_s / SAME_TIME_S), []).append(frame)
-        if not by_time:
-            return Rows(np.empty(0), np.empty((0, len(state) - BIAS + MOTION)), UNIT)
-        found = []
-        for place, frames in by_time.items():
-            late_s = float(np.mean([frame.late_s.mean() for frame in frames if len(frame.late_s)])) if place else 0.0
-            information, pull, cost = gathered(frames, state)
-            found.append(compressed(information, pull, cost, len(state) - BIAS + MOTION, frames[0].size_column, late_s))
-        if len(found) == 1:
-            return found[0]
-        return Rows(np.concatenate([rows.error for rows in found]), np.concatenate([rows.jacobian for rows in found]),
-                    UNIT)
+        """COLUMNS whitened rows of the information of all slices, and one of the remaining cost."""
+        size = len(state) - BIAS + MOTION
+        if not self.frames:
+            return Rows(np.empty(0), np.empty((0, size)), UNIT)
+        root = None
+        if self._velocity is not None:
+            state, root = state.copy(), self._velocity[1]
+            state[VELOCITY:ACCELERATION] = self._velocity[0]
+        return compressed(*gathered(self.frames, state, root), size, self.frames[0].size_column)
 
 
-def gathered(frames: Sequence[ContourFrame], state: Array) -> tuple[Array, Array, float]:
+def velocity_of(estimate: tuple[Array, Array]) -> tuple[Array, Array]:
+    """The velocity (POSE,) in a state with its covariance, and its own."""
+    own = slice(POSE, 2 * POSE)
+    return estimate[0][VELOCITY:ACCELERATION].copy(), estimate[1][own, own].copy()
+
+
+def _root(covariance: Array) -> Array:
+    """A matrix whose square, times its transposed, is a covariance of any rank."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def gathered(frames: Sequence[ContourFrame], state: Array, velocity_root: Array | None = None
+             ) -> tuple[Array, Array, float]:
     """Information (COLUMNS, COLUMNS), of which only the lower triangle is filled, gradient (COLUMNS,) and cost of all
-    slices of some cameras at one instant. The surface's offset along each side is marginalised, about a Gauss-Newton
-    step from none."""
-    information, pull = np.zeros((COLUMNS, COLUMNS)), np.zeros(COLUMNS)
-    sides = np.zeros((SIDES * len(frames[0].surface.row), COLUMNS + 2))
+    slices of some cameras. The surface's offset along each side is marginalised, about a Gauss-Newton step from none.
+    So is the velocity's error in frames that are not of the state's instant; `velocity_root` (POSE, POSE): times its
+    transposed, the velocity's covariance."""
+    late_s = np.array([frame.late_s.mean() for frame in frames])
+    if velocity_root is not None and np.abs(late_s).max() < SAME_TIME_S:
+        velocity_root = None
+    count = COLUMNS + (0 if velocity_root is None else POSE)
+    information, pull = np.zeros((count, count)), np.zeros(count)
+    sides = np.zeros((SIDES * len(frames[0].surface.row), count + 2))
     predicted = [frame.add_sides(state, sides) for frame in frames]
-    aside = sides[:, COLUMNS] / (1.0 + sides[:, COLUMNS + 1])
+    aside = sides[:, -2] / (1.0 + sides[:, -1])
     sides[:] = 0.0
-    cost = float(aside @ aside) + sum(frame.gather(at, aside, information, pull, sides)
-                                      for frame, at in zip(frames, predicted, strict=True))
+    cost = float(aside @ aside)
+    for frame, late, (offset, rows, good) in zip(frames, late_s, predicted, strict=True):
+        if velocity_root is not None:
+            rows = np.hstack([rows, late * (rows[:, :POSE] @ velocity_root)])
+        cost += frame.gather((offset, rows, good), aside, information, pull, sides)
     _marginalise(sides, information, pull)
+    if velocity_root is not None:
+        own, cross = information[COLUMNS:, COLUMNS:], information[COLUMNS:, :COLUMNS]
+        own = np.tril(own) + np.tril(own, -1).T + np.eye(POSE)
+        solved = np.linalg.solve(own, np.column_stack([cross, pull[COLUMNS:]]))
+        cost -= float(pull[COLUMNS:] @ solved[:, -1])
+        information, pull = (information[:COLUMNS, :COLUMNS] - cross.T @ solved[:, :-1],
+                             pull[:COLUMNS] - cross.T @ solved[:, -1])
     return information, pull, cost
 
 
-def compressed(information: Array, pull: Array, cost: float, size: int, size_column: int, late_s: float = 0.0) -> Rows:
-    """Rows of whitened errors with this information (COLUMNS, COLUMNS), of which the lower triangle is read, gradient
-    (COLUMNS,) and cost in all, from images `late_s` later than the state, which then has a velocity after the pose."""
+def compressed(information: Array, pull: Array, cost: float, size: int, size_column: int) -> Rows:
+    """COLUMNS rows of whitened errors with this information (COLUMNS, COLUMNS), of which the lower triangle is read,
+    gradient (COLUMNS,) and cost in all, and one row of the rest."""
     error, own = residual.compressed(information, pull, cost, _RIDGE)
     jacobian = np.zeros((COLUMNS + 1, size))
     jacobian[:, :POSE], jacobian[:, size_column:size_column + SHAPE] = own[:, :POSE], own[:, POSE:]
-    if late_s:  # its velocity moves it meanwhile
-        jacobian[:, POSE:2 * POSE] = late_s * own[:, :POSE]
     return Rows(error, jacobian, UNIT)
 
 
@@ -300,8 +324,8 @@ def _add_sides(surface, state, size, pose, intrinsics, late_s, capsule, kind, al
             _, weight, error, _ = _mix(count[s], offsets[s], sds[s], inside[s], outside[s], behind[s], offset[s],
                                        shape_variance[s], expected_sd[s] ** 2, clutter[s], found)
             side = SIDES * capsule[s] + kind[s]
-            sides[side, COLUMNS] += weight * side_sd[s] * error
-            sides[side, COLUMNS + 1] += weight * side_sd[s] ** 2
+            sides[side, -2] += weight * side_sd[s] * error
+            sides[side, -1] += weight * side_sd[s] ** 2
 
 
 @njit(cache=True)
@@ -309,7 +333,7 @@ def _gather(surface, offset, rows, good, capsule, kind, behind, shape_variance, 
             outside, expected_sd, clutter, aside, information, pull, seen, sides):
     """Add the slices' information to the lower triangle of `information` (COLUMNS, COLUMNS) and to `pull` (COLUMNS,);
     returns their cost."""
-    found, cost, own = np.empty(offsets.shape[1]), 0.0, np.empty(COLUMNS, np.int64)
+    found, cost, own = np.empty(offsets.shape[1]), 0.0, np.empty(rows.shape[1], np.int64)
     for s in range(capsule.shape[0]):
         if not good[s]:
             continue
@@ -321,8 +345,8 @@ def _gather(surface, offset, rows, good, capsule, kind, behind, shape_variance, 
         cost += one
         seen[surface.group[capsule[s]], 0] += present
         seen[surface.group[capsule[s]], 1] += 1.0
-        sides[side, COLUMNS] += weight * side_sd[s] * error
-        sides[side, COLUMNS + 1] += weight * side_sd[s] ** 2
+        sides[side, -2] += weight * side_sd[s] * error
+        sides[side, -1] += weight * side_sd[s] ** 2
         used = _nonzero(rows[s], own)
         for p in range(used):
             a = weight * rows[s, own[p]]
@@ -338,14 +362,14 @@ def _marginalise(sides, information, pull):
     """Take out of the lower triangle of `information` (COLUMNS, COLUMNS) and of `pull` (COLUMNS,) what may be the
     surface's offset along a side (Schur complement). Of each of `sides` (S, COLUMNS + 2): derivatives of the residuals
     by the state, their error, and their derivative by the offset, each times weight and that derivative."""
-    own = np.empty(COLUMNS, np.int64)
+    own = np.empty(len(pull), np.int64)
     for s in range(sides.shape[0]):
-        if sides[s, COLUMNS + 1] == 0.0:
+        if sides[s, -1] == 0.0:
             continue
-        used, part = _nonzero(sides[s, :COLUMNS], own), 1.0 / (1.0 + sides[s, COLUMNS + 1])
+        used, part = _nonzero(sides[s, :-2], own), 1.0 / (1.0 + sides[s, -1])
         for p in range(used):
             a = part * sides[s, own[p]]
-            pull[own[p]] -= a * sides[s, COLUMNS]
+            pull[own[p]] -= a * sides[s, -2]
             for q in range(p + 1):
                 information[own[p], own[q]] -= a * sides[s, own[q]]
 

@@ -15,7 +15,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import GROUPS, SAME_TIME_S, ContourFrame, Contours, JointLimits, slices_of
+from rhot_app.barehand.contour_residual import (
+    GROUPS,
+    SAME_TIME_S,
+    ContourFrame,
+    Contours,
+    JointLimits,
+    slices_of,
+    velocity_of,
+)
 from rhot_app.barehand.contours import STEP_M, contour_points
 from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
@@ -283,7 +291,7 @@ class BareHandTracker:
         for number in range(passes):
             frames = [self._search(camera, image, state, covariance * 0.25**number, number == passes - 1,
                                    late_s.get(camera, 0.0)) for camera, image in images.items()]
-            residuals = [Contours(frames), *self.constraints, *extra]
+            residuals = [Contours(frames, velocity_of(prediction)), *self.constraints, *extra]
             if number < passes - 1:
                 state = update(self.process, t_s, prediction, residuals, state, self.filter.partial).state
         return self.filter.add(t_s, residuals, prediction, state)

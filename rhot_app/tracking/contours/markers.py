@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import SAME_TIME_S, ContourFrame, Contours
+from rhot_app.barehand.contour_residual import SAME_TIME_S, ContourFrame, Contours, velocity_of
 from rhot_app.barehand.observations import EdgeFrame
 from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import CONFUSED_PX, PASSES, RELOCATION_LOG_ODDS, BareHandTracker
@@ -205,9 +205,10 @@ def weigh(hand: BareHandTracker, markers: MarkersOfHand | None, waiting: Mapping
     prediction, spreads = hand.filter.predict(t_s), [contour.expected_sd for contour in contours]
     found: list[BesideContours] = []
     initial = prediction[0]
+    seen = Contours(contours, velocity_of(prediction))
     if markers is not None:
-        prediction, found, initial = markers.choose(marked, Contours(contours), prediction, t_s)
-    residuals: list[Residual] = [*found, Contours(contours), *hand.constraints]
+        prediction, found, initial = markers.choose(marked, seen, prediction, t_s)
+    residuals: list[Residual] = [*found, seen, *hand.constraints]
     for number in range(PASSES):
         for contour, spread in zip(contours, spreads, strict=True):
             contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)
