@@ -130,8 +130,8 @@ class ContourFrame:
         return Contours([self]).linearise(state)
 
     def add_sides(self, state: Array, sides: Array) -> Predicted:
-        """Add to the last two columns of `sides` (S, COLUMNS + 2) what the slices say of the surface's offset along
-        each side, in standard deviations: gradient and information. Returns where the contours are (`predict`)."""
+        """Add to the last two columns of `sides` (S, N + 2) what the slices say of the surface's offset along each
+        side, in standard deviations: gradient and information. Returns where the contours are (`predict`)."""
         assert self.edges is not None, "the edges of the slices have not been observed"
         count, p, e = len(self.slices), self.points, self.edges
         offset, rows, good = np.zeros(count), np.zeros((count, COLUMNS)), np.zeros(count, np.bool_)
@@ -141,8 +141,8 @@ class ContourFrame:
         return offset, rows, good
 
     def gather(self, predicted: Predicted, aside: Array, information: Array, pull: Array, sides: Array) -> float:
-        """Add the lower triangle of the slices' information (COLUMNS, COLUMNS), their gradient (COLUMNS,), and to
-        `sides` (S, COLUMNS + 2) what `_marginalise` takes; returns their cost."""
+        """Add the lower triangle of the slices' information (N, N), their gradient (N,), and to `sides` (S, N + 2) what
+        `_marginalise` takes; returns their cost. Of `predicted`, the derivatives are by N numbers."""
         assert self.edges is not None, "the edges of the slices have not been observed"
         p, e = self.points, self.edges
         self.seen = np.zeros((GROUPS, 2))
@@ -178,9 +178,9 @@ class Contours:
         size = len(state) - BIAS + MOTION
         if not self.frames:
             return Rows(np.empty(0), np.empty((0, size)), UNIT)
-        root = None
+        root, late_s = None, max(abs(float(frame.late_s.mean())) for frame in self.frames)
         if self._velocity is not None:
-            state, root = state.copy(), self._velocity[1]
+            state, root = state.copy(), self._velocity[1] if late_s > SAME_TIME_S else None
             state[VELOCITY:ACCELERATION] = self._velocity[0]
         return compressed(*gathered(self.frames, state, root), size, self.frames[0].size_column)
 
@@ -203,9 +203,6 @@ def gathered(frames: Sequence[ContourFrame], state: Array, velocity_root: Array 
     slices of some cameras. The surface's offset along each side is marginalised, about a Gauss-Newton step from none.
     So is the velocity's error in frames that are not of the state's instant; `velocity_root` (POSE, POSE): times its
     transposed, the velocity's covariance."""
-    late_s = np.array([frame.late_s.mean() for frame in frames])
-    if velocity_root is not None and np.abs(late_s).max() < SAME_TIME_S:
-        velocity_root = None
     count = COLUMNS + (0 if velocity_root is None else POSE)
     information, pull = np.zeros((count, count)), np.zeros(count)
     sides = np.zeros((SIDES * len(frames[0].surface.row), count + 2))
@@ -213,9 +210,9 @@ def gathered(frames: Sequence[ContourFrame], state: Array, velocity_root: Array 
     aside = sides[:, -2] / (1.0 + sides[:, -1])
     sides[:] = 0.0
     cost = float(aside @ aside)
-    for frame, late, (offset, rows, good) in zip(frames, late_s, predicted, strict=True):
+    for frame, (offset, rows, good) in zip(frames, predicted, strict=True):
         if velocity_root is not None:
-            rows = np.hstack([rows, late * (rows[:, :POSE] @ velocity_root)])
+            rows = np.hstack([rows, frame.late_s.mean() * (rows[:, :POSE] @ velocity_root)])
         cost += frame.gather((offset, rows, good), aside, information, pull, sides)
     _marginalise(sides, information, pull)
     if velocity_root is not None:
@@ -315,7 +312,7 @@ def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance,
 def _add_sides(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, shape_variance, side_sd,
                pixel, normal, count, offsets, sds, inside, outside, expected_sd, clutter, offset, rows, good,
                sides):
-    """Fill `offset` (K,), `rows` (K, COLUMNS) and `good` (K,) as `follow` does, and add to `sides` (S, COLUMNS + 2)
+    """Fill `offset` (K,), `rows` (K, COLUMNS) and `good` (K,) as `follow` does, and add to `sides` (S, N + 2)
     gradient and information of the surface's offset along each side."""
     follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, good)
     found = np.empty(offsets.shape[1])
@@ -331,8 +328,8 @@ def _add_sides(surface, state, size, pose, intrinsics, late_s, capsule, kind, al
 @njit(cache=True)
 def _gather(surface, offset, rows, good, capsule, kind, behind, shape_variance, side_sd, count, offsets, sds, inside,
             outside, expected_sd, clutter, aside, information, pull, seen, sides):
-    """Add the slices' information to the lower triangle of `information` (COLUMNS, COLUMNS) and to `pull` (COLUMNS,);
-    returns their cost."""
+    """Add the slices' information to the lower triangle of `information` (N, N) and to `pull` (N,); returns their
+    cost."""
     found, cost, own = np.empty(offsets.shape[1]), 0.0, np.empty(rows.shape[1], np.int64)
     for s in range(capsule.shape[0]):
         if not good[s]:
@@ -359,8 +356,8 @@ def _gather(surface, offset, rows, good, capsule, kind, behind, shape_variance, 
 
 @njit(cache=True)
 def _marginalise(sides, information, pull):
-    """Take out of the lower triangle of `information` (COLUMNS, COLUMNS) and of `pull` (COLUMNS,) what may be the
-    surface's offset along a side (Schur complement). Of each of `sides` (S, COLUMNS + 2): derivatives of the residuals
+    """Take out of the lower triangle of `information` (N, N) and of `pull` (N,) what may be the surface's offset along
+    a side (Schur complement). Of each of `sides` (S, N + 2): derivatives of the residuals
     by the state, their error, and their derivative by the offset, each times weight and that derivative."""
     own = np.empty(len(pull), np.int64)
     for s in range(sides.shape[0]):

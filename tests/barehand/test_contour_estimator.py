@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bare_scenes import DISTANCE_M, model_and_surface, poses, rig_of, right_hand, scene
 from pictures import look_at, picture, taken, wall
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
@@ -122,6 +123,24 @@ def test_slow_cameras_find_and_follow_a_hand(film) -> None:
         nodes.step(number, film[0][1 if number >= 3 else 2], times_ns=[FIRST_NS + 4 * number * PERIOD_NS] * 2)
     assert nodes.states[-1].tracked and error_mm(nodes.states[-1], poses("grasp", TIMES)[0]) < 5.0
     assert nodes.states[-1].t_master_ns == FIRST_NS + 4 * number * PERIOD_NS, "no camera's edges wait for a frame"
+
+
+@pytest.mark.parametrize("apart_ms", [2, 10])
+def test_cameras_that_disagree_do_not_move_a_hand_at_rest(film, apart_ms: int) -> None:
+    """A camera that is turned by a fifth of a degree shows it 2 mm elsewhere, milliseconds later: that is no speed."""
+    rig = bare_rig(film[0][0])
+    turned = Rotation.from_quat(rig.nodes[1].pose.rotation_wxyz, scalar_first=True) * Rotation.from_rotvec(
+        [0.2, 0.0, 0.0], degrees=True)
+    pose = msgspec.structs.replace(rig.nodes[1].pose,
+                                   rotation_wxyz=tuple(turned.as_quat(scalar_first=True).tolist()))
+    rig = msgspec.structs.replace(rig, nodes=(rig.nodes[0], msgspec.structs.replace(rig.nodes[1], pose=pose)))
+    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
+    for number in range(30):
+        t_ns = FIRST_NS + 3 * number * PERIOD_NS
+        nodes.step(number, film[0][1 if number >= 3 else 2], times_ns=[t_ns, t_ns + 1_000_000 * apart_ms])
+    assert nodes.states[-1].tracked and error_mm(nodes.states[-1], poses("grasp", TIMES)[0]) < 5.0
+    speeds = [np.linalg.norm(state.velocity[:3]) for state in nodes.states[-5:]]
+    assert np.median(speeds) < 0.1  # m/s
 
 
 def test_a_finger_that_is_taken_for_another_is_found_again(film, monkeypatch) -> None:

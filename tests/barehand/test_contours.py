@@ -84,26 +84,35 @@ def test_contours_follow_the_hand_as_their_derivatives_say(features: bool) -> No
         assert np.abs(difference - rows[:, column]).max() < 2e-3 * scale, f"column {column}"
 
 
+def _later(late_s: float) -> tuple[ContourFrame, np.ndarray]:
+    """A frame of `late_s` after its state, whose edges lie a little beside the contour, and the state."""
+    frame, state = _observed((0.3,))
+    frame.late_s = frame.late_s + late_s
+    return frame, state
+
+
 def test_contours_of_a_later_image_follow_the_velocity() -> None:
-    _, surface = model_and_surface()
-    process, camera, state = process_of(), two_cameras()[1], state_of(poses("grasp", (0.9,))[0])
-    frame = frame_of(surface, state, camera)
-    empty = np.zeros((len(frame.slices), EDGES_MAX))
-    edges = Edges(np.ones(len(empty), np.int64), *(empty.copy() for _ in range(5)))
-    frame.expected_sd[:] = 0.0
-    edges.offset[:, 0], edges.sd[:, 0], edges.strength[:, 0], edges.inside[:, 0] = 0.3, 0.5, 5.0, 1.0
-    frame.observe(edges)
-    frame.late_s = frame.late_s + 0.013
-    rows = Contours([frame]).linearise(state)
-    slope = rows.jacobian.T @ rows.error
-    step = np.zeros(process.size)
-    for axis in range(3):
-        costs = []
-        for sign in (-1.0, 1.0):
-            step[:] = 0.0
-            step[POSE + axis] = sign * 1e-3
-            costs.append(float(np.sum(Contours([frame]).linearise(process.retract(state, step)).error ** 2)))
-        assert 0.5 * (costs[1] - costs[0]) / 2e-3 == pytest.approx(-slope[POSE + axis], rel=0.02, abs=0.05)
+    process, (frame, state) = process_of(), _later(0.013)
+    here, rows, good = frame.predict(state)
+    for axis in range(POSE):
+        step = np.zeros(process.size)
+        step[POSE + axis] = 1e-2
+        moved, _, _ = frame.predict(process.retract(state, step))
+        assert moved[good] - here[good] == pytest.approx(0.013 * 1e-2 * rows[good, axis], abs=1e-9)
+
+
+def test_an_uncertain_velocity_makes_a_later_image_uncertain_and_is_not_changed_by_it() -> None:
+    """An error of the velocity moves the pose meanwhile: its covariance adds to that of the pose."""
+    frame, state = _later(0.013)
+    root = np.diag(np.repeat([0.3, 2.0, 3.0], (3, 3, 21)))
+    certain = Contours([frame], (np.zeros(POSE), np.zeros((POSE, POSE)))).linearise(state)
+    uncertain = Contours([frame], (np.zeros(POSE), root @ root)).linearise(state)
+    assert not certain.jacobian[:, POSE:2 * POSE].any() and not uncertain.jacobian[:, POSE:2 * POSE].any()
+    known, found = (one.jacobian[:, :POSE].T @ one.jacobian[:, :POSE] for one in (certain, uncertain))
+    reduced = 0.013 * root
+    expected = known - known @ reduced @ np.linalg.solve(np.eye(POSE) + reduced @ known @ reduced, reduced @ known)
+    assert found == pytest.approx(expected, rel=1e-3, abs=1e-4 * np.abs(known).max())
+    assert uncertain.error @ uncertain.error < certain.error @ certain.error
 
 
 def test_edges_within_the_hand_are_told_from_its_silhouette() -> None:
