@@ -171,7 +171,13 @@ class Contours:
 
     def __init__(self, frames: Sequence[ContourFrame], velocity: tuple[Array, Array] | None = None) -> None:
         self.frames = [frame for frame in frames if len(frame.slices)]
-        self._velocity = None if velocity is None else (velocity[0], _root(velocity[1]))
+        self._velocity: tuple[Array, Array] | None = None
+        if velocity is not None:
+            self.move_by(velocity)
+
+    def move_by(self, velocity: tuple[Array, Array]) -> None:
+        """Move the frames by another velocity (POSE,), with its covariance."""
+        self._velocity = velocity[0], _root(velocity[1])
 
     def linearise(self, state: Array) -> Rows:
         """COLUMNS whitened rows of the information of all slices, and one of the remaining cost."""

@@ -287,13 +287,14 @@ class BareHandTracker:
              prediction: tuple[Array, Array], state: Array, extra: Sequence[Residual], passes: int) -> Knot:
         """Search the images and estimate, `passes` times; the first time about `state`."""
         residuals: list[Residual] = []
-        covariance = prediction[1]
+        covariance, velocity = prediction[1], velocity_of(prediction)
         for number in range(passes):
             frames = [self._search(camera, image, state, covariance * 0.25**number, number == passes - 1,
                                    late_s.get(camera, 0.0)) for camera, image in images.items()]
-            residuals = [Contours(frames, velocity_of(prediction)), *self.constraints, *extra]
+            residuals = [Contours(frames, velocity), *self.constraints, *extra]
             if number < passes - 1:
-                state = update(self.process, t_s, prediction, residuals, state, self.filter.partial).state
+                better = update(self.process, t_s, prediction, residuals, state, self.filter.partial)
+                state, velocity = better.state, velocity_of((better.state, better.covariance))
         return self.filter.add(t_s, residuals, prediction, state)
 
     def _silhouettes(self, images: dict[int, Image]) -> Silhouettes | None:

@@ -213,7 +213,9 @@ def weigh(hand: BareHandTracker, markers: MarkersOfHand | None, waiting: Mapping
         for contour, spread in zip(contours, spreads, strict=True):
             contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)
         if number < PASSES - 1:
-            initial = update(hand.process, t_s, prediction, residuals, initial, hand.filter.partial).state
+            better = update(hand.process, t_s, prediction, residuals, initial, hand.filter.partial)
+            initial = better.state
+            seen.move_by(velocity_of((better.state, better.covariance)))
     knot = hand.filter.add(t_s, residuals, prediction, initial)
     if markers is not None:
         markers.judge(found, knot)
