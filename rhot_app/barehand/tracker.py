@@ -44,6 +44,7 @@ from rhot_app.hand.motion.hand_process import (
     MOTION,
     PALM_SPREAD,
     POSE,
+    SLOWEST,
     VELOCITY,
     HandProcess,
 )
@@ -167,7 +168,7 @@ class BareHandTracker:
         self.shape_covariance = np.square(spread)[:, :, None] * np.eye(3)
         self.shape_s = np.append(np.full(len(spread) - 1, SHAPE_S), TURN_S)
         self.process = HandProcess(self.surface.dh, self.model.limits, prior.mean,
-                                   np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, np.full(3, FASTEST),
+                                   np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, SLOWEST,
                                    FASTEST, self.shape_covariance, self.shape_s)
         self.filter = IteratedFilter(self.process)
         self.constraints: list[Residual] = [JointLimits(self.model.limits)]
