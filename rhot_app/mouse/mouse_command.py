@@ -43,6 +43,9 @@ COMMAND_S = 30.0
 REST_S = 10.0
 """Until the simulated hand's motion at rest repeats itself."""
 
+NOTE_S = 15.0
+"""Between notes while the hand is looked for."""
+
 TRACKED_S = 360.0
 """The first start of all compiles the numerical code; on a slow or busy machine that takes minutes."""
 
@@ -245,7 +248,8 @@ def line_of(mouse: MouseState) -> str:
 def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterator[Path]:
     """A simulated rig whose hand carries balls about, and an engine that tracks it; the engine's directory. Both end
     with the context. `bare`: the hand wears no markers; its nodes have learnt the background. With one of the
-    `cameras` the engine knows the plane and the mouse's hand. Raises SimulatorError, EngineError."""
+    `cameras` the engine knows the plane and the mouse's hand. Says on standard error how far it is. Raises
+    SimulatorError, EngineError."""
     import tempfile
 
     from rhot_app.engine.client import EngineClient
@@ -262,6 +266,7 @@ def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterat
     show = BareHandShow if bare else HandShow
     set_up = SetUp("contours", cameras, facing="back") if bare else SetUp("markers", cameras)
     with tempfile.TemporaryDirectory(prefix="rhot-mouse-") as name, contextlib.ExitStack() as stack:
+        _note("a simulated rig and an engine start.")
         place = Path(name)
         rig, rest, scene = place / "rig.json", place / "rest.json", twin_scene(set_up, seed)
         write_document(rest, motion_file(resting(REST_S), scene.hand, MouseSettings(), Sway(), facing=set_up.facing))
@@ -277,18 +282,31 @@ def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterat
         stack.callback(stop_engine, place / "engine")
         ensure_engine(rig, place / "engine", start=True)
         with EngineClient(place / "engine") as client, TwinRemote(place) as remote:
-            deadline = time.monotonic() + TRACKED_S
+            begun = time.monotonic()
+            deadline, note_s = begun + TRACKED_S, begun + NOTE_S
             if bare:
+                _note("the cameras learn the empty scene.")
                 remote.show(EmptyShow())
                 _learn_backgrounds(client, deadline)
                 remote.show(show(str(rest)))
+            _note("the hand is looked for.")
             while client.state is None or not client.state.tracked:
                 client.poll(0.1)
-                if time.monotonic() > deadline:
+                now = time.monotonic()
+                if now > note_s:
+                    note_s += NOTE_S
+                    condition = "no state yet" if client.state is None else client.state.condition.value
+                    _note(f"not found in {now - begun:.0f} s ({condition}); it is looked for until {TRACKED_S:.0f} s.")
+                if now > deadline:
                     raise SimulatorError(f"the simulated hand was not tracked within {TRACKED_S:.0f} s. Is this "
                                          "computer busy? Try again.")
+            _note("the hand is tracked, and begins to move.")
             remote.show(show(MOTION))  # it begins where the hand rests now
         yield place / "engine"
+
+
+def _note(text: str) -> None:
+    print(f"rhot: {text}", file=sys.stderr, flush=True)
 
 
 def _learn_backgrounds(client: EngineClient, deadline: float) -> None:

@@ -158,3 +158,14 @@ def test_the_simulated_hand_works_the_mouse_by_itself() -> None:
     assert len(cursors) > 10 and np.ptp(cursors[:, 0]) > 0.05
     assert "/rhot/mouse/buttons" in heard
     assert "from the hand to the cursor" in done.stderr
+
+
+def test_the_simulated_bare_hand_works_the_mouse_live() -> None:
+    """The same without markers, before cameras that are not synchronised and have rolling shutters."""
+    done = rhot_mouse("--simulated", "--bare", "--seconds", "12", "--json")
+    assert done.returncode == 0, done.stderr
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    cursors = np.array([line["cursor_m"] for line in lines if line["cursor_m"] is not None])
+    assert len(cursors) > 10 and np.ptp(cursors[:, 0]) > 0.05, done.stderr
+    for stage in ("start", "learn the empty scene", "looked for", "is tracked"):
+        assert stage in done.stderr
