@@ -28,13 +28,14 @@ from rhot_app.barehand.contours import STEP_M, contour_points
 from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
 from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, silhouettes
-from rhot_app.barehand.start import STEP, Found, find_hand, settle
+from rhot_app.barehand.start import STEP, Found, find_hand, find_in_maps, settle
 from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, PALM, SHAPE, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
 from rhot_app.estimation.residual import Residual
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model, with_locked
 from rhot_app.hand.motion.hand_process import (
     ACCELERATION,
@@ -119,6 +120,14 @@ SEARCHED_S = 0.2
 """s: a hand is searched for anew at least so often, which is how long a wrong pose may last. Chosen: about a
 person's reaction time. A search in every image doubles the time of a step."""
 
+LOOK_S = 0.25, 4.0
+"""s: from a start to the first search everywhere, and between two at most; each time twice as long. A search about a
+pose does not leave one that is wrong by more than a finger's breadth. Chosen: a wrong start lasts no longer than a
+person needs to see it, and the searches take less than a fifth of a core."""
+
+APART_M = 0.1
+"""m: farther apart are two hands: a hand's breadth."""
+
 COVER_DROP, COVER_SHARE = 0.3, 0.1
 """Log odds per pixel by which a prediction may cover the foreground worse than the hand did of late: a twentieth of the
 hand, half a finger, off the foreground (`silhouette.MISLABELLED`: 5.9 for each of its pixels). And the share of a new
@@ -167,9 +176,10 @@ class BareHandTracker:
         spread = np.concatenate([size, phalanges, FOREARM_SD]).reshape(-1, 3)
         self.shape_covariance = np.square(spread)[:, :, None] * np.eye(3)
         self.shape_s = np.append(np.full(len(spread) - 1, SHAPE_S), TURN_S)
+        slowest = np.append(SLOWEST[:2], FASTEST)  # fingers begin to move within an image
         self.process = HandProcess(self.surface.dh, self.model.limits, prior.mean,
-                                   np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, SLOWEST,
-                                   FASTEST, self.shape_covariance, self.shape_s)
+                                   np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, slowest, FASTEST,
+                                   self.shape_covariance, self.shape_s)
         self.filter = IteratedFilter(self.process)
         self.constraints: list[Residual] = [JointLimits(self.model.limits)]
         if self.plane is not None:
@@ -179,6 +189,7 @@ class BareHandTracker:
         self.noise = [0.0] * len(self.cameras)
         self._sequence, self._epoch_ns, self._fresh = 0, 0, False
         self.cover, self._searched_s, self._rng = 0.0, -np.inf, np.random.default_rng(0)
+        self.look_soon(0.0)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
     def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD,
@@ -194,6 +205,7 @@ class BareHandTracker:
         self.filter.start(0.0, state, covariance)
         self.tracking = self._fresh = True
         self._taken_s, self._searched_s = [-np.inf] * len(self.cameras), -np.inf
+        self.look_soon(0.0)
         self.frames = [None] * len(self.cameras)
 
     def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
@@ -240,10 +252,11 @@ class BareHandTracker:
         prediction, since_s = self.filter.predict(t_s), t_s - self.filter.newest.t_s
         self.take(images, t_s)
         self.frames = [frame if c in images else None for c, frame in enumerate(self.frames)]
-        seen = self._silhouettes(images)
-        start = None
-        if seen is not None and (self._fresh or self._doubtful(seen, prediction, t_s)):
-            start, self._searched_s = self.relocate(seen, prediction, since_s), t_s
+        maps = self._maps(images)
+        seen, start = None if maps is None else self.silhouettes(maps), None
+        if maps is not None and seen is not None and (self._fresh or self._doubtful(seen, prediction, t_s)):
+            start = self.relocate(maps, prediction, since_s, everywhere=self.look_due(t_s))
+            self._searched_s = t_s
         initial = prediction[0] if start is None else start
         passes = START_PASSES if self._fresh or start is not None else PASSES
         knot = self._fit(images, late, t_s, prediction, initial, extra, passes)
@@ -276,9 +289,8 @@ class BareHandTracker:
 
     def restart(self, t_s: float, start: Array) -> tuple[Array, Array]:
         """Begin at rest in the state `start`; what is known of the size stays. Returns state and covariance."""
-        world = np.eye(4)
-        world[:3] = start[:ANGLES].reshape(3, 4)
-        state, covariance = self.process.start(world, start[ANGLES:VELOCITY], START_SD[:2])
+        pose = _pose_of(start)
+        state, covariance = self.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
         state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
         covariance[own, own] = self.filter.newest.covariance[own, own]
         self.filter.start(t_s, state, covariance)
@@ -298,19 +310,41 @@ class BareHandTracker:
                 state, velocity = better.state, velocity_of((better.state, better.covariance))
         return self.filter.add(t_s, residuals, prediction, state)
 
-    def _silhouettes(self, images: dict[int, Image]) -> Silhouettes | None:
-        """The images' foreground, None while no camera knows any."""
-        known = [c for c in images if self.foreground[c].informative]
-        if not known:
+    def _maps(self, images: dict[int, Image]) -> list[NDArray[np.float32] | None] | None:
+        """The foreground of every STEP-th pixel of each camera, None of one without an image; None while no camera
+        knows any."""
+        known = [c in images and model.informative for c, model in enumerate(self.foreground)]
+        if not any(known):
             return None
-        maps = [foreground_map(images[c], self.foreground[c], STEP) for c in known]
-        return silhouettes(maps, STEP, [self.poses[c] for c in known], [self.cameras[c].intrinsics for c in known])
+        return [foreground_map(images[c], self.foreground[c], STEP) if one else None for c, one in enumerate(known)]
+
+    def silhouettes(self, maps: Sequence[NDArray[np.float32] | None]) -> Silhouettes:
+        """Log odds of foreground probabilities (h, w) of every STEP-th pixel of each camera, of those that have any."""
+        used = [c for c, one in enumerate(maps) if one is not None]
+        return silhouettes([one for one in maps if one is not None], STEP, [self.poses[c] for c in used],
+                           [self.cameras[c].intrinsics for c in used])
+
+    def look(self, maps: Sequence[NDArray[np.float32] | None]) -> HandPose | None:
+        """The most probable hand anywhere in foreground maps; None without any."""
+        found = find_in_maps(maps, self.cameras, self.model, self.surface, np.zeros(SHAPE), self._rng, 1, self.plane)
+        return found[0].pose if found else None
+
+    def look_soon(self, t_s: float) -> None:
+        """Have the hand looked for everywhere soon after `t_s`: it is not certain."""
+        self._look_s, self._pause_s = t_s + LOOK_S[0], LOOK_S[0]
+
+    def look_due(self, t_s: float) -> bool:
+        """Whether the hand should be looked for everywhere now; it is not again for twice as long as last."""
+        if t_s < self._look_s:
+            return False
+        self._pause_s = min(2.0 * self._pause_s, LOOK_S[1])
+        self._look_s = t_s + self._pause_s
+        return True
 
     def score_of(self, seen: Silhouettes, state: Array) -> float:
         """Log odds of the hand in `state` by the foreground."""
-        world = np.eye(4)
-        world[:3] = state[:ANGLES].reshape(3, 4)
-        return score(self.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE], seen)[0]
+        pose = _pose_of(state)
+        return score(self.surface, pose.world_from_palm, pose.angles, state[BIAS:BIAS + SHAPE], seen)[0]
 
     def prior_of(self, state: Array) -> float:
         """Log probability density of the joint angles in `state`, but for a constant."""
@@ -319,26 +353,35 @@ class BareHandTracker:
 
     def covered(self, seen: Silhouettes, state: Array) -> float:
         """Log odds of the hand in `state` by the foreground, per pixel of the hand."""
-        world = np.eye(4)
-        world[:3] = state[:ANGLES].reshape(3, 4)
-        _, parts = score(self.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE], seen)
+        pose = _pose_of(state)
+        _, parts = score(self.surface, pose.world_from_palm, pose.angles, state[BIAS:BIAS + SHAPE], seen)
         return float((parts[:, 0] - parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
 
-    def relocate(self, seen: Silhouettes, found: tuple[Array, Array], dt_s: float) -> Array | None:
+    def relocate(self, maps: Sequence[NDArray[np.float32] | None], found: tuple[Array, Array], dt_s: float,
+                 everywhere: bool = False) -> Array | None:
         """A state that covers the foreground better than the `found` one, with its covariance (n, n), by
-        RELOCATION_LOG_ODDS, or None. It is searched for as far about it as hands go in `dt_s`."""
-        state, covariance = found
+        RELOCATION_LOG_ODDS, or None. It is searched for as far about it as hands go in `dt_s`; `everywhere`: in all of
+        the images, too, where what is farther than APART_M away is another hand."""
+        (state, covariance), seen = found, self.silhouettes(maps)
         pace = FASTEST / np.sqrt(3.0) * dt_s
         spread = covariance[:POSE, :POSE] + pace**2 * self.process.stationary[:POSE, :POSE]
-        world = np.eye(4)
-        world[:3] = state[:ANGLES].reshape(3, 4)
-        world, angles, value = settle(self.surface, world, state[ANGLES:VELOCITY].copy(), spread, self.model,
+        old = _pose_of(state)
+        world, angles, value = settle(self.surface, old.world_from_palm, old.angles, spread, self.model,
                                       state[BIAS:BIAS + SHAPE].copy(), seen, self._rng, self.plane)
-        if value < self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS:
-            return None
-        out = state.copy()
+        out, least = state.copy(), self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS
         out[:ANGLES], out[ANGLES:VELOCITY] = world[:3].ravel(), angles
-        return out
+        pose = self.look(maps) if everywhere else None
+        if pose is not None and np.linalg.norm(self._centre(pose) - self._centre(old)) < APART_M:
+            other = state.copy()
+            other[:ANGLES], other[ANGLES:VELOCITY] = pose.world_from_palm[:3].ravel(), pose.angles
+            other_value = self.score_of(seen, other) / CORRELATED + self.prior_of(other) - self.prior_of(state)
+            if other_value > value:
+                out, value = other, other_value
+        return out if value > least else None
+
+    def _centre(self, pose: HandPose) -> Array:
+        """(3,) m: the mean of the joints."""
+        return np.asarray(forward(self.model, pose).joints.mean(axis=0))
 
     def _search(self, camera: int, image: Image, state: Array, covariance: Array, last: bool,
                 late_s: float = 0.0) -> ContourFrame:
@@ -418,6 +461,12 @@ class BareHandTracker:
                 "joint_velocity_sd": motion[0], "joint_acceleration_sd": motion[1],
                 "hand_scale": float(np.exp(state[BIAS])), "hand_scale_sd": float(deviation[MOTION])},
             latency_s={"filter": time.perf_counter() - begun})
+
+
+def _pose_of(state: Array) -> HandPose:
+    world = np.eye(4)
+    world[:3] = state[:ANGLES].reshape(3, 4)
+    return HandPose(world, state[ANGLES:VELOCITY].copy())
 
 
 def _stated_sd(hand: HandAnatomy) -> Array | None:

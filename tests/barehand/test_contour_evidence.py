@@ -10,14 +10,12 @@ from pictures import two_cameras
 
 from rhot_app.barehand.contours import SILHOUETTE, STEP_M
 from rhot_app.barehand.observations import EdgeFrame, SliceRequest
-from rhot_app.barehand.start import Found
 from rhot_app.barehand.surface import SHAPE, WHOLE
 from rhot_app.barehand.tracker import SAME_POSE_S, BareHandTracker
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.motion.hand_process import BIAS, MOTION
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
-from rhot_app.tracking.contours import finder as finder_module
 from rhot_app.tracking.contours.finder import Finder
 from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.contours.requests import Requests, asked, matched
@@ -98,7 +96,7 @@ def test_a_search_that_ends_while_its_track_is_given_up_gives_no_pose(hand: Bare
                                                                       monkeypatch: pytest.MonkeyPatch) -> None:
     finder = Finder(hand)
     pose = poses("grasp", (0.5,))[0]
-    monkeypatch.setattr(finder_module, "find_in_maps", lambda *_: [Found(pose, 1.0)])
+    monkeypatch.setattr(hand, "look", lambda _: pose)
 
     class Maps:
         probabilities = ()

@@ -14,7 +14,7 @@ from rhot_app.barehand.contours import SILHOUETTE
 from rhot_app.barehand.follower import CONFUSED_M, MAJORITY
 from rhot_app.barehand.joints import place_joints
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
-from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.barehand.tracker import APART_M, BareHandTracker
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.state import SeenContour
@@ -22,9 +22,6 @@ from rhot_app.tracking.contours.requests import NEVER, CameraFrames
 from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
 
 Array = NDArray[np.float64]
-
-APART_M = 0.1
-"""m: farther apart are two hands: a hand's breadth."""
 
 NEAR_SD = 3.0
 """Standard deviations from the contour within which an edge is shown as the hand's."""

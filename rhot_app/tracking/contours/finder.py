@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.follower import CONFUSED_M
 from rhot_app.barehand.observations import ForegroundFrame
-from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, search, silhouettes
-from rhot_app.barehand.start import STEP, find_in_maps
+from rhot_app.barehand.silhouette import CORRELATED, search
 from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import COVER_DROP, COVER_SHARE, RELOCATION_LOG_ODDS, SEARCHED_S, BareHandTracker
 from rhot_app.hand.motion.hand_process import FASTEST, POSE
@@ -45,12 +44,6 @@ class Maps:
     t_ns: int
     probabilities: list[NDArray[np.float32] | None]
 
-    def silhouettes(self, hand: BareHandTracker) -> Silhouettes:
-        """The same as log odds, of the cameras that have a picture."""
-        used = [c for c, one in enumerate(self.probabilities) if one is not None]
-        return silhouettes([one for one in self.probabilities if one is not None], STEP, [hand.poses[c] for c in used],
-                           [hand.cameras[c].intrinsics for c in used])
-
 
 class NewestMaps:
     """The newest foreground map of each camera."""
@@ -80,8 +73,9 @@ class Finder:
     """`look` and `relocate` begin a search, `found` and `change` give what came of it, once. One search at a time; all
     belong to the tracker's thread."""
 
-    def __init__(self, hand: BareHandTracker) -> None:
-        self._hand = hand
+    def __init__(self, hand: BareHandTracker, *, alone: bool = True) -> None:
+        """`alone`: no other hand is in the images, for which a search everywhere might take it."""
+        self._hand, self._alone = hand, alone
         self._rng = np.random.default_rng(0)
         self._thread: threading.Thread | None = None
         self._newest: Maps | None = None
@@ -101,9 +95,9 @@ class Finder:
         self._newest = maps
         self._begin(self._look, maps, self._run)
 
-    def relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float) -> None:
+    def relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float, everywhere: bool = False) -> None:
         """See whether a hand in `state` may have gone elsewhere in `dt_s` (`BareHandTracker.relocate`)."""
-        self._begin(self._relocate, maps, state.copy(), covariance.copy(), dt_s, self._run)
+        self._begin(self._relocate, maps, state.copy(), covariance.copy(), dt_s, everywhere, self._run)
 
     def follow(self, maps: Maps, t_s: float, dt_s: float) -> bool:
         """Search anew every SEARCHED_S, and when the hand covers the foreground of `t_s` worse than of late. The search
@@ -112,7 +106,7 @@ class Finder:
         how, unless they take one finger for another."""
         hand = self._hand
         state, covariance = hand.filter.predict(t_s)
-        seen, change = maps.silhouettes(hand), self.change()
+        seen, change = hand.silhouettes(maps.probabilities), self.change()
         covered = hand.covered(seen, state)
         worse = covered < hand.cover - COVER_DROP
         if change is not None:
@@ -123,9 +117,11 @@ class Finder:
             gain += CORRELATED * (hand.prior_of(moved) - hand.prior_of(state))
             if (worse or confused) and gain > LEAST_GAIN:
                 hand.filter.start(t_s, moved, _widened(covariance, change))
+                hand.look_soon(t_s)
                 return True
         if worse or t_s - self._searched_s > SEARCHED_S:
-            self.relocate(maps, state, covariance, dt_s)
+            self.relocate(maps, state, covariance, dt_s,
+                          everywhere=self._alone and not self._busy and hand.look_due(t_s))
             self._searched_s = t_s
         hand.cover += (COVER_SHARE if hand.cover else 1.0) * (covered - hand.cover)
         return False
@@ -145,31 +141,32 @@ class Finder:
         if self._thread is not None:
             self._thread.join()
 
+    @property
+    def _busy(self) -> bool:
+        return self._thread is not None and self._thread.is_alive()
+
     def _begin(self, search_for: Callable[..., None], *arguments: Any) -> None:
-        if self._thread is None or not self._thread.is_alive():
+        if not self._busy:
             self._thread = threading.Thread(target=_logged, args=(search_for, *arguments), name="find", daemon=True)
             self._thread.start()
 
     def _look(self, maps: Maps, run: int) -> None:
-        hand, size = self._hand, np.zeros(SHAPE)
-        found = find_in_maps(maps.probabilities, hand.cameras, hand.model, hand.surface, size, self._rng, 1,
-                             hand.plane)
-        if not found or run != self._run:
+        pose, newest = self._hand.look(maps.probabilities), self._newest
+        if pose is None or run != self._run:
             return
-        pose, newest = found[0].pose, self._newest
         if newest is not None and newest is not maps:
             pose, maps = self._followed(pose, newest), newest
         self._found = run, pose, maps.t_ns
 
-    def _relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float, run: int) -> None:
-        moved = self._hand.relocate(maps.silhouettes(self._hand), (state, covariance), dt_s)
+    def _relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float, everywhere: bool, run: int) -> None:
+        moved = self._hand.relocate(maps.probabilities, (state, covariance), dt_s, everywhere)
         if moved is not None:
             self._change = run, self._hand.process.difference(moved, state)
 
     def _followed(self, pose: HandPose, maps: Maps) -> HandPose:
         """The pose in later maps, near to where it was."""
         hand = self._hand
-        seen = maps.silhouettes(hand)
+        seen = hand.silhouettes(maps.probabilities)
         covariance = np.diag(np.repeat(np.square([MOVED_M, TURNED, TURNED]), (3, 3, 21)))
         covariance[6:, 6:] = np.linalg.inv(hand.model.pose_prior.information + np.eye(21) / TURNED**2)
         if hand.plane is not None:

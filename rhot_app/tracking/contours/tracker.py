@@ -48,7 +48,7 @@ class ContourEstimator:
         self.beside: Callable[[int], Capsules | None] = lambda _: None
         self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale)
         self._markers = MarkersOfHand(rig, self._hand) if _marked(rig) else None
-        self._finder = Finder(self._hand)
+        self._finder = Finder(self._hand, alone=hands == 1)
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._names = tuple(node.name for node in rig.nodes)
         self.key_frames = KeyFrames(self._hand.model)
@@ -283,7 +283,7 @@ class ContourEstimator:
         pose, t_ns = found
         state, _ = self._predict(t_ns)
         other, _ = self._hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
-        other[BIAS:], seen = state[BIAS:], maps.silhouettes(self._hand)
+        other[BIAS:], seen = state[BIAS:], self._hand.silhouettes(maps.probabilities)
         gain = self._hand.score_of(seen, other) - self._hand.score_of(seen, state)
         apart_m = float(np.linalg.norm(joints_of(self._hand, other) - joints_of(self._hand, state), axis=1).mean())
         same = same_hand(self._hand, state, pose)

@@ -19,7 +19,7 @@ from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFram
 from rhot_app.barehand.silhouette import CORRELATED, score
 from rhot_app.barehand.start import STEP
 from rhot_app.barehand.surface import SHAPE
-from rhot_app.barehand.tracker import RELOCATION_LOG_ODDS, SEARCHED_S, START_SD, BareHandTracker
+from rhot_app.barehand.tracker import APART_M, RELOCATION_LOG_ODDS, SEARCHED_S, START_SD, BareHandTracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.kinematics import forward
@@ -27,7 +27,7 @@ from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import Rig
 from rhot_app.state import HandState, SeenContour
-from rhot_app.tracking.contours.evidence import APART_M, joints_of
+from rhot_app.tracking.contours.evidence import joints_of
 from rhot_app.tracking.contours.finder import LEAST_GAIN, Finder, Maps
 from rhot_app.tracking.contours.occlusion import Capsules, capsules_in, occluded_pixels, visible
 from rhot_app.tracking.contours.requests import JUMP_NS, NEVER
