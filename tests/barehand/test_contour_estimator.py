@@ -314,7 +314,7 @@ def test_landmarks_mend_a_finger_that_is_taken_for_its_neighbour(film, monkeypat
     curled = pose.angles.copy()
     curled[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
     rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
-    monkeypatch.setattr(Finder, "relocate", lambda *_: None)  # it would mend the finger, too
+    monkeypatch.setattr(Finder, "relocate", lambda *_, **__: None)  # it would mend the finger, too
     nodes, number = SearchedNodes(make_tracker(rig), known(film), 21), 0
     with monkeypatch.context() as patched:
         patched.setattr(Finder, "found", lambda _: (HandPose(pose.world_from_palm, curled), FIRST_NS))

@@ -281,7 +281,7 @@ def _apart_m(ours: Array, theirs: Array) -> float:
 def _log_odds(hand: BareHandTracker, state: Array, maps: Maps) -> float:
     """Of a hand in `state`, by the foreground and by how hands are bent."""
     bent = state[ANGLES:VELOCITY] - hand.model.pose_prior.mean
-    return hand.score_of(maps.silhouettes(hand), state) / CORRELATED - 0.5 * float(
+    return hand.score_of(hand.silhouettes(maps.probabilities), state) / CORRELATED - 0.5 * float(
         bent @ hand.model.pose_prior.information @ bent)
 
 
@@ -290,5 +290,5 @@ def _shown(hand: BareHandTracker, state: Array, maps: Maps) -> float:
     world = np.eye(4)
     world[:3] = state[:ANGLES].reshape(3, 4)
     _, parts = score(hand.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE].copy(),
-                     maps.silhouettes(hand))
+                     hand.silhouettes(maps.probabilities))
     return float(parts[:, 0].sum())
