@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.key_frames import KeyFrames
-from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.barehand.tracker import CONFUSED_M, BareHandTracker
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, no_hand
@@ -22,10 +22,6 @@ Points = NDArray[np.float64]
 
 MAJORITY: Final = 0.5
 """Part above which more speaks for a hand than against it: of the contour that is found, of joints on foreground."""
-
-CONFUSED_M: Final = 0.02
-"""Mean distance of two hands' joints, m, from which fingers are taken for each other: neighbouring knuckles are so far
-apart in the hand files."""
 
 FASTEST_M_S: Final = 4.0
 """m/s: twice the speed of the fastest motion in `resources/motions`. Chosen, not measured."""

@@ -121,9 +121,13 @@ SEARCHED_S = 0.2
 person's reaction time. A search in every image doubles the time of a step."""
 
 LOOK_S = 0.25, 4.0
-"""s: from a start to the first search everywhere, and between two at most; each time twice as long. A search about a
-pose does not leave one that is wrong by more than a finger's breadth. Chosen: a wrong start lasts no longer than a
-person needs to see it, and the searches take less than a fifth of a core."""
+"""s: from a start to the first search everywhere, and between two at most; each time twice as long, until one finds the
+same hand. A search about a pose does not leave one that is wrong by more than a finger's breadth. Chosen: a wrong start
+lasts no longer than a person needs to see it, and the searches take less than a fifth of a core."""
+
+CONFUSED_M = 0.02
+"""Mean distance of two hands' joints, m, from which fingers are taken for each other: neighbouring knuckles are so far
+apart in the hand files."""
 
 APART_M = 0.1
 """m: farther apart are two hands: a hand's breadth."""
@@ -334,8 +338,9 @@ class BareHandTracker:
         self._look_s, self._pause_s = t_s + LOOK_S[0], LOOK_S[0]
 
     def look_due(self, t_s: float) -> bool:
-        """Whether the hand should be looked for everywhere now; it is not again for twice as long as last."""
-        if t_s < self._look_s:
+        """Whether the hand should be looked for everywhere now; it is not again for twice as long as last. Before one
+        camera, without a plane, it is not: a start is hardly better known than a track."""
+        if t_s < self._look_s or (len(self.cameras) == 1 and self.plane is None):
             return False
         self._pause_s = min(2.0 * self._pause_s, LOOK_S[1])
         self._look_s = t_s + self._pause_s
@@ -371,17 +376,16 @@ class BareHandTracker:
         out, least = state.copy(), self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS
         out[:ANGLES], out[ANGLES:VELOCITY] = world[:3].ravel(), angles
         pose = self.look(maps) if everywhere else None
-        if pose is not None and np.linalg.norm(self._centre(pose) - self._centre(old)) < APART_M:
+        apart = None if pose is None else forward(self.model, pose).joints - forward(self.model, old).joints
+        if apart is not None and np.linalg.norm(apart, axis=1).mean() < CONFUSED_M:
+            self._look_s = np.inf
+        elif pose is not None and apart is not None and np.linalg.norm(apart.mean(axis=0)) < APART_M:
             other = state.copy()
             other[:ANGLES], other[ANGLES:VELOCITY] = pose.world_from_palm[:3].ravel(), pose.angles
             other_value = self.score_of(seen, other) / CORRELATED + self.prior_of(other) - self.prior_of(state)
             if other_value > value:
                 out, value = other, other_value
         return out if value > least else None
-
-    def _centre(self, pose: HandPose) -> Array:
-        """(3,) m: the mean of the joints."""
-        return np.asarray(forward(self.model, pose).joints.mean(axis=0))
 
     def _search(self, camera: int, image: Image, state: Array, covariance: Array, last: bool,
                 late_s: float = 0.0) -> ContourFrame:

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,11 +103,12 @@ def run(args: argparse.Namespace) -> int:
             _replay(args, outputs)
             outputs.close()
             return 0
-        directory = stack.enter_context(simulated_hand(args.seed, bare=args.bare, cameras=args.cameras)
-                                        ) if args.simulated else args.directory
+        directory, begin = args.directory, None
+        if args.simulated:
+            directory, begin = stack.enter_context(simulated_hand(args.seed, bare=args.bare, cameras=args.cameras))
         client = stack.enter_context(EngineClient(directory))
         with contextlib.suppress(KeyboardInterrupt):
-            _live(args, client, outputs)
+            _live(args, client, outputs, begin)
         outputs.close()
     return 0
 
@@ -161,7 +162,8 @@ def _settings(args: argparse.Namespace) -> MouseSettings:
     return MouseSettings(**chosen)
 
 
-def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs) -> None:
+def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs, begin: Callable[[], object] | None) -> None:
+    """Until the end, or --seconds from when the mouse has its origin and the simulated hand may `begin` to move."""
     from rhot_app.mouse.model import up_of
     from rhot_app.mouse.pointer import Mouse
     from rhot_app.state import HandState
@@ -179,7 +181,11 @@ def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs) -> 
             end = now + (args.seconds or float("inf"))
         for message in messages:
             if isinstance(message, HandState) and mouse is not None:
-                outputs.write(mouse.feed(message))
+                state = mouse.feed(message)
+                outputs.write(state)
+                if begin is not None and state.cursor is not None:
+                    begin()
+                    begin, end = None, now + (args.seconds or float("inf"))
 
 
 class _Outputs:
@@ -245,11 +251,11 @@ def line_of(mouse: MouseState) -> str:
 
 
 @contextlib.contextmanager
-def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterator[Path]:
-    """A simulated rig whose hand carries balls about, and an engine that tracks it; the engine's directory. Both end
-    with the context. `bare`: the hand wears no markers; its nodes have learnt the background. With one of the
-    `cameras` the engine knows the plane and the mouse's hand. Says on standard error how far it is. Raises
-    SimulatorError, EngineError."""
+def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterator[tuple[Path, Callable[[], object]]]:
+    """A simulated rig whose hand lies at rest, and an engine that tracks it: the engine's directory, and what makes the
+    hand carry balls about. Both processes end with the context. `bare`: the hand wears no markers; its nodes have
+    learnt the background. With one of the `cameras` the engine knows the plane and the mouse's hand. Says on standard
+    error how far it is. Raises SimulatorError, EngineError."""
     import tempfile
 
     from rhot_app.engine.client import EngineClient
@@ -281,7 +287,8 @@ def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterat
         save_rig(rig, tracked_rig(load_rig(rig), set_up, scene))
         stack.callback(stop_engine, place / "engine")
         ensure_engine(rig, place / "engine", start=True)
-        with EngineClient(place / "engine") as client, TwinRemote(place) as remote:
+        remote = stack.enter_context(TwinRemote(place))
+        with EngineClient(place / "engine") as client:
             begun = time.monotonic()
             deadline, note_s = begun + TRACKED_S, begun + NOTE_S
             if bare:
@@ -300,9 +307,8 @@ def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterat
                 if now > deadline:
                     raise SimulatorError(f"the simulated hand was not tracked within {TRACKED_S:.0f} s. Is this "
                                          "computer busy? Try again.")
-            _note("the hand is tracked, and begins to move.")
-            remote.show(show(MOTION))  # it begins where the hand rests now
-        yield place / "engine"
+        _note("the hand is tracked, and moves as soon as the mouse has its origin.")
+        yield place / "engine", lambda: remote.show(show(MOTION))  # it begins where the hand rests now
 
 
 def _note(text: str) -> None:

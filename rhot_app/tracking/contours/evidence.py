@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import SILHOUETTE
-from rhot_app.barehand.follower import CONFUSED_M, MAJORITY
+from rhot_app.barehand.follower import MAJORITY
 from rhot_app.barehand.joints import place_joints
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
-from rhot_app.barehand.tracker import APART_M, BareHandTracker
+from rhot_app.barehand.tracker import APART_M, CONFUSED_M, BareHandTracker
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.state import SeenContour

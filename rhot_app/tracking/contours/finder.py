@@ -11,11 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.follower import CONFUSED_M
 from rhot_app.barehand.observations import ForegroundFrame
 from rhot_app.barehand.silhouette import CORRELATED, search
 from rhot_app.barehand.surface import SHAPE
-from rhot_app.barehand.tracker import COVER_DROP, COVER_SHARE, RELOCATION_LOG_ODDS, SEARCHED_S, BareHandTracker
+from rhot_app.barehand.tracker import (
+    CONFUSED_M,
+    COVER_DROP,
+    COVER_SHARE,
+    RELOCATION_LOG_ODDS,
+    SEARCHED_S,
+    BareHandTracker,
+)
 from rhot_app.hand.motion.hand_process import FASTEST, POSE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.tracking.contours.evidence import joints_of

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import STEP_M
-from rhot_app.barehand.follower import CONFUSED_M
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
-from rhot_app.barehand.tracker import START_SD, BareHandTracker
+from rhot_app.barehand.tracker import CONFUSED_M, START_SD, BareHandTracker
 from rhot_app.hand.motion.hand_process import BIAS
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
