@@ -162,7 +162,8 @@ def _settings(args: argparse.Namespace) -> MouseSettings:
     return MouseSettings(**chosen)
 
 
-def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs, begin: Callable[[], object] | None) -> None:
+def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs,
+          begin: Callable[[], object] | None) -> None:
     """Until the end, or --seconds from when the mouse has its origin and the simulated hand may `begin` to move."""
     from rhot_app.mouse.model import up_of
     from rhot_app.mouse.pointer import Mouse
