@@ -285,8 +285,9 @@ class BareHandTracker:
         lengths and radii are considered, not updated (Brink 2017)."""
         cameras = list(cameras)
         last_s = max(self._taken_s) if np.isfinite(self._taken_s).any() else self.filter.newest.t_s
+        rate = float(self.process.rates(self.filter.newest.state)[1])
         for camera in cameras:
-            self._repeated[camera] = max(1.0 / (FASTEST * max(t_s - self._taken_s[camera], SAME_TIME_S)), 1.0)
+            self._repeated[camera] = max(1.0 / (rate * max(t_s - self._taken_s[camera], SAME_TIME_S)), 1.0)
             self._taken_s[camera] = t_s
         share = min(max(t_s - last_s, 0.0) / SAME_POSE_S, 1.0) if cameras else 0.0
         self.filter.partial = Partial(PHALANGES, share)
