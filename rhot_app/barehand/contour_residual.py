@@ -166,7 +166,8 @@ class Contours:
 
     Frames are moved to the state's instant by a `velocity` (POSE,) that is known before them, with its covariance. They
     do not change it: if cameras disagree, surface and calibration are wrong by a part of a millimetre, and that within
-    milliseconds would be a great speed. Without it, the state's own velocity moves them.
+    milliseconds would be a great speed. Without it, the state's own velocity moves them. No row has a derivative by a
+    velocity.
     """
 
     def __init__(self, frames: Sequence[ContourFrame], velocity: tuple[Array, Array] | None = None) -> None:

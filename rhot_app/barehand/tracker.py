@@ -123,7 +123,7 @@ person's reaction time. A search in every image doubles the time of a step."""
 LOOK_S = 0.25, 4.0
 """s: from a start to the first search everywhere, and between two at most; each time twice as long, until one finds the
 same hand. A search about a pose does not leave one that is wrong by more than a finger's breadth. Chosen: a wrong start
-lasts no longer than a person needs to see it, and the searches take less than a fifth of a core."""
+lasts no longer than a person needs to see it. A search takes a second of one core."""
 
 CONFUSED_M = 0.02
 """Mean distance of two hands' joints, m, from which fingers are taken for each other: neighbouring knuckles are so far
@@ -180,9 +180,9 @@ class BareHandTracker:
         spread = np.concatenate([size, phalanges, FOREARM_SD]).reshape(-1, 3)
         self.shape_covariance = np.square(spread)[:, :, None] * np.eye(3)
         self.shape_s = np.append(np.full(len(spread) - 1, SHAPE_S), TURN_S)
-        slowest = np.append(SLOWEST[:2], FASTEST)  # fingers begin to move within an image
+        self.slowest = np.append(SLOWEST[:2], FASTEST)  # fingers begin to move within an image
         self.process = HandProcess(self.surface.dh, self.model.limits, prior.mean,
-                                   np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, slowest, FASTEST,
+                                   np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, self.slowest, FASTEST,
                                    self.shape_covariance, self.shape_s)
         self.filter = IteratedFilter(self.process)
         self.constraints: list[Residual] = [JointLimits(self.model.limits)]
@@ -193,7 +193,7 @@ class BareHandTracker:
         self.noise = [0.0] * len(self.cameras)
         self._sequence, self._epoch_ns, self._fresh = 0, 0, False
         self.cover, self._searched_s, self._rng = 0.0, -np.inf, np.random.default_rng(0)
-        self.look_soon(0.0)
+        self.looked(0.0, moved=True, same=False)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
     def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD,
@@ -209,7 +209,7 @@ class BareHandTracker:
         self.filter.start(0.0, state, covariance)
         self.tracking = self._fresh = True
         self._taken_s, self._searched_s = [-np.inf] * len(self.cameras), -np.inf
-        self.look_soon(0.0)
+        self.looked(0.0, moved=True, same=False)
         self.frames = [None] * len(self.cameras)
 
     def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
@@ -259,8 +259,9 @@ class BareHandTracker:
         maps = self._maps(images)
         seen, start = None if maps is None else self.silhouettes(maps), None
         if maps is not None and seen is not None and (self._fresh or self._doubtful(seen, prediction, t_s)):
-            start = self.relocate(maps, prediction, since_s, everywhere=self.look_due(t_s))
+            start, same = self.relocate(maps, prediction, since_s, everywhere=self.look_due(maps, t_s))
             self._searched_s = t_s
+            self.looked(t_s, moved=start is not None, same=same)
         initial = prediction[0] if start is None else start
         passes = START_PASSES if self._fresh or start is not None else PASSES
         knot = self._fit(images, late, t_s, prediction, initial, extra, passes)
@@ -329,19 +330,24 @@ class BareHandTracker:
         return silhouettes([one for one in maps if one is not None], STEP, [self.poses[c] for c in used],
                            [self.cameras[c].intrinsics for c in used])
 
-    def look(self, maps: Sequence[NDArray[np.float32] | None]) -> HandPose | None:
-        """The most probable hand anywhere in foreground maps; None without any."""
-        found = find_in_maps(maps, self.cameras, self.model, self.surface, np.zeros(SHAPE), self._rng, 1, self.plane)
+    def look(self, maps: Sequence[NDArray[np.float32] | None], size: Array, rng: np.random.Generator
+             ) -> HandPose | None:
+        """The most probable hand of `size` (SHAPE,) anywhere in foreground maps; None without any."""
+        found = find_in_maps(maps, self.cameras, self.model, self.surface, size, rng, 1, self.plane)
         return found[0].pose if found else None
 
-    def look_soon(self, t_s: float) -> None:
-        """Have the hand looked for everywhere soon after `t_s`: it is not certain."""
-        self._look_s, self._pause_s = t_s + LOOK_S[0], LOOK_S[0]
+    def looked(self, t_s: float, *, moved: bool, same: bool) -> None:
+        """Note what a search at `t_s` has found: a hand that was `moved` to a better pose is looked for everywhere soon
+        again, and one that was found everywhere as the `same` no more."""
+        if same:
+            self._look_s = np.inf
+        elif moved:
+            self._look_s, self._pause_s = t_s + LOOK_S[0], LOOK_S[0]
 
-    def look_due(self, t_s: float) -> bool:
-        """Whether the hand should be looked for everywhere now; it is not again for twice as long as last. Before one
-        camera, without a plane, it is not: a start is hardly better known than a track."""
-        if t_s < self._look_s or (len(self.cameras) == 1 and self.plane is None):
+    def look_due(self, maps: Sequence[NDArray[np.float32] | None], t_s: float) -> bool:
+        """Whether the hand should be looked for everywhere now; it is not again for twice as long as last. In one
+        camera's map, without a plane, it is not: a start is hardly better known than a track."""
+        if t_s < self._look_s or (sum(one is not None for one in maps) < 2 and self.plane is None):
             return False
         self._pause_s = min(2.0 * self._pause_s, LOOK_S[1])
         self._look_s = t_s + self._pause_s
@@ -364,29 +370,29 @@ class BareHandTracker:
         return float((parts[:, 0] - parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
 
     def relocate(self, maps: Sequence[NDArray[np.float32] | None], found: tuple[Array, Array], dt_s: float,
-                 everywhere: bool = False) -> Array | None:
+                 everywhere: bool = False) -> tuple[Array | None, bool]:
         """A state that covers the foreground better than the `found` one, with its covariance (n, n), by
         RELOCATION_LOG_ODDS, or None. It is searched for as far about it as hands go in `dt_s`; `everywhere`: in all of
-        the images, too, where what is farther than APART_M away is another hand."""
-        (state, covariance), seen = found, self.silhouettes(maps)
-        pace = FASTEST / np.sqrt(3.0) * dt_s
+        the images, too, where what is farther than APART_M away is another hand. And whether the same hand was found
+        there. Changes nothing, and may run in a thread."""
+        (state, covariance), seen, old = found, self.silhouettes(maps), _pose_of(found[0])
+        size, pace = state[BIAS:BIAS + SHAPE].copy(), FASTEST / np.sqrt(3.0) * dt_s
         spread = covariance[:POSE, :POSE] + pace**2 * self.process.stationary[:POSE, :POSE]
-        old = _pose_of(state)
-        world, angles, value = settle(self.surface, old.world_from_palm, old.angles, spread, self.model,
-                                      state[BIAS:BIAS + SHAPE].copy(), seen, self._rng, self.plane)
-        out, least = state.copy(), self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS
-        out[:ANGLES], out[ANGLES:VELOCITY] = world[:3].ravel(), angles
-        pose = self.look(maps) if everywhere else None
-        apart = None if pose is None else forward(self.model, pose).joints - forward(self.model, old).joints
-        if apart is not None and np.linalg.norm(apart, axis=1).mean() < CONFUSED_M:
-            self._look_s = np.inf
-        elif pose is not None and apart is not None and np.linalg.norm(apart.mean(axis=0)) < APART_M:
-            other = state.copy()
-            other[:ANGLES], other[ANGLES:VELOCITY] = pose.world_from_palm[:3].ravel(), pose.angles
-            other_value = self.score_of(seen, other) / CORRELATED + self.prior_of(other) - self.prior_of(state)
-            if other_value > value:
-                out, value = other, other_value
-        return out if value > least else None
+        world, angles, value = settle(self.surface, old.world_from_palm, old.angles, spread, self.model, size, seen,
+                                      self._rng, self.plane)
+        least = self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS
+        best = _with_pose(state, HandPose(world, angles)) if value > least else None
+        pose = self.look(maps, size, self._rng) if everywhere else None
+        if pose is None:
+            return best, False
+        apart = forward(self.model, pose).joints - forward(self.model, old).joints
+        if np.linalg.norm(apart, axis=1).max() < CONFUSED_M:
+            return best, True
+        other, prior = _with_pose(state, pose), self.prior_of(state)
+        gains = [self.score_of(seen, one) / CORRELATED + self.prior_of(one) - prior
+                 for one in (other, state if best is None else best)]
+        near = np.linalg.norm(apart.mean(axis=0)) < APART_M
+        return (other if near and gains[0] > max(gains[1], least) else best), False
 
     def _search(self, camera: int, image: Image, state: Array, covariance: Array, last: bool,
                 late_s: float = 0.0) -> ContourFrame:
@@ -468,7 +474,15 @@ class BareHandTracker:
             latency_s={"filter": time.perf_counter() - begun})
 
 
+def _with_pose(state: Array, pose: HandPose) -> Array:
+    """The state with another pose."""
+    out = state.copy()
+    out[:ANGLES], out[ANGLES:VELOCITY] = pose.world_from_palm[:3].ravel(), pose.angles
+    return out
+
+
 def _pose_of(state: Array) -> HandPose:
+    """The pose in a state."""
     world = np.eye(4)
     world[:3] = state[:ANGLES].reshape(3, 4)
     return HandPose(world, state[ANGLES:VELOCITY].copy())

@@ -164,7 +164,8 @@ def _settings(args: argparse.Namespace) -> MouseSettings:
 
 def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs,
           begin: Callable[[], object] | None) -> None:
-    """Until the end, or --seconds from when the mouse has its origin and the simulated hand may `begin` to move."""
+    """Until --seconds after the first message, and after a simulated hand may `begin` to move: once the mouse has its
+    origin."""
     from rhot_app.mouse.model import up_of
     from rhot_app.mouse.pointer import Mouse
     from rhot_app.state import HandState
@@ -186,7 +187,7 @@ def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs,
                 outputs.write(state)
                 if begin is not None and state.cursor is not None:
                     begin()
-                    begin, end = None, now + (args.seconds or float("inf"))
+                    begin, end = None, time.monotonic() + (args.seconds or float("inf"))
 
 
 class _Outputs:

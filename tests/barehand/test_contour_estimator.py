@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
+from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import RigError
 from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
 from rhot_app.geometry.camera import CameraModel
@@ -156,6 +157,41 @@ def test_a_finger_that_is_taken_for_another_is_found_again(film, monkeypatch) ->
     tip = forward(model_and_surface()[0], pose).joints[INDEX_TIP]
     assert nodes.states[-1].tracked
     assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.01
+
+
+def test_a_hand_that_was_found_wrong_is_found_anew(film, monkeypatch) -> None:
+    """It is followed 3 cm beside and turned, so that fingers are taken for each other; both searches say so."""
+    pose = poses("grasp", TIMES)[0]
+    wrong = pose.world_from_palm.copy()
+    wrong[:3, :3] = wrong[:3, :3] @ Rotation.from_euler("z", 14.0, degrees=True).as_matrix()
+    wrong[:3, 3] -= 0.03 * wrong[:3, 0]
+    rig, number = bare_rig(film[0][0]), 0
+    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
+    with monkeypatch.context() as patched:
+        patched.setattr(Finder, "found", lambda _: (HandPose(wrong, pose.angles), FIRST_NS + number * PERIOD_NS))
+        patched.setattr(Finder, "follow", lambda *_: False)
+        while not nodes.states or not nodes.states[-1].tracked:
+            assert number < 20
+            nodes.step(number, film[0][1])
+            number += 1
+    assert error_mm(nodes.states[-1], pose) > 10.0, "it is wrong"
+    for _ in range(45):
+        nodes.step(number, film[0][1])
+        number += 1
+    assert nodes.states[-1].tracked and error_mm(nodes.states[-1], pose) < 3.0
+
+
+def test_a_hand_is_looked_for_everywhere_ever_more_rarely_and_not_in_one_image(film) -> None:
+    hand = BareHandTracker(bare_rig(film[0][0]))
+    both, one = [np.zeros((2, 2), np.float32)] * 2, [np.zeros((2, 2), np.float32), None]
+    hand.start(poses("grasp", TIMES)[0], 0)
+    assert not any(hand.look_due(one, t_s) for t_s in np.arange(0.0, 20.0, 0.1))
+    times = [t_s for t_s in np.arange(0.0, 20.0, 0.05) if hand.look_due(both, float(t_s))]
+    assert times[0] < 0.5 and 4 <= len(times) <= 8 and np.diff(times).max() > 3.0
+    hand.looked(20.0, moved=True, same=False)
+    assert hand.look_due(both, 20.5)
+    hand.looked(21.0, moved=False, same=True)
+    assert not hand.look_due(both, 1000.0)
 
 
 def test_slices_lie_across_the_contour_of_the_next_frame(film) -> None:

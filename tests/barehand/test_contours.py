@@ -101,6 +101,16 @@ def test_contours_of_a_later_image_follow_the_velocity() -> None:
         assert moved[good] - here[good] == pytest.approx(0.013 * 1e-2 * rows[good, axis], abs=1e-9)
 
 
+def test_a_given_velocity_moves_a_later_image_in_place_of_the_states() -> None:
+    process, (frame, state) = process_of(), _later(0.013)
+    step, velocity = np.zeros(process.size), np.zeros(POSE)
+    step[POSE], velocity[0] = 0.3, 0.3
+    own = Contours([frame]).linearise(process.retract(state, step))
+    given = Contours([frame], (velocity, np.zeros((POSE, POSE)))).linearise(state)
+    assert given.error == pytest.approx(own.error) and given.jacobian == pytest.approx(own.jacobian)
+    assert np.abs(given.error - Contours([frame]).linearise(state).error).max() > 0.1
+
+
 def test_an_uncertain_velocity_makes_a_later_image_uncertain_and_is_not_changed_by_it() -> None:
     """An error of the velocity moves the pose meanwhile: its covariance adds to that of the pose."""
     frame, state = _later(0.013)

@@ -167,5 +167,5 @@ def test_the_simulated_bare_hand_works_the_mouse_live() -> None:
     lines = [json.loads(line) for line in done.stdout.splitlines()]
     cursors = np.array([line["cursor_m"] for line in lines if line["cursor_m"] is not None])
     assert len(cursors) > 10 and np.ptp(cursors[:, 0]) > 0.05, done.stderr
-    for stage in ("start", "learn the empty scene", "looked for", "is tracked"):
+    for stage in ("a simulated rig and an engine start", "learn the empty scene", "looked for", "is tracked"):
         assert stage in done.stderr

@@ -86,7 +86,7 @@ class Finder:
         self._thread: threading.Thread | None = None
         self._newest: Maps | None = None
         self._found: tuple[int, HandPose, int] | None = None  # of which run
-        self._change: tuple[int, Array] | None = None
+        self._change: tuple[int, Array | None, bool] | None = None
         self._run = 0
         self._searched_s = -np.inf
 
@@ -112,7 +112,8 @@ class Finder:
         how, unless they take one finger for another."""
         hand = self._hand
         state, covariance = hand.filter.predict(t_s)
-        seen, change = hand.silhouettes(maps.probabilities), self.change()
+        seen, (change, same) = hand.silhouettes(maps.probabilities), self.change()
+        hand.looked(t_s, moved=False, same=same)
         covered = hand.covered(seen, state)
         worse = covered < hand.cover - COVER_DROP
         if change is not None:
@@ -123,11 +124,11 @@ class Finder:
             gain += CORRELATED * (hand.prior_of(moved) - hand.prior_of(state))
             if (worse or confused) and gain > LEAST_GAIN:
                 hand.filter.start(t_s, moved, _widened(covariance, change))
-                hand.look_soon(t_s)
+                hand.looked(t_s, moved=True, same=False)
                 return True
         if worse or t_s - self._searched_s > SEARCHED_S:
             self.relocate(maps, state, covariance, dt_s,
-                          everywhere=self._alone and not self._busy and hand.look_due(t_s))
+                          everywhere=self._alone and not self._busy and hand.look_due(maps.probabilities, t_s))
             self._searched_s = t_s
         hand.cover += (COVER_SHARE if hand.cover else 1.0) * (covered - hand.cover)
         return False
@@ -137,10 +138,11 @@ class Finder:
         found, self._found = self._found, None
         return None if found is None or found[0] != self._run else found[1:]
 
-    def change(self) -> Array | None:
-        """The step in the tangent space to where the hand may be, if it was found since it was asked for last."""
-        change, self._change = self._change, None
-        return None if change is None or change[0] != self._run else change[1]
+    def change(self) -> tuple[Array | None, bool]:
+        """The step in the tangent space to where the hand may be, if it was found since it was asked for last, and
+        whether the same hand was found everywhere."""
+        found, self._change = self._change, None
+        return (None, False) if found is None or found[0] != self._run else found[1:]
 
     def wait(self) -> None:
         """Until the search is over."""
@@ -157,7 +159,7 @@ class Finder:
             self._thread.start()
 
     def _look(self, maps: Maps, run: int) -> None:
-        pose, newest = self._hand.look(maps.probabilities), self._newest
+        pose, newest = self._hand.look(maps.probabilities, np.zeros(SHAPE), self._rng), self._newest
         if pose is None or run != self._run:
             return
         if newest is not None and newest is not maps:
@@ -165,9 +167,9 @@ class Finder:
         self._found = run, pose, maps.t_ns
 
     def _relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float, everywhere: bool, run: int) -> None:
-        moved = self._hand.relocate(maps.probabilities, (state, covariance), dt_s, everywhere)
-        if moved is not None:
-            self._change = run, self._hand.process.difference(moved, state)
+        moved, same = self._hand.relocate(maps.probabilities, (state, covariance), dt_s, everywhere)
+        if moved is not None or same:
+            self._change = run, None if moved is None else self._hand.process.difference(moved, state), same
 
     def _followed(self, pose: HandPose, maps: Maps) -> HandPose:
         """The pose in later maps, near to where it was."""

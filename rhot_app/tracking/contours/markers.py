@@ -52,7 +52,7 @@ class MarkersOfHand:
         lasting = np.where(self._markers.landmark, LASTING_S, BIAS_S)
         self._process = HandProcess(
             hand.surface.dh, hand.model.limits, prior.mean, np.asarray(np.linalg.inv(prior.information)),
-            PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.concatenate([self._shape, np.zeros((count, 3, 3))]),
+            PALM_SPREAD, hand.slowest, FASTEST, np.concatenate([self._shape, np.zeros((count, 3, 3))]),
             np.concatenate([hand.shape_s, lasting]))
         hand.process, hand.filter = self._process, IteratedFilter(self._process)
         self._hand, self._observations = hand, RecentObservations(arrays, self._markers)
@@ -205,17 +205,18 @@ def weigh(hand: BareHandTracker, markers: MarkersOfHand | None, waiting: Mapping
     prediction, spreads = hand.filter.predict(t_s), [contour.expected_sd for contour in contours]
     found: list[BesideContours] = []
     initial = prediction[0]
-    seen = Contours(contours, velocity_of(prediction))
+    edges = Contours(contours, velocity_of(prediction))
     if markers is not None:
-        prediction, found, initial = markers.choose(marked, seen, prediction, t_s)
-    residuals: list[Residual] = [*found, seen, *hand.constraints]
+        prediction, found, initial = markers.choose(marked, edges, prediction, t_s)
+        edges.move_by(velocity_of(prediction))
+    residuals: list[Residual] = [*found, edges, *hand.constraints]
     for number in range(PASSES):
         for contour, spread in zip(contours, spreads, strict=True):
             contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)
         if number < PASSES - 1:
             better = update(hand.process, t_s, prediction, residuals, initial, hand.filter.partial)
             initial = better.state
-            seen.move_by(velocity_of((better.state, better.covariance)))
+            edges.move_by(velocity_of((better.state, better.covariance)))
     knot = hand.filter.add(t_s, residuals, prediction, initial)
     if markers is not None:
         markers.judge(found, knot)
