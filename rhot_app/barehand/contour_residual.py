@@ -164,10 +164,10 @@ def in_a_fit(frame: ContourFrame) -> ContourFrame:
 class Contours:
     """Implements `Residual`: the frames of some cameras, each at its own time.
 
-    Frames are moved to the state's instant by a `velocity` (POSE,) that is known before them, with its covariance. They
-    do not change it: if cameras disagree, surface and calibration are wrong by a part of a millimetre, and that within
-    milliseconds would be a great speed. Without it, the state's own velocity moves them. No row has a derivative by a
-    velocity.
+    Frames are moved to the state's instant by a given `velocity` (POSE,), with its covariance, and do not change it: if
+    cameras disagree, surface and calibration are wrong by a part of a millimetre, and that within milliseconds would be
+    a great speed. Its error counts as independent of theirs, even where an earlier pass over these frames has estimated
+    it. Without it, the state's own velocity moves them. No row has a derivative by a velocity.
     """
 
     def __init__(self, frames: Sequence[ContourFrame], velocity: tuple[Array, Array] | None = None) -> None:
