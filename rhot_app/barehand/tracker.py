@@ -126,8 +126,8 @@ same hand. A search about a pose does not leave one that is wrong by more than a
 lasts no longer than a person needs to see it. A search takes a second of one core."""
 
 CONFUSED_M = 0.02
-"""m: distance of two hands' joints, mean or greatest, from which fingers are taken for each other: neighbouring knuckles
-are so far apart in the hand files."""
+"""m: distance of two hands' joints, mean or greatest, from which fingers are taken for each other: neighbouring
+knuckles are so far apart in the hand files."""
 
 APART_M = 0.1
 """m: farther apart are two hands: a hand's breadth."""
