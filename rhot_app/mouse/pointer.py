@@ -79,8 +79,8 @@ class MouseState:
         return button in self.pressed
 
 
-GAP_NS: Final = 250_000_000
-"""ns: states farther apart are of different stays of the hand. Rehg's mouse had 10 images a second; one may be lost."""
+GAP_NS: Final = round(1e9 * HOME_S)
+"""ns: states farther apart are of different stays of the hand. A slow rig's rest is the mean of two or three."""
 
 
 STILL_M: Final = 0.01

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import msgspec
@@ -68,7 +69,7 @@ def build_surface(anatomy: HandAnatomy, *, spacing_m: float = 2.0e-3, sleeve_fro
     right = build_model(msgspec.structs.replace(anatomy, side="right"))
     frames, points = rest_frames(right)
     limbs = _limbs(right, frames, points, sleeve_from_m, forearm)
-    vertices, triangles = _polygonised(limbs, spacing_m)
+    vertices, triangles = _polygonised(limbs.tobytes(), spacing_m)
     nearest = distances(vertices, limbs)
     weights = _weights(right, points, vertices, nearest)
     group = np.argmin(nearest, axis=1)
@@ -259,7 +260,7 @@ def distances(points: Array, limbs: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)  # it takes a second, and the live twin's cameras go on meanwhile
 def _field(xs: Array, ys: Array, zs: Array, limbs: Array) -> NDArray[np.float32]:
     out, groups = np.empty((len(xs), len(ys), len(zs)), np.float32), np.empty(GROUPS)
     for i in range(len(xs)):
@@ -269,8 +270,10 @@ def _field(xs: Array, ys: Array, zs: Array, limbs: Array) -> NDArray[np.float32]
     return out
 
 
-def _polygonised(limbs: Array, spacing_m: float) -> tuple[Array, Indices]:
+@lru_cache(maxsize=2)  # the live twin shows the same hand in other motions
+def _polygonised(packed_limbs: bytes, spacing_m: float) -> tuple[Array, Indices]:
     """Vertices and triangles of the field's zero level; behind the wrist the cells are four times as long."""
+    limbs = np.frombuffer(packed_limbs).reshape(-1, _LIMB).copy()
     reach = 1.2 * np.maximum(limbs[:, 6], limbs[:, 7]) + 3.0 * spacing_m
     low = np.minimum(limbs[:, :3], limbs[:, 3:6]).min(axis=0, initial=0.0) - reach.max()
     high = np.maximum(limbs[:, :3], limbs[:, 3:6]).max(axis=0) + reach.max()

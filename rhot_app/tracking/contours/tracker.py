@@ -197,8 +197,7 @@ class ContourEstimator:
         camera.take(frame)
         self._hand.row_s[frame.camera] = 1e-9 * frame.row_time_ns
         t_ns = frame.t_row0_master_ns
-        if self._tracking and (abs(t_ns - self._time_ns()) > JUMP_NS
-                               or self._evidence.lost(t_ns)):
+        if self._tracking and (self._time_ns() - t_ns > JUMP_NS or self._evidence.lost(t_ns)):
             self._give_up()
         marked = self._markers is not None and self._take_markers(frame, self._markers)
         if not self._tracking:
