@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.key_frames import KeyFrames
-from rhot_app.barehand.tracker import CONFUSED_M, BareHandTracker
+from rhot_app.barehand.relocalisation import SAME_POSE_M
+from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, no_hand
@@ -134,7 +135,7 @@ class HandFollower:
         centre, earlier = state.joint_positions.mean(axis=0), before[1].mean(axis=0)
         pace = float(np.linalg.norm(centre - earlier)) / max(1e-9 * (state.t_master_ns - before[0]), 1e-3)
         shape = np.linalg.norm((state.joint_positions - centre) - (before[1] - earlier), axis=1)
-        return pace < FASTEST_M_S and float(np.mean(shape)) < CONFUSED_M
+        return pace < FASTEST_M_S and float(np.mean(shape)) < SAME_POSE_M
 
     def _none(self, t_ns: int, begun: float) -> HandState:
         self._count += 1

@@ -52,25 +52,25 @@ _U0, _V0, _U1, _V1, _R0, _R1, _DU, _DV, _PER_SQUARE = range(9)
 """Of what a capsule covers of an image: places and radii at its ends, the way between them, and 1 / its square; px."""
 
 
-class Silhouettes(NamedTuple):
-    """Log odds (C, h, w) of every `step`-th pixel of C images; `poses` (C, 3, 4), `intrinsics` (C, 9) of the cameras.
-    Images of other sizes are padded with 0."""
+class LogOddsMaps(NamedTuple):
+    """Log odds of the foreground: `values` (C, h, w) of every `step`-th pixel of C images; `poses` (C, 3, 4) and
+    `intrinsics` (C, 9) of their cameras. Smaller images are padded with 0."""
 
-    odds: Array
+    values: Array
     step: int
     poses: Array
     intrinsics: Array
 
 
-def silhouettes(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequence[Array],
-                intrinsics: Sequence[Array]) -> Silhouettes:
+def log_odds_maps(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequence[Array],
+                intrinsics: Sequence[Array]) -> LogOddsMaps:
     """From foreground probabilities (h, w) of each camera (`foreground_map`), NaN where nothing is known."""
     height, width = max(one.shape[0] for one in maps), max(one.shape[1] for one in maps)
     odds = np.zeros((len(maps), height, width))
     for camera, one in enumerate(maps):
         sure = MISLABELLED + (1.0 - 2.0 * MISLABELLED) * np.asarray(one, dtype=np.float64)
         odds[camera, :one.shape[0], :one.shape[1]] = np.nan_to_num(np.log(sure / (1.0 - sure)))
-    return Silhouettes(odds, step, np.array(poses), np.array(intrinsics))
+    return LogOddsMaps(odds, step, np.array(poses), np.array(intrinsics))
 
 
 @njit(cache=True)
@@ -218,12 +218,12 @@ def cover(centres, radii, pose, intrinsics, step, margin, mask):
             _paint(circles, margin, 0.0, mask, box)
 
 
-def score(surface: Surface, world: Array, angles: Array, size: Array, images: Silhouettes) -> tuple[float, Array]:
+def score(surface: Surface, world: Array, angles: Array, size: Array, odds: LogOddsMaps) -> tuple[float, Array]:
     """Log odds of the hand at `world` (4, 4), `angles` (21,); and (C, 3) of each camera the sum of log odds on the
     hand, its pixels, and the sum of log odds in the ring about it."""
-    parts = np.zeros((len(images.odds), 3))
-    mask = np.zeros(images.odds.shape[1:], np.uint8)
-    return float(_score(surface, world, angles, size, images.odds, images.step, images.poses, images.intrinsics, mask,
+    parts = np.zeros((len(odds.values), 3))
+    mask = np.zeros(odds.values.shape[1:], np.uint8)
+    return float(_score(surface, world, angles, size, odds.values, odds.step, odds.poses, odds.intrinsics, mask,
                         parts)), parts
 
 
@@ -239,16 +239,16 @@ def _score_many(surface, world, angles, steps, limits, size, odds, step, poses, 
 
 
 def score_steps(surface: Surface, world: Array, angles: Array, steps: Array, limits: Array, size: Array,
-                images: Silhouettes) -> Array:
+                odds: LogOddsMaps) -> Array:
     """(N,) scores of the hand moved by `steps` (N, 27) of twist and angles; angles stay within `limits` (21, 2)."""
     scores = np.empty(len(steps))
-    _score_many(surface, world, angles, np.ascontiguousarray(steps), limits, size, images.odds, images.step,
-                images.poses, images.intrinsics, scores)
+    _score_many(surface, world, angles, np.ascontiguousarray(steps), limits, size, odds.values, odds.step,
+                odds.poses, odds.intrinsics, scores)
     return scores
 
 
 def search(surface: Surface, world: Array, angles: Array, covariance: Array, limits: Array, size: Array,
-           images: Silhouettes, rng: np.random.Generator, rounds: int) -> tuple[Array, Array, float]:
+           odds: LogOddsMaps, rng: np.random.Generator, rounds: int) -> tuple[Array, Array, float]:
     """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, and its score, after
     `rounds` of DRAWS poses.
 
@@ -257,7 +257,7 @@ def search(surface: Surface, world: Array, angles: Array, covariance: Array, lim
     root = np.linalg.cholesky(covariance + 1e-12 * np.eye(len(covariance)))
 
     def scores(white: Array) -> Array:
-        values = score_steps(surface, world, angles, white @ root.T, limits, size, images)
+        values = score_steps(surface, world, angles, white @ root.T, limits, size, odds)
         return np.asarray(values / CORRELATED - 0.5 * np.sum(white * white, axis=1))
     best, value = _evolved(scores, len(root), rng, rounds)
     moved, turned = np.empty((4, 4)), np.empty(21)

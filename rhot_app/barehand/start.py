@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rhot_app.barehand.silhouette import Silhouettes, score_steps, search, silhouettes
+from rhot_app.barehand.silhouette import LogOddsMaps, log_odds_maps, score_steps, search
 from rhot_app.barehand.surface import Surface
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
@@ -81,8 +81,8 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
     """The same in foreground probabilities (h, w) of every STEP-th pixel, None of a camera without an image."""
     used = [c for c, one in enumerate(foreground) if one is not None]
     maps = [one for one in foreground if one is not None]
-    seen = silhouettes(maps, STEP, [cameras[c].camera_from_world[:3] for c in used],
-                       [cameras[c].intrinsics for c in used])
+    odds = log_odds_maps(maps, STEP, [cameras[c].camera_from_world[:3] for c in used],
+                         [cameras[c].intrinsics for c in used])
     breadth = 0.5 * float(np.exp(size[0])) * float(model.base[1, 1] - model.base[4, 1] + model.radii[1, 0]
                                                    + model.radii[4, 0])
     centres = _palm_centres(maps, [cameras[c] for c in used], breadth)
@@ -97,7 +97,7 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
     middle = np.array([0.6 * model.base[2, 0] * np.exp(size[0]), 0.0, 0.0])
 
     def try_pose(world: Array, angles: Array) -> None:
-        value = float(score_steps(surface, world, angles, np.zeros((1, 27)), model.limits, size, seen)[0])
+        value = float(score_steps(surface, world, angles, np.zeros((1, 27)), model.limits, size, odds)[0])
         tried.append((value, world, angles))
 
     for centre, turn in product(centres, turns):
@@ -111,9 +111,9 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
     if plane is not None:
         covariance = plane.narrowed(covariance)
     for _, world, angles in _distinct(tried, KEPT):
-        moved, bent, value = search(surface, world, angles, covariance, model.limits, size, seen, rng, FIRST_ROUNDS)
+        moved, bent, value = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
         found.append(Found(HandPose(moved, bent), value))
-    found = [_refined(one, covariance, model, surface, size, seen, rng) for one in _best(found, REFINED)]
+    found = [_refined(one, covariance, model, surface, size, odds, rng) for one in _best(found, REFINED)]
     return _best(found, most)
 
 
@@ -121,28 +121,28 @@ def _best(found: list[Found], most: int) -> list[Found]:
     return sorted(found, key=lambda one: -one.score)[:most]
 
 
-def _refined(found: Found, covariance: Array, model: HandModel, surface: Surface, size: Array, images: Silhouettes,
+def _refined(found: Found, covariance: Array, model: HandModel, surface: Surface, size: Array, odds: LogOddsMaps,
              rng: np.random.Generator) -> Found:
     world, angles = found.pose.world_from_palm, found.pose.angles
-    angles = bend_fingers(surface, world, angles, model, size, images)
-    world, angles, value = search(surface, world, angles, covariance, model.limits, size, images, rng, LAST_ROUNDS)
+    angles = bend_fingers(surface, world, angles, model, size, odds)
+    world, angles, value = search(surface, world, angles, covariance, model.limits, size, odds, rng, LAST_ROUNDS)
     return Found(HandPose(world, angles), value)
 
 
 def settle(surface: Surface, world: Array, angles: Array, covariance: Array, model: HandModel, size: Array,
-           images: Silhouettes, rng: np.random.Generator, plane: PalmOnPlane | None = None
+           odds: LogOddsMaps, rng: np.random.Generator, plane: PalmOnPlane | None = None
            ) -> tuple[Array, Array, float]:
     """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, each finger bent or
     straight, and its score (`silhouette.search`)."""
     if plane is not None:
         covariance = plane.narrowed(covariance)
-    moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, images, rng, FIRST_ROUNDS)
-    bent = bend_fingers(surface, moved, bent, model, size, images)
-    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, images, rng, FIRST_ROUNDS)
+    moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
+    bent = bend_fingers(surface, moved, bent, model, size, odds)
+    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
 
 
 def bend_fingers(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array,
-                 images: Silhouettes) -> Array:
+                 odds: LogOddsMaps) -> Array:
     """The angles (21,) with each finger as it is, open, relaxed or closed, and the thumb as it is, relaxed or to either
     side, whichever the foreground says, one after the other, twice. What the hand holds stays as it is."""
     angles, held = angles.copy(), set(model.locked)
@@ -157,7 +157,7 @@ def bend_fingers(surface: Surface, world: Array, angles: Array, model: HandModel
         steps = np.zeros((1 + len(options), 27))
         for k, option in enumerate(options):
             steps[1 + k, 6:][where] = option - angles[where]
-        best = int(np.argmax(score_steps(surface, world, angles, steps, model.limits, size, images)))
+        best = int(np.argmax(score_steps(surface, world, angles, steps, model.limits, size, odds)))
         angles += steps[best, 6:]
     return angles
 

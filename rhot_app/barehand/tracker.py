@@ -27,15 +27,14 @@ from rhot_app.barehand.contour_residual import (
 from rhot_app.barehand.contours import STEP_M, contour_points
 from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
-from rhot_app.barehand.silhouette import CORRELATED, Silhouettes, score, silhouettes
-from rhot_app.barehand.start import STEP, Found, find_hand, find_in_maps, settle
+from rhot_app.barehand.relocalisation import ODDS_DROP, Relocaliser, pose_of
+from rhot_app.barehand.start import STEP, Found, find_hand
 from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, PALM, SHAPE, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
 from rhot_app.estimation.residual import Residual
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model, with_locked
 from rhot_app.hand.motion.hand_process import (
     ACCELERATION,
@@ -111,32 +110,6 @@ SAME_POSE_S = 1.0
 """s: images within this time show the hand in much the same pose, and count as one for its phalanges: a grasp takes a
 second. Errors of edges and of the surface last as long, and would move the lengths otherwise."""
 
-RELOCATION_LOG_ODDS = 20.0
-"""Log odds by which a pose that was searched for must be better than the predicted one: twice what the surface's own
-error changes them by. By estimate, 0.5 mm along each side of a finger and 1 mm along the palm
-(`contour_residual.COMMON`) are 10 before two cameras."""
-
-SEARCHED_S = 0.2
-"""s: a hand is searched for anew at least so often, which is how long a wrong pose may last. Chosen: about a
-person's reaction time. A search in every image doubles the time of a step."""
-
-LOOK_S = 0.25, 4.0
-"""s: from a start to the first search everywhere, and between two at most; each time twice as long, until one finds the
-same hand. A search about a pose does not leave one that is wrong by more than a finger's breadth. Chosen: a wrong start
-lasts no longer than a person needs to see it. A search takes a second of one core."""
-
-CONFUSED_M = 0.02
-"""m: distance of two hands' joints, mean or greatest, from which fingers are taken for each other: neighbouring
-knuckles are so far apart in the hand files."""
-
-APART_M = 0.1
-"""m: farther apart are two hands: a hand's breadth."""
-
-COVER_DROP, COVER_SHARE = 0.3, 0.1
-"""Log odds per pixel by which a prediction may cover the foreground worse than the hand did of late: a twentieth of the
-hand, half a finger, off the foreground (`silhouette.MISLABELLED`: 5.9 for each of its pixels). And the share of a new
-image in that memory; chosen: ten images, a third of a second at 30 a second."""
-
 
 @dataclass(frozen=True, slots=True)
 class Fit:
@@ -192,8 +165,7 @@ class BareHandTracker:
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
         self._sequence, self._epoch_ns, self._fresh = 0, 0, False
-        self.cover, self._searched_s, self._rng = 0.0, -np.inf, np.random.default_rng(0)
-        self.looked(0.0, moved=True, same=False)
+        self.relocaliser = Relocaliser(self.model, self.surface, self.cameras, self.plane)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
     def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD,
@@ -208,8 +180,8 @@ class BareHandTracker:
             state[BIAS:BIAS + SHAPE] = size
         self.filter.start(0.0, state, covariance)
         self.tracking = self._fresh = True
-        self._taken_s, self._searched_s = [-np.inf] * len(self.cameras), -np.inf
-        self.looked(0.0, moved=True, same=False)
+        self._taken_s = [-np.inf] * len(self.cameras)
+        self.relocaliser.restart()
         self.frames = [None] * len(self.cameras)
 
     def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
@@ -220,8 +192,8 @@ class BareHandTracker:
         """
         size = np.zeros(SHAPE)
         best: tuple[float, Found] | None = None
-        for found in find_hand(images, self.cameras, self.foreground, self.model, self.surface, size, self._rng,
-                               plane=self.plane):
+        for found in find_hand(images, self.cameras, self.foreground, self.model, self.surface, size,
+                               self.relocaliser.rng, plane=self.plane):
             if found.score <= 0.0:
                 continue
             self.start(found.pose, t_ns)
@@ -256,30 +228,25 @@ class BareHandTracker:
         prediction, since_s = self.filter.predict(t_s), t_s - self.filter.newest.t_s
         self.take(images, t_s)
         self.frames = [frame if c in images else None for c, frame in enumerate(self.frames)]
-        maps = self._maps(images)
-        seen, start = None if maps is None else self.silhouettes(maps), None
-        if maps is not None and seen is not None and (self._fresh or self._doubtful(seen, prediction, t_s)):
-            start, same = self.relocate(maps, prediction, since_s, everywhere=self.look_due(maps, t_s))
-            self._searched_s = t_s
-            self.looked(t_s, moved=start is not None, same=same)
+        maps, relocaliser, start = self._maps(images), self.relocaliser, None
+        odds = None if maps is None else relocaliser.odds_of(maps)
+        if maps and odds and (self._fresh or relocaliser.search_due(odds, prediction[0], t_s)):
+            everywhere = relocaliser.global_search_due(maps, t_s)
+            start, same = relocaliser.relocalise(maps, prediction, self.process.stationary, since_s, everywhere)
+            relocaliser.last_search_s = t_s
+            relocaliser.schedule_global_search(t_s, relocalised=start is not None, same=same)
         initial = prediction[0] if start is None else start
         passes = START_PASSES if self._fresh or start is not None else PASSES
         knot = self._fit(images, late, t_s, prediction, initial, extra, passes)
-        if seen is not None:
-            covered = self.covered(seen, knot.state)
-            if start is not None and covered < self.covered(seen, start) - COVER_DROP:
+        if odds is not None:
+            per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
+            if start is not None and per_pixel < relocaliser.log_odds_per_pixel(odds, start) - ODDS_DROP:
                 # the contour led away from the foreground
                 knot = self._fit(images, late, t_s, self.restart(t_s, start), start, extra, START_PASSES)
-                covered = self.covered(seen, knot.state)
-            self.cover += (1.0 if self._fresh else COVER_SHARE) * (covered - self.cover)
+                per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
+            relocaliser.average(per_pixel, first=self._fresh)
         self._fresh = False
         return knot
-
-    def _doubtful(self, seen: Silhouettes, prediction: tuple[Array, Array], t_s: float) -> bool:
-        """Whether the last search is long ago, or a prediction covers the foreground worse than the hand did of
-        late."""
-        late = t_s - self._searched_s > SEARCHED_S
-        return bool(late or self.covered(seen, prediction[0]) < self.cover - COVER_DROP)
 
     def take(self, cameras: Iterable[int], t_s: float) -> None:
         """Note that images of `cameras` at `t_s`, s since the start, are weighed next. Without cameras the phalanges'
@@ -295,7 +262,7 @@ class BareHandTracker:
 
     def restart(self, t_s: float, start: Array) -> tuple[Array, Array]:
         """Begin at rest in the state `start`; what is known of the size stays. Returns state and covariance."""
-        pose = _pose_of(start)
+        pose = pose_of(start)
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
         state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
         covariance[own, own] = self.filter.newest.covariance[own, own]
@@ -323,76 +290,6 @@ class BareHandTracker:
         if not any(known):
             return None
         return [foreground_map(images[c], self.foreground[c], STEP) if one else None for c, one in enumerate(known)]
-
-    def silhouettes(self, maps: Sequence[NDArray[np.float32] | None]) -> Silhouettes:
-        """Log odds of foreground probabilities (h, w) of every STEP-th pixel of each camera, of those that have any."""
-        used = [c for c, one in enumerate(maps) if one is not None]
-        return silhouettes([one for one in maps if one is not None], STEP, [self.poses[c] for c in used],
-                           [self.cameras[c].intrinsics for c in used])
-
-    def look(self, maps: Sequence[NDArray[np.float32] | None], size: Array, rng: np.random.Generator
-             ) -> HandPose | None:
-        """The most probable hand of `size` (SHAPE,) anywhere in foreground maps; None without any."""
-        found = find_in_maps(maps, self.cameras, self.model, self.surface, size, rng, 1, self.plane)
-        return found[0].pose if found else None
-
-    def looked(self, t_s: float, *, moved: bool, same: bool) -> None:
-        """Note what a search at `t_s` has found: a hand that was `moved` to a better pose is looked for everywhere soon
-        again, and one that was found everywhere as the `same` no more."""
-        if same:
-            self._look_s = np.inf
-        elif moved:
-            self._look_s, self._pause_s = t_s + LOOK_S[0], LOOK_S[0]
-
-    def look_due(self, maps: Sequence[NDArray[np.float32] | None], t_s: float) -> bool:
-        """Whether the hand should be looked for everywhere now; it is not again for twice as long as last. In one
-        camera's map, without a plane, it is not: a start is hardly better known than a track."""
-        if t_s < self._look_s or (sum(one is not None for one in maps) < 2 and self.plane is None):
-            return False
-        self._pause_s = min(2.0 * self._pause_s, LOOK_S[1])
-        self._look_s = t_s + self._pause_s
-        return True
-
-    def score_of(self, seen: Silhouettes, state: Array) -> float:
-        """Log odds of the hand in `state` by the foreground."""
-        pose = _pose_of(state)
-        return score(self.surface, pose.world_from_palm, pose.angles, state[BIAS:BIAS + SHAPE], seen)[0]
-
-    def prior_of(self, state: Array) -> float:
-        """Log probability density of the joint angles in `state`, but for a constant."""
-        prior, angles = self.model.pose_prior, state[ANGLES:VELOCITY]
-        return -0.5 * float((angles - prior.mean) @ prior.information @ (angles - prior.mean))
-
-    def covered(self, seen: Silhouettes, state: Array) -> float:
-        """Log odds of the hand in `state` by the foreground, per pixel of the hand."""
-        pose = _pose_of(state)
-        _, parts = score(self.surface, pose.world_from_palm, pose.angles, state[BIAS:BIAS + SHAPE], seen)
-        return float((parts[:, 0] - parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
-
-    def relocate(self, maps: Sequence[NDArray[np.float32] | None], found: tuple[Array, Array], dt_s: float,
-                 everywhere: bool = False) -> tuple[Array | None, bool]:
-        """A state that covers the foreground better than the `found` one, with its covariance (n, n), by
-        RELOCATION_LOG_ODDS, or None. It is searched for as far about it as hands go in `dt_s`; `everywhere`: in all of
-        the images, too, where what is farther than APART_M away is another hand. And whether the same hand was found
-        there. Changes nothing, and may run in a thread."""
-        (state, covariance), seen, old = found, self.silhouettes(maps), _pose_of(found[0])
-        size, pace = state[BIAS:BIAS + SHAPE].copy(), FASTEST / np.sqrt(3.0) * dt_s
-        spread = covariance[:POSE, :POSE] + pace**2 * self.process.stationary[:POSE, :POSE]
-        world, angles, value = settle(self.surface, old.world_from_palm, old.angles, spread, self.model, size, seen,
-                                      self._rng, self.plane)
-        least = self.score_of(seen, state) / CORRELATED + RELOCATION_LOG_ODDS
-        best = _with_pose(state, HandPose(world, angles)) if value > least else None
-        pose = self.look(maps, size, self._rng) if everywhere else None
-        if pose is None:
-            return best, False
-        apart = forward(self.model, pose).joints - forward(self.model, old).joints
-        if np.linalg.norm(apart, axis=1).max() < CONFUSED_M:
-            return best, True
-        other, prior = _with_pose(state, pose), self.prior_of(state)
-        gains = [self.score_of(seen, one) / CORRELATED + self.prior_of(one) - prior
-                 for one in (other, state if best is None else best)]
-        near = np.linalg.norm(apart.mean(axis=0)) < APART_M
-        return (other if near and gains[0] > max(gains[1], least) else best), False
 
     def _search(self, camera: int, image: Image, state: Array, covariance: Array, last: bool,
                 late_s: float = 0.0) -> ContourFrame:
@@ -472,20 +369,6 @@ class BareHandTracker:
                 "joint_velocity_sd": motion[0], "joint_acceleration_sd": motion[1],
                 "hand_scale": float(np.exp(state[BIAS])), "hand_scale_sd": float(deviation[MOTION])},
             latency_s={"filter": time.perf_counter() - begun})
-
-
-def _with_pose(state: Array, pose: HandPose) -> Array:
-    """The state with another pose."""
-    out = state.copy()
-    out[:ANGLES], out[ANGLES:VELOCITY] = pose.world_from_palm[:3].ravel(), pose.angles
-    return out
-
-
-def _pose_of(state: Array) -> HandPose:
-    """The pose in a state."""
-    world = np.eye(4)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    return HandPose(world, state[ANGLES:VELOCITY].copy())
 
 
 def _stated_sd(hand: HandAnatomy) -> Array | None:

@@ -181,17 +181,17 @@ def test_a_hand_that_was_found_wrong_is_found_anew(film, monkeypatch) -> None:
     assert nodes.states[-1].tracked and error_mm(nodes.states[-1], pose) < 3.0
 
 
-def test_a_hand_is_looked_for_everywhere_ever_more_rarely_and_not_in_one_image(film) -> None:
+def test_the_whole_image_is_searched_ever_more_rarely_and_not_before_one_camera(film) -> None:
     hand = BareHandTracker(bare_rig(film[0][0]))
     both, one = [np.zeros((2, 2), np.float32)] * 2, [np.zeros((2, 2), np.float32), None]
     hand.start(poses("grasp", TIMES)[0], 0)
-    assert not any(hand.look_due(one, t_s) for t_s in np.arange(0.0, 20.0, 0.1))
-    times = [t_s for t_s in np.arange(0.0, 20.0, 0.05) if hand.look_due(both, float(t_s))]
+    assert not any(hand.relocaliser.global_search_due(one, t_s) for t_s in np.arange(0.0, 20.0, 0.1))
+    times = [t_s for t_s in np.arange(0.0, 20.0, 0.05) if hand.relocaliser.global_search_due(both, float(t_s))]
     assert times[0] < 0.5 and 4 <= len(times) <= 8 and np.diff(times).max() > 3.0
-    hand.looked(20.0, moved=True, same=False)
-    assert hand.look_due(both, 20.5)
-    hand.looked(21.0, moved=False, same=True)
-    assert not hand.look_due(both, 1000.0)
+    hand.relocaliser.schedule_global_search(20.0, relocalised=True, same=False)
+    assert hand.relocaliser.global_search_due(both, 20.5)
+    hand.relocaliser.schedule_global_search(21.0, relocalised=False, same=True)
+    assert not hand.relocaliser.global_search_due(both, 1000.0)
 
 
 def test_slices_lie_across_the_contour_of_the_next_frame(film) -> None:

@@ -96,7 +96,7 @@ def test_a_search_that_ends_while_its_track_is_given_up_gives_no_pose(hand: Bare
                                                                       monkeypatch: pytest.MonkeyPatch) -> None:
     finder = Finder(hand)
     pose = poses("grasp", (0.5,))[0]
-    monkeypatch.setattr(hand, "look", lambda *_: pose)
+    monkeypatch.setattr(hand.relocaliser, "search_globally", lambda *_: pose)
 
     class Maps:
         probabilities = ()

@@ -14,7 +14,8 @@ from rhot_app.barehand.contours import SILHOUETTE
 from rhot_app.barehand.follower import MAJORITY
 from rhot_app.barehand.joints import place_joints
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
-from rhot_app.barehand.tracker import APART_M, CONFUSED_M, BareHandTracker
+from rhot_app.barehand.relocalisation import SAME_HAND_M, SAME_POSE_M
+from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.state import SeenContour
@@ -122,7 +123,7 @@ def same_hand(hand: BareHandTracker, state: Array, pose: HandPose) -> bool:
     ours, theirs = joints_of(hand, state), forward(hand.model, pose).joints
     ours_centre, theirs_centre = ours.mean(axis=0), theirs.mean(axis=0)
     shape = np.linalg.norm((ours - ours_centre) - (theirs - theirs_centre), axis=1)
-    return bool(np.mean(shape) < CONFUSED_M and np.linalg.norm(ours_centre - theirs_centre) < APART_M)
+    return bool(np.mean(shape) < SAME_POSE_M and np.linalg.norm(ours_centre - theirs_centre) < SAME_HAND_M)
 
 
 def joints_of(hand: BareHandTracker, state: Array) -> Array:

@@ -12,16 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import ForegroundFrame
+from rhot_app.barehand.relocalisation import LOCAL_SEARCH_S, ODDS_DROP, RELOCALISATION_LOG_ODDS, SAME_POSE_M
 from rhot_app.barehand.silhouette import CORRELATED, search
 from rhot_app.barehand.surface import SHAPE
-from rhot_app.barehand.tracker import (
-    CONFUSED_M,
-    COVER_DROP,
-    COVER_SHARE,
-    RELOCATION_LOG_ODDS,
-    SEARCHED_S,
-    BareHandTracker,
-)
+from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.motion.hand_process import FASTEST, POSE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.tracking.contours.evidence import joints_of
@@ -34,8 +28,8 @@ log = logging.getLogger(__name__)
 MOVED_M, TURNED = 0.05, 0.4
 """m and rad: how far a hand that is being looked for moves while it is, at most: it is held still, more or less."""
 
-LEAST_GAIN = RELOCATION_LOG_ODDS * CORRELATED
-"""Log odds of pixels by which another pose must cover the foreground better (`barehand.tracker`)."""
+LEAST_GAIN = RELOCALISATION_LOG_ODDS * CORRELATED
+"""Log odds of pixels by which another pose must cover the foreground better (`barehand.relocalisation`)."""
 
 SAME_MAPS_NS = 100_000_000
 """ns: what was seen so far apart may still be of one place of a hand that is looked for."""
@@ -76,8 +70,9 @@ class NewestMaps:
 
 
 class Finder:
-    """`look` and `relocate` begin a search, `found` and `change` give what came of it, once. One search at a time; all
-    belong to the tracker's thread."""
+    """Searches in a thread of its own. `look` and `relocalise` begin one, `found` and `change` return its result once.
+
+    One search runs at a time. All methods belong to the tracker's thread."""
 
     def __init__(self, hand: BareHandTracker, *, alone: bool = True) -> None:
         """`alone`: no other hand is in the images, for which a search everywhere might take it."""
@@ -101,36 +96,36 @@ class Finder:
         self._newest = maps
         self._begin(self._look, maps, self._run)
 
-    def relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float, everywhere: bool = False) -> None:
-        """See whether a hand in `state` may have gone elsewhere in `dt_s` (`BareHandTracker.relocate`)."""
-        self._begin(self._relocate, maps, state.copy(), covariance.copy(), dt_s, everywhere, self._run)
+    def relocalise(self, maps: Maps, state: Array, covariance: Array, dt_s: float, everywhere: bool = False) -> None:
+        """See whether a hand in `state` may have gone elsewhere in `dt_s` (`Relocaliser.relocalise`)."""
+        self._begin(self._relocalise, maps, state.copy(), covariance.copy(), dt_s, everywhere, self._run)
 
     def follow(self, maps: Maps, t_s: float, dt_s: float) -> bool:
         """Search anew every SEARCHED_S, and when the hand covers the foreground of `t_s` worse than of late. The search
         asks whether another pose, as far away as hands go in `dt_s`, covers it better. A change that was found is
         compared in the newest maps, into which the hand has moved meanwhile. Whether it was moved: edges tell better
         how, unless they take one finger for another."""
-        hand = self._hand
+        hand, relocaliser = self._hand, self._hand.relocaliser
         state, covariance = hand.filter.predict(t_s)
-        seen, (change, same) = hand.silhouettes(maps.probabilities), self.change()
-        hand.looked(t_s, moved=False, same=same)
-        covered = hand.covered(seen, state)
-        worse = covered < hand.cover - COVER_DROP
+        odds, (change, same) = relocaliser.odds_of(maps.probabilities), self.change()
+        relocaliser.schedule_global_search(t_s, relocalised=False, same=same)
+        per_pixel = relocaliser.log_odds_per_pixel(odds, state)
+        worse = per_pixel < relocaliser.average_odds - ODDS_DROP
         if change is not None:
             moved = hand.process.retract(state, change)
             way = joints_of(hand, moved) - joints_of(hand, state)
-            confused = np.linalg.norm(way - way.mean(axis=0), axis=1).max() > CONFUSED_M
-            gain = hand.score_of(seen, moved) - hand.score_of(seen, state)
-            gain += CORRELATED * (hand.prior_of(moved) - hand.prior_of(state))
+            confused = np.linalg.norm(way - way.mean(axis=0), axis=1).max() > SAME_POSE_M
+            gain = relocaliser.log_odds(odds, moved) - relocaliser.log_odds(odds, state)
+            gain += CORRELATED * (relocaliser.log_prior(moved) - relocaliser.log_prior(state))
             if (worse or confused) and gain > LEAST_GAIN:
                 hand.filter.start(t_s, moved, _widened(covariance, change))
-                hand.looked(t_s, moved=True, same=False)
+                relocaliser.schedule_global_search(t_s, relocalised=True, same=False)
                 return True
-        if worse or t_s - self._searched_s > SEARCHED_S:
-            self.relocate(maps, state, covariance, dt_s,
-                          everywhere=self._alone and not self._busy and hand.look_due(maps.probabilities, t_s))
+        if worse or t_s - self._searched_s > LOCAL_SEARCH_S:
+            everywhere = self._alone and not self._busy and relocaliser.global_search_due(maps.probabilities, t_s)
+            self.relocalise(maps, state, covariance, dt_s, everywhere)
             self._searched_s = t_s
-        hand.cover += (COVER_SHARE if hand.cover else 1.0) * (covered - hand.cover)
+        relocaliser.average(per_pixel, first=not relocaliser.average_odds)
         return False
 
     def found(self) -> tuple[HandPose, int] | None:
@@ -159,28 +154,31 @@ class Finder:
             self._thread.start()
 
     def _look(self, maps: Maps, run: int) -> None:
-        pose, newest = self._hand.look(maps.probabilities, np.zeros(SHAPE), self._rng), self._newest
+        pose = self._hand.relocaliser.search_globally(maps.probabilities, np.zeros(SHAPE), self._rng)
+        newest = self._newest
         if pose is None or run != self._run:
             return
         if newest is not None and newest is not maps:
             pose, maps = self._followed(pose, newest), newest
         self._found = run, pose, maps.t_ns
 
-    def _relocate(self, maps: Maps, state: Array, covariance: Array, dt_s: float, everywhere: bool, run: int) -> None:
-        moved, same = self._hand.relocate(maps.probabilities, (state, covariance), dt_s, everywhere)
+    def _relocalise(self, maps: Maps, state: Array, covariance: Array, dt_s: float, everywhere: bool, run: int) -> None:
+        process = self._hand.process
+        moved, same = self._hand.relocaliser.relocalise(maps.probabilities, (state, covariance), process.stationary,
+                                                        dt_s, everywhere)
         if moved is not None or same:
-            self._change = run, None if moved is None else self._hand.process.difference(moved, state), same
+            self._change = run, None if moved is None else process.difference(moved, state), same
 
     def _followed(self, pose: HandPose, maps: Maps) -> HandPose:
         """The pose in later maps, near to where it was."""
         hand = self._hand
-        seen = hand.silhouettes(maps.probabilities)
+        odds = hand.relocaliser.odds_of(maps.probabilities)
         covariance = np.diag(np.repeat(np.square([MOVED_M, TURNED, TURNED]), (3, 3, 21)))
         covariance[6:, 6:] = np.linalg.inv(hand.model.pose_prior.information + np.eye(21) / TURNED**2)
         if hand.plane is not None:
             covariance = hand.plane.narrowed(covariance)
         world, angles, _ = search(hand.surface, pose.world_from_palm, pose.angles, covariance, hand.model.limits,
-                                  np.zeros(SHAPE), seen, self._rng, _ROUNDS)
+                                  np.zeros(SHAPE), odds, self._rng, _ROUNDS)
         return HandPose(world, angles)
 
 

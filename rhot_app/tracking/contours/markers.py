@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import SAME_TIME_S, ContourFrame, Contours, velocity_of
 from rhot_app.barehand.observations import EdgeFrame
+from rhot_app.barehand.relocalisation import RELOCALISATION_LOG_ODDS
 from rhot_app.barehand.surface import SHAPE
-from rhot_app.barehand.tracker import CONFUSED_PX, PASSES, RELOCATION_LOG_ODDS, BareHandTracker
+from rhot_app.barehand.tracker import CONFUSED_PX, PASSES, BareHandTracker
 from rhot_app.estimation.filter import IteratedFilter, Knot, update
 from rhot_app.estimation.residual import Residual
 from rhot_app.hand.landmarks import LASTING_M, LASTING_S
@@ -135,7 +136,7 @@ class MarkersOfHand:
         state = update(hand.process, t_s, wide, residuals, None, hand.filter.partial).state
         state = update(hand.process, t_s, wide, [*residuals, contours], state, hand.filter.partial).state
         away = hand.process.difference(state, predicted[0])[:POSE]
-        cost = (2.0 * RELOCATION_LOG_ODDS + float(away @ np.linalg.solve(wide[1][:POSE, :POSE], away))
+        cost = (2.0 * RELOCALISATION_LOG_ODDS + float(away @ np.linalg.solve(wide[1][:POSE, :POSE], away))
                 + _cost(again, contours, state, stationary))
         if cost < _cost(found, contours, predicted[0], stationary):
             return wide, again, state

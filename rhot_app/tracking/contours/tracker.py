@@ -19,7 +19,8 @@ from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
-from rhot_app.barehand.tracker import CONFUSED_M, START_SD, BareHandTracker
+from rhot_app.barehand.relocalisation import SAME_POSE_M
+from rhot_app.barehand.tracker import START_SD, BareHandTracker
 from rhot_app.hand.motion.hand_process import BIAS
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
@@ -65,7 +66,8 @@ class ContourEstimator:
         self.key_frames.clear()
         if self._markers is not None:
             self._markers.reset()
-        self._hand.frames, self._hand.cover, self._hand.tracking = [None] * len(self._names), 0.0, False
+        self._hand.frames, self._hand.tracking = [None] * len(self._names), False
+        self._hand.relocaliser.average_odds = 0.0
         self._requests = Requests(self._hand, self._predict, lambda t_ns: self.beside(t_ns), self._most)
         self._cameras = self._requests.cameras
         self._evidence, self._maps = Evidence(self._hand, self._cameras), NewestMaps(self._cameras)
@@ -118,7 +120,7 @@ class ContourEstimator:
         hand.filter.add(0.0, [contour, *hand.constraints])
         state = hand.filter.newest.state
         hand.process.difference(state, state)  # compiled here, for `MarkersOfHand.choose`
-        self._finder.relocate(maps, hand.filter.newest.state, hand.filter.newest.covariance, 0.03)
+        self._finder.relocalise(maps, hand.filter.newest.state, hand.filter.newest.covariance, 0.03)
         self._finder.wait()
         self._finder.look(maps)
         self._finder.wait()
@@ -281,11 +283,12 @@ class ContourEstimator:
         pose, t_ns = found
         state, _ = self._predict(t_ns)
         other, _ = self._hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
-        other[BIAS:], seen = state[BIAS:], self._hand.silhouettes(maps.probabilities)
-        gain = self._hand.score_of(seen, other) - self._hand.score_of(seen, state)
+        other[BIAS:], relocaliser = state[BIAS:], self._hand.relocaliser
+        odds = relocaliser.odds_of(maps.probabilities)
+        gain = relocaliser.log_odds(odds, other) - relocaliser.log_odds(odds, state)
         apart_m = float(np.linalg.norm(joints_of(self._hand, other) - joints_of(self._hand, state), axis=1).mean())
         same = same_hand(self._hand, state, pose)
-        if gain > (LEAST_GAIN if same else 0.0) and apart_m > CONFUSED_M:  # it has come in meanwhile, or is another one
+        if gain > (LEAST_GAIN if same else 0.0) and apart_m > SAME_POSE_M:  # it has come in since, or is another one
             self._start(pose, t_ns)
         elif same:
             self._evidence.confirmed = self._ever = True
@@ -304,7 +307,7 @@ class ContourEstimator:
 
     def _start(self, pose: HandPose, t_ns: int) -> None:
         self._hand.start(pose, t_ns)
-        self._hand.cover = 0.0
+        self._hand.relocaliser.average_odds = 0.0
         self._finder.reset()
         self.key_frames.clear()
         if self._markers is not None:

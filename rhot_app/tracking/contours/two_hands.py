@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest
+from rhot_app.barehand.relocalisation import LOCAL_SEARCH_S, RELOCALISATION_LOG_ODDS, SAME_HAND_M
 from rhot_app.barehand.silhouette import CORRELATED, score
 from rhot_app.barehand.start import STEP
 from rhot_app.barehand.surface import SHAPE
-from rhot_app.barehand.tracker import APART_M, RELOCATION_LOG_ODDS, SEARCHED_S, START_SD, BareHandTracker
+from rhot_app.barehand.tracker import START_SD, BareHandTracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.kinematics import forward
@@ -159,7 +160,7 @@ class TwoBareHands(TwoHands):
         if _apart_m(*places) > self._thick_m:
             return
         maps = self._newest_maps(t_ns)
-        odds = [_log_odds(one.hand, state, maps) + RELOCATION_LOG_ODDS * one.confirmed
+        odds = [_log_odds(one.hand, state, maps) + RELOCALISATION_LOG_ODDS * one.confirmed
                 for one, state in zip(self._both, states, strict=True)]
         worse = int(odds[0] >= odds[1])
         one, better = self._both[worse], self._both[1 - worse]
@@ -178,20 +179,20 @@ class TwoBareHands(TwoHands):
             return
         found = finder.found()
         if found is None:
-            if not 0 <= t_ns - self._looked_ns[number] < 1e9 * SEARCHED_S:  # a search takes a processor
+            if not 0 <= t_ns - self._looked_ns[number] < 1e9 * LOCAL_SEARCH_S:  # a search takes a processor
                 self._looked_ns[number] = t_ns
                 finder.look(self._newest_maps(t_ns, self._beside(hand, t_ns)))
             return
         pose, found_ns = found
         state = hand.state_at(found_ns)
-        if _apart_m(joints_of(hand.hand, state), forward(other.hand.model, pose).joints) > APART_M:
+        if _apart_m(joints_of(hand.hand, state), forward(other.hand.model, pose).joints) > SAME_HAND_M:
             return
         maps = self._newest_maps(t_ns)
         instead, _ = other.hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
         gain = _log_odds(other.hand, instead, maps) - _log_odds(hand.hand, state, maps)
         self._gains[number] = gain
         others = self._gains[1 - number] if other.confirmed else 0.0
-        if others is not None and gain + others > RELOCATION_LOG_ODDS:
+        if others is not None and gain + others > RELOCALISATION_LOG_ODDS:
             hand.give_up()
             other.start(pose, found_ns)
 
@@ -280,9 +281,9 @@ def _apart_m(ours: Array, theirs: Array) -> float:
 
 def _log_odds(hand: BareHandTracker, state: Array, maps: Maps) -> float:
     """Of a hand in `state`, by the foreground and by how hands are bent."""
-    bent = state[ANGLES:VELOCITY] - hand.model.pose_prior.mean
-    return hand.score_of(hand.silhouettes(maps.probabilities), state) / CORRELATED - 0.5 * float(
-        bent @ hand.model.pose_prior.information @ bent)
+    relocaliser = hand.relocaliser
+    odds = relocaliser.odds_of(maps.probabilities)
+    return relocaliser.log_odds(odds, state) / CORRELATED + relocaliser.log_prior(state)
 
 
 def _shown(hand: BareHandTracker, state: Array, maps: Maps) -> float:
@@ -290,5 +291,5 @@ def _shown(hand: BareHandTracker, state: Array, maps: Maps) -> float:
     world = np.eye(4)
     world[:3] = state[:ANGLES].reshape(3, 4)
     _, parts = score(hand.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE].copy(),
-                     hand.silhouettes(maps.probabilities))
+                     hand.relocaliser.odds_of(maps.probabilities))
     return float(parts[:, 0].sum())
