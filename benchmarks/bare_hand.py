@@ -35,7 +35,7 @@ from tables import arguments, publish, table  # noqa: E402
 
 from rhot_app.barehand.contour_residual import Contours  # noqa: E402
 from rhot_app.barehand.contours import SILHOUETTE  # noqa: E402
-from rhot_app.barehand.surface import FINGER_SIZE, LENGTH, RADIUS, SHAPE, WHOLE, surface_of  # noqa: E402
+from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, SHAPE, surface_of  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
 from rhot_app.estimation.filter import gauss_newton_step  # noqa: E402
 from rhot_app.estimation.residual import stack  # noqa: E402
@@ -85,7 +85,7 @@ def iteration_ms(tracker: BareHandTracker, images: list[np.ndarray]) -> dict[str
 
     error, jacobian, variances = rows()
     here = np.zeros(tracker.process.size)
-    parts = {"slices": lambda: [tracker.expected(c, knot.state, knot.covariance) for c in frames],
+    parts = {"slices": lambda: [tracker.expected_contour(c, knot.state, knot.covariance) for c in frames],
              "edges": lambda: [frame.observe(find_edges(images[c], frame.slices, tracker.foreground[c],
                                                         tracker.noise[c])) for c, frame in frames.items()],
              "Jacobian": rows,
@@ -145,7 +145,7 @@ def run(case: str, motion: str, seed: int, frames: int) -> dict[str, float]:
     shape = tracker.filter.newest.state[BIAS:BIAS + SHAPE]
     true, file = (np.log([bone for finger in one.fingers.values() for bone in finger.bones_mm])
                   for one in (hand, believed))
-    left = true - file - shape[WHOLE] - shape[FINGER_SIZE] - shape[LENGTH:RADIUS]
+    left = true - file - shape[HAND_SIZE] - shape[FINGER_SIZE] - shape[LENGTH:RADIUS]
     return {**iteration_ms(tracker, images),
             "lengths %": 100.0 * float(np.sqrt(np.mean(left**2))), "joint mm": float(np.mean(joints)),
             "p95 mm": float(np.percentile(joints, 95)),
@@ -166,7 +166,7 @@ def edges(motion: str, seed: int, frames: int) -> dict[str, float]:
         state, covariance = tracker.filter.newest.state, 1e-6 * np.eye(tracker.process.size)
         for c, camera in enumerate(cameras):
             image = picture(tracker.surface, pose.world_from_palm, pose.angles, camera, walls[c], 1000 * seed + k)
-            frame = tracker.expected(c, state, covariance)
+            frame = tracker.expected_contour(c, state, covariance)
             true, _, good = frame.predict(state)
             outline = np.flatnonzero(good & (frame.points.behind == SILHOUETTE))
             for name, known in (("skin", learn_skin(image)), ("background", learn_background(

@@ -92,7 +92,7 @@ def offsets(tracker: BareHandTracker, surface: Surface, pose: HandPose, images: 
     tracker.start(pose, 0, POSE_SD)
     capsules, found = [], []
     for camera, image in enumerate(images):
-        frame = tracker.expected(camera, tracker.filter.newest.state, tracker.filter.newest.covariance)
+        frame = tracker.expected_contour(camera, tracker.filter.newest.state, tracker.filter.newest.covariance)
         scale = frame.points.scale
         frame.slices[:, 4] = np.minimum(REACH_M * scale, REACH_PX)
         edges = find_edges(image, frame.slices, learn_skin(image), noise_of(image))

@@ -38,7 +38,7 @@ from bare_hand import CHI2_3, MOTIONS, mistaken  # noqa: E402
 from bare_scenes import DISTANCE_M, rig_of, right_hand  # noqa: E402
 from pictures import picture, two_cameras, wall  # noqa: E402
 
-from rhot_app.barehand.surface import capsules_of, meet, surface_of  # noqa: E402
+from rhot_app.barehand.surface import capsules_of, ray_to_capsule, surface_of  # noqa: E402
 from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
@@ -123,7 +123,7 @@ def _hide(one: CameraObservations, centres: Array, radii: Array, camera: CameraM
         way = 0.5 * (centres[tip, 0] + centres[tip, 1]) - o
         far = float(np.linalg.norm(way))
         u = way / far
-        hits = [meet(*o, *u, centres[k, 0], centres[k, 1], *radii[k]) for k in range(len(radii)) if k != tip]
+        hits = [ray_to_capsule(*o, *u, centres[k, 0], centres[k, 1], *radii[k]) for k in range(len(radii)) if k != tip]
         if any(0.0 < hit < far - radii[tip].max() for hit in hits):
             one.pixels[m], one.flags[m] = np.nan, int(MarkerFlag.LOST)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.surface import FOREARM, PALM, Surface, meet
+from rhot_app.barehand.surface import FOREARM, PALM, Surface, ray_to_capsule
 from rhot_app.geometry.camera import CameraModel, undistort_points
 from rhot_app.hand.articulated import Box, Capsule
 from rhot_app.hand.articulated_model import ArticulatedModel
@@ -210,7 +210,7 @@ def hit(bodies, placed, k, ox, oy, oz, ux, uy, uz, margin):
         if reach <= max(ra, rb) + 1e-12:  # a ball
             rest = mx * mx + my * my + mz * mz - along * along
             return along - math.sqrt(ra * ra - rest)
-        return meet(ox, oy, oz, ux, uy, uz, a, b, ra, rb)
+        return ray_to_capsule(ox, oy, oz, ux, uy, uz, a, b, ra, rb)
     pose = placed.box[k]
     enter, leave = -1e9, 1e9
     for i in range(3):

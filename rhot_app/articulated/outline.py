@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rhot_app.articulated.bodies import CAPSULE, Bodies, Placed, hit_layer
 from rhot_app.articulated.visibility import NONE, front_layer
-from rhot_app.barehand.contours import BESIDE_M, JUMP_M, STEP_M, camera_centre, image_normal, project, side_normals
+from rhot_app.barehand.contours import JUMP_M, OUTSIDE_M, STEP_M, camera_centre, image_normal, project, side_normals
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -144,8 +144,8 @@ def _edges(bodies, placed, order, pose, intrinsics, o, width, height, k, step_m,
 @njit(cache=True)
 def _beside(bodies, placed, order, layer, o, p, n, sign):
     """The layer that a ray just beside a point p of `layer` meets first, and how far behind p."""
-    x, y, z = (p[0] + sign * BESIDE_M * n[0] - o[0], p[1] + sign * BESIDE_M * n[1] - o[1],
-               p[2] + sign * BESIDE_M * n[2] - o[2])
+    x, y, z = (p[0] + sign * OUTSIDE_M * n[0] - o[0], p[1] + sign * OUTSIDE_M * n[1] - o[1],
+               p[2] + sign * OUTSIDE_M * n[2] - o[2])
     far = math.sqrt(x * x + y * y + z * z)
     if order.shape[0]:
         layer = front_layer(bodies, placed, order, o[0], o[1], o[2], x / far, y / far, z / far)

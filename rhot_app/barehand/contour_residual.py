@@ -1,13 +1,13 @@
 """The residual of one camera's edges: contour points of the hand against the edges that were found near them.
 
 On a slice, the hand's edge is one of the edges found, or none of them (Isard and Blake 1998). Clutter is a Poisson
-process along the slice. An edge counts by the probability that it is the hand's, at the present state. So a slice
-without edges, or with edges of other things only, changes nothing.
+process along the slice. An edge is weighted by the probability, at the present state, that it is the hand's. So a slice
+without edges, or with edges of other objects only, changes nothing.
 
-The phalanges' lengths and radii are numbers of the state, uncertain (`tracker.PHALANGES`). Two
-opposite edges then determine the axis, as in feature mode, and one edge alone is less certain. What else the surface
-has wrong is in part the same all along one side of a capsule, in all cameras: that offset is marginalised. It lasts as
-long as the hand shows the same side: images within that time count as one.
+The lengths and radii of the phalanges are uncertain parts of the state (`tracker.PHALANGES`). Two opposite edges then
+determine the axis, as in feature mode, and one edge alone is less certain. The rest of the surface's error is partly
+common to one side of a capsule, in all cameras: that offset is marginalised. The error persists while the hand shows
+the same side, so images within that time count as one.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, follow
+from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, contour_on_slices
 from rhot_app.barehand.surface import FOREARM, PALM, SHAPE, Surface
 from rhot_app.estimation import residual
 from rhot_app.estimation.residual import UNIT, Rows
@@ -33,34 +33,34 @@ SHAPE_SD_M = 0.7e-3
 """m: standard deviation of a finger's skin about the model's surface: creases, joints, nails and pads."""
 
 FLESHY = 2.0
-"""By how much that of palm and forearm is larger: their flesh has no capsules of its own. Measured between the twin's
-hand and the tracker's: 1.0 to 1.4 mm, and 0.7 mm on fingers."""
+"""Factor on SHAPE_SD_M for palm and forearm, whose flesh has no capsules of its own. Measured between the twin's hand
+and the tracker's: 1.0 to 1.4 mm, and 0.7 mm on fingers."""
 
 COMMON = 0.5
-"""Part of the variance that is common to one side of a capsule. Measured so, too: 0.5 mm between the sides of the
-fingers, and 0.5 mm within one."""
+"""Part of the variance that is common to one side of a capsule. Measured in the same way: 0.5 mm between the sides of
+the fingers, and 0.5 mm within one side."""
 
 MISSED = np.array([0.1, 0.4])
-"""Probability that a silhouette, or an edge within the hand, is no edge of the image."""
+"""Probabilities of a missed detection: that a silhouette, and an edge within the hand, is no edge of the image."""
 
 GROUPS = FOREARM + 1
-"""Fingers, palm and forearm."""
+"""Number of groups of capsules: five fingers, palm and forearm."""
 
 DEGREES = 4.0
-"""Of freedom, of Student's distribution of edges about the contour (Lange, Little and Taylor 1989)."""
+"""Degrees of freedom of Student's t distribution of edges about the contour (Lange, Little and Taylor 1989)."""
 
 UNSURE = 0.02
 """Probability that a foreground probability of 0 or 1 is wrong."""
 
 SAME_TIME_S = 1e-3
-"""s: images nearer in time count as of one instant: a hand at 2 m/s moves by 2 mm."""
+"""s: images nearer in time count as simultaneous: a hand at 2 m/s moves by 2 mm."""
 
 SIDES = 4
 """Kinds of contour points of a capsule (`contours.SIDE` and the others)."""
 
 _STUDENT_4 = 0.375  # density at 0 of Student's t of 4 degrees of freedom
 _LEAST_CLUTTER = 1e-3  # edges per px
-_RIDGE = 1e-3  # 1/m^2 and 1/rad^2, as good as nothing
+_RIDGE = 1e-3  # 1/m^2 and 1/rad^2: negligible, but keeps the matrix regular
 
 Predicted = tuple[Array, Array, NDArray[np.bool_]]
 
@@ -68,9 +68,9 @@ Predicted = tuple[Array, Array, NDArray[np.bool_]]
 class ContourFrame:
     """Implements `estimation.residual.Residual`: one camera's slices, the edges on them, and where the contour is.
 
-    `slices` (K, 5) as `find_edges` takes them; `expected_sd` (K,) px: of the contour along each slice. `seen`
-    (GROUPS, 2): of each finger, the palm and the forearm, the slices whose contour was found, and all, when last
-    linearised. `repeated`: images that count as one, this one included.
+    `slices` (K, 5) as `find_edges` takes them; `expected_sd` (K,) px: of the contour along each slice.
+    `slice_counts` (GROUPS, 2): of each finger, the palm and the forearm, the slices on which the contour was found, and
+    all, when last linearised. `repeated`: number of correlated images that count as one.
     """
 
     def __init__(self, surface: Surface, points: ContourPoints, pose: Array, intrinsics: Array, slices: Array,
@@ -84,10 +84,10 @@ class ContourFrame:
         self.shape_variance, self.side_sd = (1.0 - COMMON) * variance, np.sqrt(COMMON * variance)
         self.edges: Edges | None = None
         self.clutter = np.empty((0, 0))
-        self.seen = np.zeros((GROUPS, 2))
+        self.slice_counts = np.zeros((GROUPS, 2))
 
     def observe(self, edges: Edges) -> None:
-        """Take the edges of the slices. The density of edges that are at least as strong is that of the clutter."""
+        """Set the edges of the slices. The clutter density at an edge is that of the edges at least as strong."""
         self.edges = edges
         length = float(np.sum(2.0 * self.slices[:, 4] + 1.0))
         valid = np.arange(edges.offset.shape[1]) < edges.number[:, None]
@@ -96,13 +96,14 @@ class ContourFrame:
         self.clutter = np.maximum(stronger / max(length, 1.0), _LEAST_CLUTTER)
 
     def predict(self, state: Array) -> Predicted:
-        """The contour on each slice: (K,) px from its centre, its derivative (K, COLUMNS), and whether it exists."""
+        """The contour on each slice: (K,) px from the slice's centre, its derivative (K, COLUMNS), and whether it
+        exists."""
         count = len(self.slices)
         offset, rows = np.zeros(count), np.zeros((count, COLUMNS))
         good = np.zeros(count, np.bool_)
         p = self.points
-        follow(self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule, p.kind,
-               p.along, self.pixel, self.normal, offset, rows, good)
+        contour_on_slices(self.surface, state, self._size(state), self.pose, self.intrinsics, self.late_s, p.capsule,
+                          p.kind, p.along, self.pixel, self.normal, offset, rows, good)
         return offset, rows, good
 
     def _size(self, state: Array) -> Array:
@@ -130,8 +131,8 @@ class ContourFrame:
         return Contours([self]).linearise(state)
 
     def add_sides(self, state: Array, sides: Array) -> Predicted:
-        """Add to the last two columns of `sides` (S, N + 2) what the slices say of the surface's offset along each
-        side, in standard deviations: gradient and information. Returns where the contours are (`predict`)."""
+        """Add the gradient and the information of the surface's offset along each side, in standard deviations, to the
+        last two columns of `sides` (S, N + 2). Returns the predicted contours (`predict`)."""
         assert self.edges is not None, "the edges of the slices have not been observed"
         count, p, e = len(self.slices), self.points, self.edges
         offset, rows, good = np.zeros(count), np.zeros((count, COLUMNS)), np.zeros(count, np.bool_)
@@ -141,20 +142,20 @@ class ContourFrame:
         return offset, rows, good
 
     def gather(self, predicted: Predicted, aside: Array, information: Array, pull: Array, sides: Array) -> float:
-        """Add the lower triangle of the slices' information (N, N), their gradient (N,), and to `sides` (S, N + 2) what
-        `_marginalise` takes; returns their cost. Of `predicted`, the derivatives are by N numbers."""
+        """Add the lower triangle of the slices' `information` (N, N), their gradient to `pull` (N,), and to `sides`
+        (S, N + 2) the terms for `_marginalise`; returns their cost. The derivatives in `predicted` have N columns."""
         assert self.edges is not None, "the edges of the slices have not been observed"
         p, e = self.points, self.edges
-        self.seen = np.zeros((GROUPS, 2))
+        self.slice_counts = np.zeros((GROUPS, 2))
         return float(_gather(
             self.surface, *predicted, p.capsule, p.kind, p.behind, self.shape_variance, self.side_sd, e.number,
-            e.offset, e.sd, e.inside, e.outside, self.expected_sd, self.clutter, aside, information, pull, self.seen,
-            sides))
+            e.offset, e.sd, e.inside, e.outside, self.expected_sd, self.clutter, aside, information, pull,
+            self.slice_counts, sides))
 
 
 def in_a_fit(frame: ContourFrame) -> ContourFrame:
-    """The frame for a fit of one shape to some instants, which are too far apart to be `repeated`. Each slice has all
-    of its variance by itself: an offset of a side that were free at every instant would hide the bend of a finger."""
+    """The frame for a fit of one shape to several instants, which are too far apart to be correlated. All variance of a
+    slice is its own: an offset of each side that is free at every instant would absorb the bend of a finger."""
     out = copy.copy(frame)
     out.shape_variance = (frame.shape_variance + frame.side_sd**2) / frame.repeated
     out.side_sd, out.repeated = np.zeros_like(frame.side_sd), 1.0
@@ -164,10 +165,10 @@ def in_a_fit(frame: ContourFrame) -> ContourFrame:
 class Contours:
     """Implements `Residual`: the frames of some cameras, each at its own time.
 
-    Frames are moved to the state's instant by a given `velocity` (POSE,), with its covariance, and do not change it: if
-    cameras disagree, surface and calibration are wrong by a part of a millimetre, and that within milliseconds would be
-    a great speed. Its error counts as independent of theirs, even where an earlier pass over these frames has estimated
-    it. Without it, the state's own velocity moves them. No row has a derivative by a velocity.
+    A given `velocity` (POSE,), with its covariance, moves the frames to the state's instant. The frames do not update
+    it: cameras disagree by a fraction of a millimetre of surface or calibration, which within milliseconds would be a
+    high speed. The velocity's error counts as independent of the frames', even after a pass over the same frames.
+    Without it, the state's own velocity moves them. No row has a derivative by a velocity.
     """
 
     def __init__(self, frames: Sequence[ContourFrame], velocity: tuple[Array, Array] | None = None) -> None:
@@ -199,17 +200,19 @@ def velocity_of(estimate: tuple[Array, Array]) -> tuple[Array, Array]:
 
 
 def _root(covariance: Array) -> Array:
-    """A matrix whose square, times its transposed, is a covariance of any rank."""
+    """A square root R of a covariance of any rank: R R^T is the covariance."""
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def gathered(frames: Sequence[ContourFrame], state: Array, velocity_root: Array | None = None
              ) -> tuple[Array, Array, float]:
-    """Information (COLUMNS, COLUMNS), of which only the lower triangle is filled, gradient (COLUMNS,) and cost of all
-    slices of some cameras. The surface's offset along each side is marginalised, about a Gauss-Newton step from none.
-    So is the velocity's error in frames that are not of the state's instant; `velocity_root` (POSE, POSE): times its
-    transposed, the velocity's covariance."""
+    """Information (COLUMNS, COLUMNS), its lower triangle only, gradient (COLUMNS,) and cost of all slices of some
+    cameras.
+
+    The surface's offset along each side is marginalised, linearised at a Gauss-Newton step from 0. So is the velocity's
+    error in frames of other instants. `velocity_root` (POSE, POSE): a square root of its covariance.
+    """
     count = COLUMNS + (0 if velocity_root is None else POSE)
     information, pull = np.zeros((count, count)), np.zeros(count)
     sides = np.zeros((SIDES * len(frames[0].surface.row), count + 2))
@@ -233,8 +236,8 @@ def gathered(frames: Sequence[ContourFrame], state: Array, velocity_root: Array 
 
 
 def compressed(information: Array, pull: Array, cost: float, size: int, size_column: int) -> Rows:
-    """COLUMNS rows of whitened errors with this information (COLUMNS, COLUMNS), of which the lower triangle is read,
-    gradient (COLUMNS,) and cost in all, and one row of the rest."""
+    """COLUMNS rows of whitened errors with this information (COLUMNS, COLUMNS), lower triangle, and gradient
+    (COLUMNS,), and one row with the rest of the `cost`."""
     error, own = residual.compressed(information, pull, cost, _RIDGE)
     jacobian = np.zeros((COLUMNS + 1, size))
     jacobian[:, :POSE], jacobian[:, size_column:size_column + SHAPE] = own[:, :POSE], own[:, POSE:]
@@ -242,8 +245,8 @@ def compressed(information: Array, pull: Array, cost: float, size: int, size_col
 
 
 class JointLimits:
-    """Implements `Residual`: angles beyond their limits (A, 2) rad are drawn to them. A state begins with the root's
-    pose and the A angles, its tangent space with six numbers of the pose and the angles."""
+    """Implements `Residual`: a penalty on angles beyond their limits (A, 2) rad. A state begins with the root's pose
+    and the A angles, its tangent space with six numbers of the pose and the A angles."""
 
     def __init__(self, limits: Array) -> None:
         self.limits = limits
@@ -261,9 +264,9 @@ class JointLimits:
 def slices_of(surface: Surface, state: Array, covariance: Array, pose: Array, intrinsics: Array,
               points: ContourPoints, size_column: int, row_s: float, reach: float, longest_px: float,
               repeated: float = 1.0, late_s: float = 0.0) -> ContourFrame:
-    """The slices that a camera should search at `points`, which are expected of a hand in `state` with `covariance`
-    (n, n): `reach` standard deviations to both sides, at most `longest_px`. `row_s`: time between rows, s; `late_s`:
-    the image's time less the state's."""
+    """The slices at the contour `points` that are expected of a hand in `state` with `covariance` (n, n). They reach
+    `reach` standard deviations to both sides, at most `longest_px`. `row_s`: time between rows, s; `late_s`: the
+    image's time less the state's, s."""
     count = len(points.along)
     late = np.full(count, late_s)
     if count and row_s:
@@ -283,10 +286,9 @@ def slices_of(surface: Surface, state: Array, covariance: Array, pose: Array, in
 
 @njit(cache=True)
 def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance, spread_variance, clutter, found):
-    """Fill `found` with the probability that each edge is the hand's. Returns -2 log likelihood over its least, the
-    weight 1/px^2, the weighted mean error px, and the probability that any is. Edges that are far apart and equally
-    probable add the variance between them to the weight's, which the likelihood does not know (probabilistic data
-    association, Bar-Shalom and Tse 1975)."""
+    """Probabilistic data association on one slice (Bar-Shalom and Tse 1975): fill `found` with the probability that
+    each edge is the hand's. Returns -2 log likelihood above its minimum, the weight 1/px^2, the weighted mean error px,
+    and the probability that any edge is the hand's. The weight includes the spread of the means of several edges."""
     missed = MISSED[behind]
     total, peak = missed, missed
     for k in range(count):
@@ -311,7 +313,7 @@ def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance,
         square += one * error * error
     if weight > 0.0:
         mean /= weight
-        weight /= 1.0 + max(square - weight * mean * mean, 0.0)  # which edge it is, is uncertain
+        weight /= 1.0 + max(square - weight * mean * mean, 0.0)  # the spread of the means
     return 2.0 * np.log(max(peak / total, 1.0)), weight, mean, 1.0 - missed / total
 
 
@@ -319,9 +321,10 @@ def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance,
 def _add_sides(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, behind, shape_variance, side_sd,
                pixel, normal, count, offsets, sds, inside, outside, expected_sd, clutter, offset, rows, good,
                sides):
-    """Fill `offset` (K,), `rows` (K, COLUMNS) and `good` (K,) as `follow` does, and add to `sides` (S, N + 2)
-    gradient and information of the surface's offset along each side."""
-    follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, good)
+    """Fill `offset` (K,), `rows` (K, COLUMNS) and `good` (K,) as `contour_on_slices` does. Add gradient and
+    information to `sides` (S, N + 2), of the surface's offset along each side."""
+    contour_on_slices(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows,
+                      good)
     found = np.empty(offsets.shape[1])
     for s in range(capsule.shape[0]):
         if good[s]:
@@ -334,9 +337,9 @@ def _add_sides(surface, state, size, pose, intrinsics, late_s, capsule, kind, al
 
 @njit(cache=True)
 def _gather(surface, offset, rows, good, capsule, kind, behind, shape_variance, side_sd, count, offsets, sds, inside,
-            outside, expected_sd, clutter, aside, information, pull, seen, sides):
-    """Add the slices' information to the lower triangle of `information` (N, N) and to `pull` (N,); returns their
-    cost."""
+            outside, expected_sd, clutter, aside, information, pull, slice_counts, sides):
+    """Add the slices' information to the lower triangle of `information` (N, N) and their gradient to `pull` (N,);
+    returns their cost."""
     found, cost, own = np.empty(offsets.shape[1]), 0.0, np.empty(rows.shape[1], np.int64)
     for s in range(capsule.shape[0]):
         if not good[s]:
@@ -347,8 +350,8 @@ def _gather(surface, offset, rows, good, capsule, kind, behind, shape_variance, 
                                            offset[s] + shift, shape_variance[s], expected_sd[s] ** 2, clutter[s], found)
         error += shift
         cost += one
-        seen[surface.group[capsule[s]], 0] += present
-        seen[surface.group[capsule[s]], 1] += 1.0
+        slice_counts[surface.group[capsule[s]], 0] += present
+        slice_counts[surface.group[capsule[s]], 1] += 1.0
         sides[side, -2] += weight * side_sd[s] * error
         sides[side, -1] += weight * side_sd[s] ** 2
         used = _nonzero(rows[s], own)
@@ -363,9 +366,9 @@ def _gather(surface, offset, rows, good, capsule, kind, behind, shape_variance, 
 
 @njit(cache=True)
 def _marginalise(sides, information, pull):
-    """Take out of the lower triangle of `information` (N, N) and of `pull` (N,) what may be the surface's offset along
-    a side (Schur complement). Of each of `sides` (S, N + 2): derivatives of the residuals
-    by the state, their error, and their derivative by the offset, each times weight and that derivative."""
+    """Marginalise the surface's offset along each side (Schur complement): subtract it from the lower triangle of
+    `information` (N, N) and from the gradient `pull` (N,). A row of `sides` (S, N + 2) sums the residuals' derivatives
+    by the state, their error, and their derivative by the offset, each times the weight and the last."""
     own = np.empty(len(pull), np.int64)
     for s in range(sides.shape[0]):
         if sides[s, -1] == 0.0:
@@ -380,7 +383,7 @@ def _marginalise(sides, information, pull):
 
 @njit(cache=True)
 def _nonzero(row, own):
-    """Fill `own` with the places of the numbers of `row` that are not 0, and return how many are."""
+    """Fill `own` with the indices of the nonzero elements of `row`; return their number."""
     used = 0
     for i in range(row.shape[0]):
         if row[i] != 0.0:

@@ -1,9 +1,10 @@
-"""Occluding contours of the hand's capsules in one camera: where edges are expected, and how they follow the hand.
+"""Occluding contours of the hand's capsules in one camera: where edges are expected, and their derivatives by the
+state.
 
-A point of a ball's surface with the normal n is on its contour where n is square to the line of sight,
-n . (c - o) = -r, for a centre c, a radius r and the camera's centre o. A plane that touches both balls of a capsule
-makes a straight contour between them. The normal distance of a contour point moves as if the point were fixed to the
-bone: what it slides along the surface, it slides along the line of sight (envelope theorem).
+A point of a ball's surface with the normal n is on its contour where n is perpendicular to the line of sight, n . (c -
+o) = -r, for a centre c, a radius r and the camera's centre o. A plane tangent to both balls of a capsule makes a
+straight contour between them. The derivative of a contour point along its normal is that of a point fixed to the bone:
+the point slides on the surface too, but along the line of sight (envelope theorem).
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ from rhot_app.barehand.surface import (
     FOREARM,
     FOREARM_RADIUS,
     FOREARM_TURN,
+    HAND_SIZE,
     LENGTH,
     RADIUS,
     SHAPE,
     THICKNESS,
-    WHOLE,
     Surface,
-    meet,
     place_capsules,
+    ray_to_capsule,
 )
 from rhot_app.geometry.camera import distort
 from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY
@@ -36,32 +37,32 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 STEP_M = 4e-3
-"""m: spacing of contour points; skin's creases and nails are as long, so nearer ones are correlated."""
+"""m: spacing of contour points. Skin's creases and nails are as long, so errors of nearer points are correlated."""
 
-BESIDE_M = 1e-3
-"""m: distance outside of the capsule at which a ray tests what is behind a contour."""
+OUTSIDE_M = 1e-3
+"""m: distance outside of the capsule at which a ray tests what lies behind a contour."""
 
 GRAZE_M = 1e-4
-"""m: the same, for a neighbouring phalanx that hides a contour and stands out by less than BESIDE_M beyond it."""
+"""m: the same for a neighbouring phalanx that hides a contour and protrudes by less than OUTSIDE_M beyond it."""
 
 JUMP_M = 6e-3
-"""m: a smaller step in depth is none: flesh fills it."""
+"""m: smallest step in depth that makes a contour; flesh fills smaller ones."""
 
 SIDE, OTHER_SIDE, START_BALL, END_BALL = range(4)
 """Kinds of contour points: the two straight contours of a capsule and those of its balls."""
 
 SILHOUETTE, INNER = 0, 1
-"""What is behind a contour: not the hand, or another part of it."""
+"""What lies behind a contour: something other than the hand, or another part of it."""
 
 COLUMNS = POSE + SHAPE
-NEAREST_M = 0.02  # nothing is nearer than the camera's housing
-_MOST = 1500
+NEAREST_M = 0.02  # near plane: the camera's housing
+_MAX_POINTS = 1500
 _MARGIN_PX = 3.0
 
 
 class ContourPoints(NamedTuple):
-    """K visible contour points of one camera. `capsule` (K,), `kind` (K,), `along` (K,): place between the balls 0..1;
-    `behind` (K,): SILHOUETTE or INNER; `pixel` (K, 2) px; `normal` (K, 2) unit, outwards; `scale` (K,) px/m."""
+    """K visible contour points of one camera. `capsule` (K,); `kind` (K,); `along` (K,): position between the balls,
+    0..1; `behind` (K,): SILHOUETTE or INNER; `pixel` (K, 2) px; `normal` (K, 2) unit, outwards; `scale` (K,) px/m."""
 
     capsule: Indices
     kind: Indices
@@ -74,9 +75,11 @@ class ContourPoints(NamedTuple):
 
 def contour_points(surface: Surface, state: Array, size: Array, pose: Array, intrinsics: Array,
                    image_size: tuple[int, int], step_m: float = STEP_M) -> ContourPoints:
-    """The visible contour of a hand in `state` (`hand_process`) with `size` (SHAPE,) before a camera: `pose` (3, 4)
-    camera_from_world, `intrinsics` (9,), `image_size` width and height px."""
-    ints, floats = np.empty((_MOST, 3), np.int64), np.empty((_MOST, 6))
+    """The visible contour, a point every `step_m`, of a hand in `state` (`hand_process`) with shape `size` (SHAPE,).
+
+    `pose` (3, 4): camera_from_world; `intrinsics` (9,); `image_size`: width and height, px.
+    """
+    ints, floats = np.empty((_MAX_POINTS, 3), np.int64), np.empty((_MAX_POINTS, 6))
     count = _contours(surface, state, size, pose, intrinsics, image_size[0], image_size[1], step_m, ints, floats)
     ints, floats = ints[:count], floats[:count]
     return ContourPoints(ints[:, 0].copy(), ints[:, 1].copy(), floats[:, 0].copy(), ints[:, 2].copy(),
@@ -85,7 +88,7 @@ def contour_points(surface: Surface, state: Array, size: Array, pose: Array, int
 
 @njit(cache=True)
 def project(x, y, z, pose, intrinsics, pixel, slope):
-    """Fill `pixel` (2,) and its `slope` (2, 3) px/m at a world point; False when it is not before the camera."""
+    """Fill `pixel` (2,) of a world point and its Jacobian `slope` (2, 3) px/m; False behind the near plane."""
     a = pose[0, 3] + pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z
     b = pose[1, 3] + pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z
     c = pose[2, 3] + pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z
@@ -111,7 +114,8 @@ def camera_centre(pose, out):
 
 @njit(cache=True)
 def side_normals(c0, c1, r0, r1, o, normals):
-    """Fill `normals` (2, 3) of the planes through `o` that touch both balls; False when one ball hides the other."""
+    """Fill `normals` (2, 3) of the planes through `o` that are tangent to both balls; False when one ball hides the
+    other."""
     px, py, pz = c0[0] - o[0], c0[1] - o[1], c0[2] - o[2]
     qx, qy, qz = c1[0] - o[0], c1[1] - o[1], c1[2] - o[2]
     a, b, c = px * px + py * py + pz * pz, px * qx + py * qy + pz * qz, qx * qx + qy * qy + qz * qz
@@ -190,7 +194,7 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
                     continue
                 for i in range(3):
                     u[i] = (c[i] - o[i]) / distance
-                _square_to(u, e1, e2)
+                _orthogonal_to(u, e1, e2)
             for j in range(number):
                 along = (j + 0.5) / number
                 if straight:
@@ -213,7 +217,7 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
                 if not (_MARGIN_PX < pixel[0] < width - 1 - _MARGIN_PX
                         and _MARGIN_PX < pixel[1] < height - 1 - _MARGIN_PX):
                     continue
-                behind = link_behind(surface, centres, radii, o, px, py, pz, n, BESIDE_M)
+                behind = link_behind(surface, centres, radii, o, px, py, pz, n, OUTSIDE_M)
                 if behind < 0 or used == ints.shape[0]:
                     continue
                 if link_behind(surface, centres, radii, o, px, py, pz, n, GRAZE_M) < 0:
@@ -238,8 +242,8 @@ def _contours(surface, state, size, pose, intrinsics, width, height, step_m, int
 
 
 @njit(cache=True)
-def _square_to(u, e1, e2):
-    """Fill two unit vectors square to `u` (3,) and to each other."""
+def _orthogonal_to(u, e1, e2):
+    """Fill two unit vectors perpendicular to `u` (3,) and to each other."""
     least = 0
     for i in range(1, 3):
         if abs(u[i]) < abs(u[least]):
@@ -258,16 +262,16 @@ def _square_to(u, e1, e2):
 
 
 @njit(cache=True)
-def link_behind(surface, centres, radii, o, px, py, pz, n, beside):
-    """What a camera sees `beside` m outside of a contour point: SILHOUETTE, INNER, or -1 where the point is hidden or
-    no edge."""
-    px, py, pz = px + beside * n[0], py + beside * n[1], pz + beside * n[2]
+def link_behind(surface, centres, radii, o, px, py, pz, n, outside):
+    """What lies on the line of sight `outside` m from a contour point: SILHOUETTE, INNER, or -1 where the point is
+    occluded or makes no contour."""
+    px, py, pz = px + outside * n[0], py + outside * n[1], pz + outside * n[2]
     ux, uy, uz = px - o[0], py - o[1], pz - o[2]
     far = math.sqrt(ux * ux + uy * uy + uz * uz)
     ux, uy, uz = ux / far, uy / far, uz / far
     out = SILHOUETTE
     for j in range(centres.shape[0]):
-        # the ball about both of the capsule's
+        # bounding ball of the capsule
         mx = 0.5 * (centres[j, 0, 0] + centres[j, 1, 0]) - o[0]
         my = 0.5 * (centres[j, 0, 1] + centres[j, 1, 1]) - o[1]
         mz = 0.5 * (centres[j, 0, 2] + centres[j, 1, 2]) - o[2]
@@ -276,7 +280,7 @@ def link_behind(surface, centres, radii, o, px, py, pz, n, beside):
         dot = mx * ux + my * uy + mz * uz
         if mx * mx + my * my + mz * mz - dot * dot > half * half:
             continue
-        t = meet(o[0], o[1], o[2], ux, uy, uz, centres[j, 0], centres[j, 1], radii[j, 0], radii[j, 1])
+        t = ray_to_capsule(o[0], o[1], o[2], ux, uy, uz, centres[j, 0], centres[j, 1], radii[j, 0], radii[j, 1])
         if t > 0.0:
             if t < far + JUMP_M:
                 return -1
@@ -285,10 +289,11 @@ def link_behind(surface, centres, radii, o, px, py, pz, n, beside):
 
 
 @njit(cache=True)
-def follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows, good):
-    """How the contour crosses K slices at `state`: fill `offset` (K,) px along each slice's normal from its centre
-    `pixel` (K, 2), `rows` (K, COLUMNS) its derivative by pose and shape, and `good` (K,). `late_s` (K,): a slice's time
-    less the state's."""
+def contour_on_slices(surface, state, size, pose, intrinsics, late_s, capsule, kind, along, pixel, normal, offset, rows,
+                      good):
+    """Where the contour of a hand in `state` crosses K slices. Fill `offset` (K,), px along each slice's normal from
+    its centre `pixel` (K, 2); `rows` (K, COLUMNS), its derivative by pose and shape; and `good` (K,), whether it
+    crosses. `late_s` (K,): a slice's time less the state's, s."""
     world, frames = np.eye(4), np.empty((surface.dh.parent.shape[0], 3, 4))
     world[:3] = state[:ANGLES].reshape(3, 4)
     count = surface.row.shape[0]
@@ -353,20 +358,20 @@ def follow(surface, state, size, pose, intrinsics, late_s, capsule, kind, along,
 
 @njit(cache=True)
 def _point_row(surface, world, frames, k, axis, px, py, pz, g, size, row):
-    """Fill `row` (COLUMNS,): `g` (3,) times the derivative of a surface point at p, whose axis point is `axis` (3,)."""
+    """Fill `row` (COLUMNS,): `g` (3,) times the derivative of the surface point p, whose axis point is `axis` (3,)."""
     dh = surface.dh
     row[:] = 0.0
     lx, ly, lz = px - world[0, 3], py - world[1, 3], pz - world[2, 3]
     row[0], row[1], row[2] = g[0], g[1], g[2]
     row[3], row[4], row[5] = ly * g[2] - lz * g[1], lz * g[0] - lx * g[2], lx * g[1] - ly * g[0]
-    row[POSE + WHOLE] = g[0] * lx + g[1] * ly + g[2] * lz
+    row[POSE + HAND_SIZE] = g[0] * lx + g[1] * ly + g[2] * lz
     if surface.group[k] == FOREARM:
         _forearm_row(world, size, lx, ly, lz, g, row)
     at, first = surface.row[k], True
     while at >= 0:
         parent, bone = dh.parent[at], surface.bone[at]
-        if bone >= 0:  # from its beginning to its end, or to the axis point
-            f, length = frames[at], dh.a[at] * math.exp(size[WHOLE] + size[FINGER_SIZE] + size[LENGTH + bone])
+        if bone >= 0:  # lever: from its start to its end, or to the axis point
+            f, length = frames[at], dh.a[at] * math.exp(size[HAND_SIZE] + size[FINGER_SIZE] + size[LENGTH + bone])
             for i in range(3):
                 way = axis[i] - (f[i, 3] - length * f[i, 0]) if first else length * f[i, 0]
                 row[POSE + LENGTH + bone] += g[i] * way

@@ -1,9 +1,9 @@
 """Feature mode: slices across the links' axes and at the fingertips (Rehg 1995, 4.3).
 
-Both edges of a link are on slices of the same places; its radius is integrated out, so that a pair of edges is one
+Slices cross both edges of a link at the same positions along it. The radius is marginalised, so a pair of edges is one
 point of the projected axis (eq. 2.17). One edge alone is extrapolated with the radius of the model. A fingertip is
-found along its axis (eq. 2.19). In the thesis a person left out the features that other fingers hide; here the model
-tells which. Fewer slices than in contour mode and none of the palm: quick, for open hands.
+found along its axis (eq. 2.19). In the thesis a person removed the features that other fingers hide; here the model
+does. There are fewer slices than in contour mode and none on the palm: it is fast, and meant for open hands.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import (
-    BESIDE_M,
     END_BALL,
+    OUTSIDE_M,
     ContourPoints,
     camera_centre,
     image_normal,
@@ -30,12 +30,12 @@ from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
 Array = NDArray[np.float64]
 
 PLACES = 2
-"""Slices along a link on either side: so many fix a line."""
+"""Slices along each side of a link: two determine a line."""
 
 
 def feature_points(surface: Surface, state: Array, size: Array, pose: Array, intrinsics: Array,
                    image_size: tuple[int, int]) -> ContourPoints:
-    """Places of the visible edges of all links and fingertips; arguments as of `contours.contour_points`."""
+    """The visible edges of all links and fingertips. Arguments are those of `contours.contour_points`."""
     most = len(surface.row) * (2 * PLACES + 1)
     ints, floats = np.empty((most, 3), np.int64), np.empty((most, 6))
     count = _features(surface, state, size, pose, intrinsics, float(image_size[0]), float(image_size[1]), ints, floats)
@@ -65,7 +65,7 @@ def _features(surface, state, size, pose, intrinsics, width, height, ints, float
             if j < 2 * PLACES:
                 kind, along = j // PLACES, (j % PLACES + 0.5) / PLACES
                 n[:] = normals[kind]
-            else:  # the surface's foremost point, seen along the axis
+            else:  # the most distal contour point, along the projected axis
                 kind, along, far, dot, length = END_BALL, 1.0, 0.0, 0.0, 0.0
                 for i in range(3):
                     u[i] = centres[k, 1, i] - o[i]
@@ -86,7 +86,7 @@ def _features(surface, state, size, pose, intrinsics, width, height, ints, float
                 continue
             if not (0.0 < pixel[0] < width - 1.0 and 0.0 < pixel[1] < height - 1.0):
                 continue
-            behind = link_behind(surface, centres, radii, o, u[0], u[1], u[2], n, BESIDE_M)
+            behind = link_behind(surface, centres, radii, o, u[0], u[1], u[2], n, OUTSIDE_M)
             if behind < 0:
                 continue
             for i in range(3):

@@ -1,4 +1,4 @@
-"""A bare hand from images alone: looks for the hand while there is none, follows it, and says when it is lost."""
+"""Tracks a bare hand from images alone: searches for it while there is none, and decides when it is lost."""
 
 from __future__ import annotations
 
@@ -22,60 +22,60 @@ Image = NDArray[np.uint8]
 Points = NDArray[np.float64]
 
 MAJORITY: Final = 0.5
-"""Part above which more speaks for a hand than against it: of the contour that is found, of joints on foreground."""
+"""Part of the expected contour that must be found, and of the joints that must lie on foreground: more than half."""
 
 FASTEST_M_S: Final = 4.0
 """m/s: twice the speed of the fastest motion in `resources/motions`. Chosen, not measured."""
 
 BLIND_NS: Final = 250_000_000
-"""Without any image for longer, a hand at `FASTEST_M_S` may be out of the picture: it is looked for anew."""
+"""ns: after longer without any image, a hand at `FASTEST_M_S` may have left the image, and the track is lost."""
 
 
 class HandFollower:
-    """One bare hand before the cameras of a rig, with its search and its loss."""
+    """One bare hand before the cameras of a rig: search, confirmation, tracking and loss."""
 
     def __init__(self, rig: Rig, foreground: Sequence[Foreground] | None, *, known_size: bool,
                  empty_until_ns: int = 0) -> None:
-        """`foreground`: of each camera; None: the colours of skin are learnt while the hand is looked for.
-        `empty_until_ns`: no hand is looked for before."""
+        """`foreground`: each camera's model; None: the colours of skin are learnt from every image that is searched.
+        `empty_until_ns`: master time before which no hand is searched for."""
         self.tracker = BareHandTracker(rig, known_size=known_size, foreground=foreground)
         self.key_frames = KeyFrames(self.tracker.model)
         self.starts = 0
         self.step_s: list[float] = []
-        self._skin, self._empty_until_ns = foreground is None, empty_until_ns
+        self._learns_skin, self._empty_until_ns = foreground is None, empty_until_ns
         self._names = tuple(node.name for node in rig.nodes)
         self._following = False
         self._proposed: tuple[int, Points] | None = None
-        self._count, self._seen_ns = 0, 0
+        self._count, self._image_ns = 0, 0
 
     @property
     def following(self) -> bool:
         """Whether the newest state has a hand."""
         return self._following
 
-    def know(self, foreground: Sequence[Foreground]) -> None:
-        """Use what each camera has learnt of hand and background."""
-        self.tracker.foreground, self._skin = list(foreground), False
+    def set_foreground(self, foreground: Sequence[Foreground]) -> None:
+        """Use these models of hand and background, one of each camera, and learn no skin any more."""
+        self.tracker.foreground, self._learns_skin = list(foreground), False
 
     def start(self, pose: HandPose, t_ns: int) -> None:
-        """Follow a hand from a pose on (`BareHandTracker.start`)."""
+        """Start a confirmed track at a pose (`BareHandTracker.start`)."""
         self.tracker.start(pose, t_ns)
-        self._following, self._seen_ns = True, t_ns
+        self._following, self._image_ns = True, t_ns
         self._started()
 
     def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
         """The state after one image (H, W, 3) RGB of each camera, None where it has none, of master times `t_ns`.
         LOST or SEARCHING, without numbers, where no hand is found."""
         begun, following = time.perf_counter(), self._following
-        if not following and not self._found(images, min(t_ns)):
+        if not following and not self._find(images, min(t_ns)):
             self._proposed = None
             return self._none(min(t_ns), begun)
         state = self.tracker.step(images, t_ns)
         if any(image is not None for image in images):
             good = state.tracked and self._supported(images) and self._on_foreground(images, state, not following)
-            self._seen_ns = max(t_ns)
+            self._image_ns = max(t_ns)
         else:
-            good = max(t_ns) - self._seen_ns < BLIND_NS
+            good = max(t_ns) - self._image_ns < BLIND_NS
         self._following = good and (following or self._confirmed(state))
         if not self._following:
             return self._none(min(t_ns), begun)
@@ -88,47 +88,46 @@ class HandFollower:
         return replace(state, sequence=self._count - 1)
 
     def _started(self) -> None:
-        """A hand was found. It may be another one than before, and has its own key frames."""
+        """Count a new track. Its hand may be another one than before, so the key frames begin anew."""
         self.starts += 1
         self._proposed = None
         self.key_frames.clear()
 
-    def _found(self, images: Sequence[Image | None], t_ns: int) -> bool:
+    def _find(self, images: Sequence[Image | None], t_ns: int) -> bool:
         if any(image is None for image in images) or t_ns < self._empty_until_ns:
             return False
-        if self._skin:
+        if self._learns_skin:
             self.tracker.foreground = [learn_skin(image) for image in images if image is not None]
         return self.tracker.find(images, t_ns)
 
     def _supported(self, images: Sequence[Image | None]) -> bool:
-        """Whether the cameras find the contour that the hand should have."""
-        seen = np.sum([self.tracker.fit.seen[c].sum(axis=0) for c, image in enumerate(images) if image is not None],
-                      axis=0)
-        return bool(seen[0] > MAJORITY * seen[1])
+        """Whether most of the expected contour is found in these images."""
+        counts = np.sum([self.tracker.fit.slice_counts[c].sum(axis=0)
+                         for c, image in enumerate(images) if image is not None], axis=0)
+        return bool(counts[0] > MAJORITY * counts[1])
 
     def _on_foreground(self, images: Sequence[Image | None], state: HandState, whole: bool) -> bool:
-        """Whether most joints lie on foreground in every camera that shows most of them, of which there must be one;
-        `whole`: every camera must show most of them. A camera that has learnt neither background nor skin says
-        nothing of it."""
-        shown = []
+        """Whether most joints lie on foreground in every image in which most of them are. At least one camera must have
+        such an image; with `whole`, every camera. Cameras with an uninformative foreground are not asked about it."""
+        mostly_inside = []
         for camera, image, model in zip(self.tracker.cameras, images, self.tracker.foreground, strict=True):
             if image is None:
                 continue
             places = camera.project(state.joint_positions)
             with np.errstate(invalid="ignore"):
                 inside = np.all((places > -0.5) & (places < [camera.width - 0.5, camera.height - 0.5]), axis=1)
-            shown.append(bool(np.mean(inside) > MAJORITY))
-            if shown[-1] and model.informative:
+            mostly_inside.append(bool(np.mean(inside) > MAJORITY))
+            if mostly_inside[-1] and model.informative:
                 gain = gain_of(image, model)
-                ours = [foreground_at(image, row, column, model.hand, model.rest, model.mean, model.sd, gain)
-                        for column, row in np.round(places[inside]).astype(int)]
-                if np.mean(np.array(ours) > 0.5) <= MAJORITY:
+                values = [foreground_at(image, row, column, model.hand, model.rest, model.mean, model.sd, gain)
+                          for column, row in np.round(places[inside]).astype(int)]
+                if np.mean(np.array(values) > 0.5) <= MAJORITY:
                     return False
-        return all(shown) if whole else any(shown)
+        return all(mostly_inside) if whole else any(mostly_inside)
 
     def _confirmed(self, state: HandState) -> bool:
-        """Whether the hand that was found in the images before is the same one. Finding is a random search: two of them
-        agree by chance on a wrong hand less probably than one is wrong."""
+        """Whether the search in the images before found the same pose. Searches are random: two agree on a wrong pose
+        less probably than one is wrong."""
         before, self._proposed = self._proposed, (state.t_master_ns, state.joint_positions)
         if before is None:
             return False

@@ -1,11 +1,11 @@
-"""Places of a bare hand's joints, with their covariances."""
+"""Positions of a bare hand's joints, with their covariances."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from rhot_app.barehand.surface import FINGER_SIZE, LENGTH, RADIUS, SHAPE, WHOLE, sized_table
+from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, SHAPE, sized_table
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
@@ -22,7 +22,8 @@ def knowledge_of(sd: float, observed: bool, measured: float, inferred: float) ->
 
 @njit(cache=True)
 def add_lengths(table, bone, world, frames, points, out):
-    """Add to `out` (P, 3, 17) how the points of a sized table follow WHOLE, FINGER_SIZE and the 15 of LENGTH."""
+    """Add to `out` (P, 3, 17) the Jacobian of the points of a sized table by HAND_SIZE, FINGER_SIZE and the 15
+    LENGTHs."""
     for p in range(points.shape[0]):
         for i in range(3):
             out[p, i, 0] += points[p, i] - world[i, 3]
@@ -37,13 +38,13 @@ def add_lengths(table, bone, world, frames, points, out):
 
 @njit(cache=True)
 def place_joints(state, covariance, dh, bone, points, covariances, motion):
-    """Fill `points` (26, 3) m, their covariances (26, 3, 3), and `motion` (2, 21), roots of the traces of the joints'
-    velocities' and accelerations' covariances."""
+    """Fill `points` (26, 3) m, their `covariances` (26, 3, 3), and `motion` (2, 21): standard deviations of the joints'
+    velocities, m/s, and accelerations, m/s^2 (roots of the traces of their covariances)."""
     frames, world = np.empty((dh.parent.shape[0], 3, 4)), np.eye(4)
     world[:3] = state[:ANGLES].reshape(3, 4)
     a, d = np.empty(dh.a.shape[0]), np.empty(dh.a.shape[0])
     sized_table(dh, bone, state[BIAS:BIAS + SHAPE], a, d)
-    factor = np.exp(state[BIAS + WHOLE])
+    factor = np.exp(state[BIAS + HAND_SIZE])
     table = DhArrays(dh.parent, dh.theta, d, a, dh.cos_alpha, dh.sin_alpha, dh.angle, dh.sign, dh.point_row,
                      dh.point_offset * factor)
     forward_arrays(table, world, state[ANGLES:VELOCITY], frames, points)
@@ -52,7 +53,7 @@ def place_joints(state, covariance, dh, bone, points, covariances, motion):
     jacobian_arrays(table, world, frames, points, jacobian)
     add_lengths(table, bone, world, frames, points, jacobian[:, :, POSE:])
     own = np.empty(POSE + 2 + lengths, np.int64)
-    own[POSE], own[POSE + 1] = MOTION + WHOLE, MOTION + FINGER_SIZE
+    own[POSE], own[POSE + 1] = MOTION + HAND_SIZE, MOTION + FINGER_SIZE
     own[POSE + 2:] = MOTION + LENGTH + np.arange(lengths)
     for order in range(3):
         own[:POSE] = order * POSE + np.arange(POSE)

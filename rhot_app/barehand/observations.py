@@ -1,4 +1,4 @@
-"""What nodes tell of images without markers: edges along slices, and foreground maps; and what they are asked for."""
+"""Observations of images without markers, edges along slices and foreground maps, and the requests for them."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SliceRequest:
-    """What one camera's node shall search from its next frame on. `slices` (N, 5) as `find_edges` takes them, rounded
-    as `wire.slices` rounds them. `map_step`: px of a foreground map; 0: none. `expected`: the asker's own."""
+    """What one camera's node searches from its next frame on. `slices` (N, 5) as `find_edges` takes them, rounded as
+    `wire.slices` rounds them. `map_step`: px between samples of the foreground map; 0: no map. `expected`: data of the
+    requester, which comes back with the answer and is not sent."""
 
     camera: int
     slices: Array
@@ -52,12 +53,12 @@ class ForegroundFrame:
 
 
 ImageFrame = EdgeFrame | ForegroundFrame
-"""What is observed of a frame beside markers and tags."""
+"""An observation of an image other than markers and tags."""
 
 
 def edges_of(count: int, indices: NDArray[np.int64], values: Array) -> Edges:
-    """The edges of `count` slices from those that were found on any: `indices` (K,) of their slices, `values` (K, 5)
-    offset px, sd px, strength, inside and outside. Of more than EDGES_MAX on a slice, the first are kept."""
+    """The edges of `count` slices from a list of K edges: `indices` (K,) of their slices, `values` (K, 5) offset px, sd
+    px, strength, inside and outside. Of more than EDGES_MAX on a slice, the first are kept."""
     order = np.argsort(indices, kind="stable")
     indices, values = indices[order], values[order]
     rank = np.arange(len(indices)) - np.searchsorted(indices, indices)

@@ -1,4 +1,4 @@
-"""Pictures for people: the contours that a hand is expected to have, the slices, and what was found on them."""
+"""Draws the expected contours of a hand, the slices across them and the edges on these over an image."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _SUB = 4  # bits of a pixel's fraction in OpenCV's drawing
 
 
 def overlay(image: Image, frame: ContourFrame, state: Array, joints: Array | None = None, zoom: int = 1) -> Image:
-    """A copy of `image` (H, W, 3) RGB, `zoom` times as large, with the contour of the hand in `state`: green beside the
-    background, blue within the hand. Slices are thin; edges on them yellow, and red where they are probably the hand's.
-    `joints` (21, 2) px are joined to a skeleton."""
+    """A copy of `image` (H, W, 3) RGB, `zoom` times as large, with the contour of the hand in `state`: green before the
+    background, blue before another part of the hand. Slices are thin and grey. Edges are red where they are probably
+    the hand's, otherwise yellow. `joints` (21, 2) px are drawn as a skeleton."""
     out = cv2.resize(image, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_LINEAR)
 
     def place(p: Array) -> tuple[int, int]:

@@ -1,9 +1,9 @@
-"""How well a posed hand covers the foreground of small images: a quick score for many poses, and a search with it.
+"""The log odds of a posed hand by the foreground of small images: a fast score for many poses, and a search with it.
 
-Every pixel on the hand is worth the log odds that it shows the hand, and every pixel in a ring about it the log odds
-that it does not. Where the forearm may be there is no ring, because the wrist bends. Other foreground does not count.
-The search draws poses from a Gaussian and moves it to the better ones (CMA-ES, Hansen, "The CMA Evolution Strategy: A
-Tutorial", arXiv:1604.00772).
+The score sums, over the pixels of the hand, the log odds that they are foreground, and over a ring about it the log
+odds that they are not. The ring is left out where the forearm may be, because the wrist bends. Other pixels do not
+count. The search samples poses from a Gaussian and adapts it to the better ones (CMA-ES, Hansen, "The CMA Evolution
+Strategy: A Tutorial", arXiv:1604.00772).
 """
 
 from __future__ import annotations
@@ -22,34 +22,34 @@ from rhot_app.hand.kinematics import move
 Array = NDArray[np.float64]
 
 MISLABELLED = 0.05
-"""Probability that a pixel of foreground probability 0 or 1 is of the other kind: shadows, sleeves, other skin."""
+"""Probability that a pixel of foreground probability 0 or 1 is mislabelled: shadows, sleeves, other skin."""
 
 CORRELATED = 8.0
-"""Pixels that count as one observation: where the model's contour or the foreground is wrong, it is so along a finger's
-breadth."""
+"""Pixels that count as one observation: errors of the model's contour and of the foreground are correlated along a
+finger's breadth."""
 
 RING_M = 0.012
-"""m: width of the ring, a finger's half breadth."""
+"""m: width of the ring: half a finger's breadth."""
 
 ARM_M, ARM_SPREAD = 0.5, 0.35
 """m, and radius per m: the cone behind the wrist in which a forearm may lie, about 20 degrees to every side."""
 
 FOREARM_M, FOREARM_SPREAD = 0.25, 0.07
-"""m, and radius per m: a forearm from wrist to elbow, which is there 1.6 times as thick (ANSUR II: 263 mm; girths 175
-and 280 mm)."""
+"""m, and radius per m: a forearm from wrist to elbow, where it is 1.6 times as thick (ANSUR II: 263 mm; girths 175 and
+280 mm)."""
 
 BENDS = np.array([[0.0, 0.0], [0.6, 0.0], [-0.6, 0.0], [0.0, 0.35], [0.0, -0.35]])
-"""rad: flexion and deviation of the wrist that are tried (`tracker.FOREARM_SD`)."""
+"""rad: flexions and deviations of the wrist at which the forearm is scored (`tracker.FOREARM_SD`)."""
 
 DRAWS = 14
-"""Poses drawn in a round of the search: Hansen's default for 27 dimensions, 4 + 3 ln 27, rounded up."""
+"""Population size of CMA-ES: Hansen's default for 27 dimensions, 4 + 3 ln 27, rounded up."""
 
 START_STEP = 0.5
-"""Step size of the first round, in standard deviations of what is expected. Chosen: with 1, fewer starts are good."""
+"""Initial step size of CMA-ES in standard deviations of the prior. Chosen: with 1, fewer starts are good."""
 
 
 _U0, _V0, _U1, _V1, _R0, _R1, _DU, _DV, _PER_SQUARE = range(9)
-"""Of what a capsule covers of an image: places and radii at its ends, the way between them, and 1 / its square; px."""
+"""Indices into a projected capsule: centres and radii of its ends, their difference, and 1 / its squared length; px."""
 
 
 class LogOddsMaps(NamedTuple):
@@ -64,7 +64,8 @@ class LogOddsMaps(NamedTuple):
 
 def log_odds_maps(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequence[Array],
                 intrinsics: Sequence[Array]) -> LogOddsMaps:
-    """From foreground probabilities (h, w) of each camera (`foreground_map`), NaN where nothing is known."""
+    """Log odds of foreground probabilities (h, w) of each camera (`foreground_map`); 0 where these are NaN, not
+    known."""
     height, width = max(one.shape[0] for one in maps), max(one.shape[1] for one in maps)
     odds = np.zeros((len(maps), height, width))
     for camera, one in enumerate(maps):
@@ -74,9 +75,9 @@ def log_odds_maps(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequenc
 
 
 @njit(cache=True)
-def _outline(c0, c1, r0, r1, pose, intrinsics, step, a, b, slope, circles):
-    """Fill `circles` (9,) with what a capsule covers of an image, px of the map: its numbers are at _U0 and so on.
-    False where it is not in front of the camera."""
+def _project_capsule(c0, c1, r0, r1, pose, intrinsics, step, a, b, slope, circles):
+    """Fill `circles` (9,) with a capsule's projection, px of the map, at the indices _U0 and so on. False where it is
+    not in front of the camera."""
     if not (project(c0[0], c0[1], c0[2], pose, intrinsics, a, slope)):
         return False
     if not (project(c1[0], c1[1], c1[2], pose, intrinsics, b, slope)):
@@ -92,9 +93,10 @@ def _outline(c0, c1, r0, r1, pose, intrinsics, step, a, b, slope, circles):
 
 
 @njit(cache=True)
-def _paint(circles, ring, ring_slope, mask, box):
-    """Mark a capsule's pixels in `mask` (h, w) with 1, those in the ring about it, px wide at the first end and at the
-    last, with 2 where no capsule is. `box`: first and last row and column marked so far."""
+def _rasterise(circles, ring, ring_slope, mask, box):
+    """Rasterise a projected capsule: mark its pixels in `mask` (h, w) with 1, and those of the ring about it that are
+    not yet 1 with 2. The ring is `ring` px wide at the first end, `ring_slope` wider at the last. `box` (4,) grows to
+    the first and last row and column marked."""
     u0, v0, u1, v1, s0, s1 = circles[_U0], circles[_V0], circles[_U1], circles[_V1], circles[_R0], circles[_R1]
     du, dv, inverse = circles[_DU], circles[_DV], circles[_PER_SQUARE]
     wide0, wide1 = s0 + ring, s1 + ring + ring_slope
@@ -119,7 +121,7 @@ def _paint(circles, ring, ring_slope, mask, box):
 
 @njit(cache=True)
 def _covers(circles, column, row):
-    """Whether a pixel lies on a capsule (`_outline`)."""
+    """Whether a pixel lies on a projected capsule (`_project_capsule`)."""
     x, y = column - circles[_U0], row - circles[_V0]
     t = min(max((x * circles[_DU] + y * circles[_DV]) * circles[_PER_SQUARE], 0.0), 1.0)
     x, y, r = x - t * circles[_DU], y - t * circles[_DV], circles[_R0] + t * (circles[_R1] - circles[_R0])
@@ -128,7 +130,8 @@ def _covers(circles, column, row):
 
 @njit(cache=True)
 def _arm(world, wrist, thick, bend, odds, step, pose, intrinsics, mask, a, b, slope):
-    """Log odds of the forearm behind a wrist that is bent by `bend` (2,), where the hand does not hide it."""
+    """Sum of the log odds on the forearm, where the hand does not hide it; `bend` (2,) rad: the wrist's flexion and
+    deviation."""
     along, p = np.empty(3), np.empty(3)
     x, y, z = -np.cos(bend[0]) * np.cos(bend[1]), -np.sin(bend[1]), np.sin(bend[0])
     for i in range(3):
@@ -158,8 +161,9 @@ def _arm(world, wrist, thick, bend, odds, step, pose, intrinsics, mask, a, b, sl
 
 @njit(cache=True)
 def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, parts):
-    """Log odds of a pose; `parts` (C, 3): of each camera the sum of log odds on the hand, its pixels of which anything
-    is known, and the sum of log odds in the ring about it. `mask` (h, w) is 0, and is so again afterwards."""
+    """Log odds of a pose. Fill `parts` (C, 3): for each camera the sum of log odds on the hand, the number of its
+    pixels with known foreground, and the sum of log odds in the ring. `mask` (h, w) must be 0 and is 0 again
+    afterwards."""
     count = surface.row.shape[0]
     frames = np.empty((surface.dh.parent.shape[0], 3, 4))
     centres, radii = np.empty((count, 2, 3)), np.empty((count, 2))
@@ -175,11 +179,11 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
         pose, lens = poses[camera], intrinsics[camera]
         box[0], box[1], box[2], box[3] = mask.shape[0], -1, mask.shape[1], -1
         for k in range(count):
-            if surface.group[k] != FOREARM and _outline(centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1], pose,
-                                                        lens, step, a, b, slope, circles):
+            if surface.group[k] != FOREARM and _project_capsule(centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1],
+                                                                pose, lens, step, a, b, slope, circles):
                 first, last = circles[_R0] * RING_M / radii[k, 0], circles[_R1] * RING_M / radii[k, 1]
-                _paint(circles, first, last - first, mask, box)
-        # the arm ends at the camera's housing at the latest
+                _rasterise(circles, first, last - first, mask, box)
+        # cut the cone of the arm off 0.1 m before the camera
         end, depth0, depth1 = 1.0, 0.0, 0.0
         for i in range(3):
             depth0 += pose[2, i] * wrist[i]
@@ -187,8 +191,8 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
         depth0, depth1 = depth0 + pose[2, 3], depth1 + pose[2, 3]
         if depth1 < 0.1 and depth0 > 0.1:
             end = (depth0 - 0.1) / (depth0 - depth1)
-        arm = _outline(wrist, wrist + end * (elbow - wrist), thick, thick + end * ARM_M * ARM_SPREAD, pose, lens, step,
-                       a, b, slope, cone)
+        arm = _project_capsule(wrist, wrist + end * (elbow - wrist), thick, thick + end * ARM_M * ARM_SPREAD, pose,
+                               lens, step, a, b, slope, cone)
         for n in range(BENDS.shape[0]):
             arms[n] += _arm(world, wrist, thick, BENDS[n], odds[camera], step, pose, lens, mask, a, b, slope)
         own = ring = area = 0.0
@@ -196,38 +200,38 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
             for column in range(box[2], box[3] + 1):
                 value, o = mask[row, column], odds[camera, row, column]
                 mask[row, column] = 0
-                if value == 1 and o != 0.0:  # of others it is not known what they show
+                if value == 1 and o != 0.0:  # 0: not known
                     own += o
                     area += 1.0
                 elif value == 2 and not (arm and _covers(cone, column, row)):
                     ring += o
         parts[camera, 0], parts[camera, 1], parts[camera, 2] = own, area, ring
         total += own - ring
-    return total + max(arms.max(), 0.0)  # a sleeve is no foreground
+    return total + max(arms.max(), 0.0)  # a sleeved forearm is background and costs nothing
 
 
 @njit(cache=True)
-def cover(centres, radii, pose, intrinsics, step, margin, mask):
-    """Mark in `mask` (h, w), every `step`-th pixel of an image, what capsules cover of it and `margin` pixels of the
-    mask about that."""
+def rasterise(centres, radii, pose, intrinsics, step, margin, mask):
+    """Mark in `mask` (h, w), every `step`-th pixel of an image, the pixels of capsules and `margin` mask pixels about
+    them."""
     a, b, slope = np.empty(2), np.empty(2), np.empty((2, 3))
     circles, box = np.empty(9), np.array([mask.shape[0], -1, mask.shape[1], -1])
     for k in range(centres.shape[0]):
-        if _outline(centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1], pose, intrinsics, step, a, b, slope,
-                    circles):
-            _paint(circles, margin, 0.0, mask, box)
+        if _project_capsule(centres[k, 0], centres[k, 1], radii[k, 0], radii[k, 1], pose, intrinsics, step, a, b, slope,
+                            circles):
+            _rasterise(circles, margin, 0.0, mask, box)
 
 
 def score(surface: Surface, world: Array, angles: Array, size: Array, odds: LogOddsMaps) -> tuple[float, Array]:
-    """Log odds of the hand at `world` (4, 4), `angles` (21,); and (C, 3) of each camera the sum of log odds on the
-    hand, its pixels, and the sum of log odds in the ring about it."""
+    """Log odds of the hand at `world` (4, 4), `angles` (21,) rad; and (C, 3), for each camera the sum of log odds on
+    the hand, the number of its pixels with known foreground, and the sum of log odds in the ring."""
     parts = np.zeros((len(odds.values), 3))
     mask = np.zeros(odds.values.shape[1:], np.uint8)
     return float(_score(surface, world, angles, size, odds.values, odds.step, odds.poses, odds.intrinsics, mask,
                         parts)), parts
 
 
-@njit(cache=True, nogil=True)  # it takes long, and frames come meanwhile
+@njit(cache=True, nogil=True)  # it takes long, and a thread must receive frames meanwhile
 def _score_many(surface, world, angles, steps, limits, size, odds, step, poses, intrinsics, scores):
     mask, parts = np.zeros(odds.shape[1:], np.uint8), np.zeros((odds.shape[0], 3))
     moved, turned = np.empty((4, 4)), np.empty(21)
@@ -249,25 +253,25 @@ def score_steps(surface: Surface, world: Array, angles: Array, steps: Array, lim
 
 def search(surface: Surface, world: Array, angles: Array, covariance: Array, limits: Array, size: Array,
            odds: LogOddsMaps, rng: np.random.Generator, rounds: int) -> tuple[Array, Array, float]:
-    """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, and its score, after
+    """The most probable pose about `world` (4, 4), `angles` (21,) with prior covariance (27, 27), and its score, after
     `rounds` of DRAWS poses.
 
-    The score is that of the images as correlated as they are, less half of the squared Mahalanobis distance.
+    The score is the log odds by the foreground over CORRELATED, less half of the squared Mahalanobis distance.
     """
     root = np.linalg.cholesky(covariance + 1e-12 * np.eye(len(covariance)))
 
     def scores(white: Array) -> Array:
         values = score_steps(surface, world, angles, white @ root.T, limits, size, odds)
         return np.asarray(values / CORRELATED - 0.5 * np.sum(white * white, axis=1))
-    best, value = _evolved(scores, len(root), rng, rounds)
+    best, value = _cma_es(scores, len(root), rng, rounds)
     moved, turned = np.empty((4, 4)), np.empty(21)
     move(world, angles, root @ best, moved, turned)
     return moved, np.clip(turned, limits[:, 0], limits[:, 1]), value
 
 
-def _evolved(value: Callable[[Array], Array], n: int, rng: np.random.Generator, rounds: int) -> tuple[Array, float]:
-    """The best (n,) found for a function of (DRAWS, n), from 0 with START_STEP, and its value: CMA-ES with the default
-    parameters of Hansen's tutorial, positive weights only. The first draw is the start itself."""
+def _cma_es(value: Callable[[Array], Array], n: int, rng: np.random.Generator, rounds: int) -> tuple[Array, float]:
+    """Maximise a function of (DRAWS, n), from 0 with START_STEP; returns the best (n,) and its value. CMA-ES with the
+    default parameters of Hansen's tutorial, positive weights only. The first sample is the start itself."""
     mu = DRAWS // 2
     weights = np.log(mu + 0.5) - np.log(np.arange(1, mu + 1))
     weights /= weights.sum()
@@ -281,7 +285,7 @@ def _evolved(value: Callable[[Array], Array], n: int, rng: np.random.Generator, 
     covariance, axes, lengths = np.eye(n), np.eye(n), np.ones(n)
     best, best_value = mean, -np.inf
     for number in range(rounds):
-        if number and number % 5 == 0:  # seldom: it takes as long as DRAWS scores
+        if number and number % 5 == 0:  # every fifth round: it takes as long as DRAWS scores
             squares, axes = np.linalg.eigh(covariance)
             lengths = np.sqrt(np.maximum(squares, 1e-12))
         drawn = rng.standard_normal((DRAWS, n)) * lengths @ axes.T

@@ -1,8 +1,8 @@
 """Finds a hand anywhere and in any pose, in the foreground of one image of each camera.
 
-Places where the foreground is as thick as a palm are candidates. At each, many rotations of a relaxed hand are scored
-by how well they cover the foreground (`silhouette`), and the best of them with other shapes of the hand. A short search
-about the best of these tells which are worth a long one.
+Candidates are positions where the foreground is as thick as a palm. At each, many rotations of a relaxed hand are
+scored by the foreground (`silhouette`), and the best of them with other postures of the fingers. A short search about
+each of the best selects those for a long one.
 """
 
 from __future__ import annotations
@@ -31,35 +31,34 @@ STEP = 8
 """px: spacing of the pixels of the foreground map."""
 
 ROTATIONS = 400
-"""Rotations of a relaxed hand tried at a candidate: 25 degrees apart."""
+"""Rotations of a relaxed hand that are scored at a candidate: 25 degrees apart."""
 
 TURNS = 60
-"""Of a palm on a plane, all around: 6 degrees apart. Chosen, not tuned."""
+"""Rotations of a palm on a plane about its normal: 6 degrees apart. Chosen, not tuned."""
 
-SHAPED = 80
-"""Rotations, the best of all candidates, that are tried with the other shapes of the hand. Chosen, not tuned."""
+RESCORED = 80
+"""Best rotations, of all candidates, that are scored with the other postures. Chosen, not tuned."""
 
 KEPT, FIRST_ROUNDS = 20, 15
-"""Poses, the best of all, about which is searched, and rounds of that search (`silhouette.search`). Chosen: enough
-to tell good from bad."""
+"""Best poses about which a short search is made, and its rounds (`silhouette.search`). Chosen: enough to rank them."""
 
 REFINED, LAST_ROUNDS = 4, 120
-"""Poses, the best of those found, about which is searched again, and its rounds. Chosen: more of either cost more time
-than they found better starts (drawn hands: 16 mm off in the median, with 5 and 200 15 mm)."""
+"""Best poses of the short searches about which a long one is made, and its rounds. Chosen: more of either improve the
+starts little for their time (drawn hands: a median error of 16 mm, with 5 and 200 of 15 mm)."""
 
 PALMS, PEAKS = 6, 24
-"""Places of a palm that are tried, the best of all cameras together, and thick places of each camera's foreground of
-which they are made. Chosen: a scene has fewer."""
+"""Most candidate positions of a palm, of all cameras together, and most thick parts of each camera's foreground that
+they are triangulated from. Chosen: a scene has fewer."""
 
 _CURLS_DEG = ((5.0, 10.0, 5.0), (20.0, 30.0, 20.0), (65.0, 80.0, 45.0))  # MCP, PIP, DIP: open, relaxed, closed
-_ASIDE = 0.5  # rad to either side of a relaxed thumb: a third of its range
-_SPREAD = 0.03, 0.35, 0.35  # m, rad, rad between the poses tried
-_PALM_RADIUS = 0.36, 1.7  # of half the palm's breadth; seen from the side, it is half as thick as broad
+_THUMB_STEP = 0.5  # rad to either side of a relaxed thumb: a third of its range
+_SPREAD = 0.03, 0.35, 0.35  # m, rad, rad: prior standard deviations about a scored pose, which are as far apart
+_PALM_RADIUS = 0.36, 1.7  # bounds, relative to half the palm's breadth; from the side, it is half as thick
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A pose that may be the hand's, and its score (`silhouette.search`), more is better."""
+    """A candidate pose and its score (`silhouette.search`); more is better."""
 
     pose: HandPose
     score: float
@@ -68,8 +67,8 @@ class Found:
 def find_hand(images: Sequence[NDArray[np.uint8] | None], cameras: Sequence[CameraModel],
               foreground: Sequence[Foreground], model: HandModel, surface: Surface, size: Array,
               rng: np.random.Generator, most: int = 3, plane: PalmOnPlane | None = None) -> list[Found]:
-    """The most probable hands in images (H, W, 3) RGB of some cameras, best first, at most `most`; none without
-    foreground as thick as a palm. On a `plane` the palm lies, in the posture of the model's pose prior."""
+    """The most probable poses in images (H, W, 3) RGB of some cameras, best first, at most `most`; none without
+    foreground as thick as a palm. `plane`: on which the palm lies."""
     maps = [None if image is None else foreground_map(image, learnt, STEP)
             for image, learnt in zip(images, foreground, strict=True)]
     return find_in_maps(maps, cameras, model, surface, size, rng, most, plane)
@@ -78,7 +77,7 @@ def find_hand(images: Sequence[NDArray[np.uint8] | None], cameras: Sequence[Came
 def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequence[CameraModel], model: HandModel,
                  surface: Surface, size: Array, rng: np.random.Generator, most: int = 3,
                  plane: PalmOnPlane | None = None) -> list[Found]:
-    """The same in foreground probabilities (h, w) of every STEP-th pixel, None of a camera without an image."""
+    """The same from foreground probabilities (h, w) of every STEP-th pixel, None of a camera without an image."""
     used = [c for c, one in enumerate(foreground) if one is not None]
     maps = [one for one in foreground if one is not None]
     odds = log_odds_maps(maps, STEP, [cameras[c].camera_from_world[:3] for c in used],
@@ -87,7 +86,7 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
                                                    + model.radii[4, 0])
     centres = _palm_centres(maps, [cameras[c] for c in used], breadth)
     found: list[Found] = []
-    shapes = _shapes(model)
+    postures = _postures(model)
     if plane is None:
         turns = Rotation.random(ROTATIONS, random_state=int(rng.integers(2**31))).as_matrix()
     else:
@@ -101,9 +100,9 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
         tried.append((value, world, angles))
 
     for centre, turn in product(centres, turns):
-        try_pose(rigid(turn, centre - turn @ middle), shapes[0])
+        try_pose(rigid(turn, centre - turn @ middle), postures[0])
     tried.sort(key=lambda one: -one[0])
-    for (_, world, _), angles in product(tried[:SHAPED], shapes[1:]):
+    for (_, world, _), angles in product(tried[:RESCORED], postures[1:]):
         try_pose(world, angles)
     tried.sort(key=lambda one: -one[0])
     covariance = np.diag(np.repeat(np.square(_SPREAD), (3, 3, 21)))
@@ -124,7 +123,7 @@ def _best(found: list[Found], most: int) -> list[Found]:
 def _refined(found: Found, covariance: Array, model: HandModel, surface: Surface, size: Array, odds: LogOddsMaps,
              rng: np.random.Generator) -> Found:
     world, angles = found.pose.world_from_palm, found.pose.angles
-    angles = bend_fingers(surface, world, angles, model, size, odds)
+    angles = choose_postures(surface, world, angles, model, size, odds)
     world, angles, value = search(surface, world, angles, covariance, model.limits, size, odds, rng, LAST_ROUNDS)
     return Found(HandPose(world, angles), value)
 
@@ -132,23 +131,24 @@ def _refined(found: Found, covariance: Array, model: HandModel, surface: Surface
 def settle(surface: Surface, world: Array, angles: Array, covariance: Array, model: HandModel, size: Array,
            odds: LogOddsMaps, rng: np.random.Generator, plane: PalmOnPlane | None = None
            ) -> tuple[Array, Array, float]:
-    """The pose about `world`, `angles` with `covariance` (27, 27) that covers the foreground best, each finger bent or
-    straight, and its score (`silhouette.search`)."""
+    """The most probable pose by the foreground about `world`, `angles` with prior covariance (27, 27), and its score
+    (`silhouette.search`). Each finger is tried in each posture in between (`choose_postures`)."""
     if plane is not None:
         covariance = plane.narrowed(covariance)
     moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
-    bent = bend_fingers(surface, moved, bent, model, size, odds)
+    bent = choose_postures(surface, moved, bent, model, size, odds)
     return search(surface, moved, bent, 0.25 * covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
 
 
-def bend_fingers(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array,
+def choose_postures(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array,
                  odds: LogOddsMaps) -> Array:
-    """The angles (21,) with each finger as it is, open, relaxed or closed, and the thumb as it is, relaxed or to either
-    side, whichever the foreground says, one after the other, twice. What the hand holds stays as it is."""
+    """The angles (21,) with the posture of each digit that the foreground makes most probable: a finger unchanged,
+    open, relaxed or closed; the thumb unchanged, relaxed or to either side. Coordinate descent, twice over all digits.
+    Locked angles (`HandModel.locked`) stay."""
     angles, held = angles.copy(), set(model.locked)
-    turns = [k for k in (0, 1) if k not in held]  # of the thumb, about its root
+    turns = [k for k in (0, 1) if k not in held]  # the thumb's angles at its root
     thumbs = [model.pose_prior.mean[ANGLE_SLICES[0]] + aside * np.eye(5)[which]
-              for which, aside in ((0, 0.0), *product(turns, (-_ASIDE, _ASIDE)))]
+              for which, aside in ((0, 0.0), *product(turns, (-_THUMB_STEP, _THUMB_STEP)))]
     choices: list[tuple[slice | list[int], list[Array] | Array]] = []
     if turns:
         choices.append((ANGLE_SLICES[0], thumbs))
@@ -163,7 +163,7 @@ def bend_fingers(surface: Surface, world: Array, angles: Array, model: HandModel
 
 
 def _distinct(tried: list[tuple[float, Array, Array]], most: int) -> list[tuple[float, Array, Array]]:
-    """The best poses that are not turned alike within half a radian."""
+    """The best poses of which no two are nearer than half a radian and `_SPREAD[0]`, m."""
     kept: list[tuple[float, Array, Array]] = []
     for one in tried:
         if all(np.trace(one[1][:3, :3].T @ other[1][:3, :3]) < 1.0 + 2.0 * np.cos(0.5)
@@ -174,8 +174,8 @@ def _distinct(tried: list[tuple[float, Array, Array]], most: int) -> list[tuple[
     return kept
 
 
-def _shapes(model: HandModel) -> list[Array]:
-    """Angles (21,) of a relaxed, an open, a closed and a pointing hand; what the hand holds is as it holds it."""
+def _postures(model: HandModel) -> list[Array]:
+    """Angles (21,) of a relaxed, an open, a closed and a pointing hand; locked angles are those of the prior."""
     out = []
     for curl in _CURLS_DEG:
         angles = model.pose_prior.mean.copy()
@@ -191,8 +191,9 @@ def _shapes(model: HandModel) -> list[Array]:
 
 
 def _palm_centres(maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraModel], breadth: float) -> list[Array]:
-    """(3,) m places of palms: where thick foreground of two cameras meets, or of one at the distance by its size."""
-    peaks = [_thick(one) for one in maps]
+    """Candidate positions (3,) m of palms: thick foreground triangulated from two cameras, or placed by its size before
+    one."""
+    peaks = [_largest_discs(one) for one in maps]
     found: list[tuple[float, Array]] = []
     for a in range(len(maps)):
         for b in range(a):
@@ -205,7 +206,7 @@ def _palm_centres(maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraM
                 for k, peak in ((a, p), (b, q)):
                     pixel = cameras[k].project(place)[0]
                     error += float(np.linalg.norm(pixel - peak[:2]) / peak[2]) if np.isfinite(pixel).all() else np.inf
-                    error += _unlike(cameras[k], place, peak[2], breadth)
+                    error += _size_error(cameras[k], place, peak[2], breadth)
                 if np.isfinite(error):
                     found.append((error, place))
     if len(maps) == 1:
@@ -219,8 +220,8 @@ def _palm_centres(maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraM
     return [place for _, place in found[:PALMS]]
 
 
-def _unlike(camera: CameraModel, place: Array, radius: float, breadth: float) -> float:
-    """How much a radius px differs from a palm's at a place: |ln|, inf beyond what palms show."""
+def _size_error(camera: CameraModel, place: Array, radius: float, breadth: float) -> float:
+    """Absolute log ratio of a radius px to that of a palm at a position; inf beyond _PALM_RADIUS."""
     depth = float((camera.camera_from_world[:3, :3] @ place + camera.camera_from_world[:3, 3])[2])
     if not depth > 0.05:
         return np.inf
@@ -228,8 +229,9 @@ def _unlike(camera: CameraModel, place: Array, radius: float, breadth: float) ->
     return abs(float(np.log(ratio))) if _PALM_RADIUS[0] < ratio < _PALM_RADIUS[1] else np.inf
 
 
-def _thick(probability: NDArray[np.float32]) -> list[Array]:
-    """(3,) px centres x, y and radii of the largest discs of foreground, thickest first, whose centres lie apart."""
+def _largest_discs(probability: NDArray[np.float32]) -> list[Array]:
+    """(3,) px centre x, y and radius of the largest discs inside the foreground, largest first, with distinct
+    centres."""
     solid = (probability > 0.5).astype(np.uint8)
     distance = cv2.distanceTransform(cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_REPLICATE), cv2.DIST_L2, 5)
     distance = distance[1:-1, 1:-1].copy()

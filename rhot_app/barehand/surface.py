@@ -1,10 +1,10 @@
-"""The hand's surface: tapered capsules, each the convex hull of two balls that ride on one row of the hand's table.
+"""The hand's surface: tapered capsules, each the convex hull of two balls fixed to one link of the hand's DH table.
 
-The radii are those of the hand file. Neighbouring phalanges have the ball at their joint in common, so that a bent
-finger is closed. The forearm turns about the wrist.
+The radii are those of the hand file. Neighbouring phalanges share the ball at their joint, so a bent finger has no
+gap. The forearm rotates about the wrist.
 
-A hand's shape is what may differ from its file: logarithms of lengths and radii, and the forearm's rotation. It is a
-part of the estimator's state.
+The shape is the part of the state by which a hand may differ from its file: logarithms of lengths and radii, and the
+forearm's rotation.
 """
 
 from __future__ import annotations
@@ -24,26 +24,27 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 PALM, FOREARM = 5, 6
-"""Groups beyond the fingers 0..4."""
+"""Groups of capsules after the fingers 0..4."""
 
-WHOLE, FINGER_SIZE, THICKNESS, LENGTH, RADIUS, FOREARM_RADIUS, FOREARM_TURN, SHAPE = 0, 1, 2, 3, 18, 33, 34, 36
-"""Where a shape's numbers begin, and how many it has: logarithms of the hand's size, of all phalanges' lengths and of
-all radii but the forearm's, relative to the hand file's at that size; of the 15 phalanges' own lengths and radii beyond
-these; of the forearm's radius; and the forearm's flexion and deviation, a rotation vector (0, y, z) rad about the wrist
-in the palm's frame."""
+HAND_SIZE, FINGER_SIZE, THICKNESS, LENGTH, RADIUS, FOREARM_RADIUS, FOREARM_TURN, SHAPE = 0, 1, 2, 3, 18, 33, 34, 36
+"""Indices into a shape, and its length SHAPE. Each is relative to the hand file and to those before it.
+
+HAND_SIZE, FINGER_SIZE, THICKNESS: logarithms of the hand's size, of all phalanges' length, and of all radii but the
+forearm's. LENGTH, RADIUS: logarithms of the length and radius of each of the 15 phalanges. FOREARM_RADIUS: its
+logarithm. FOREARM_TURN: flexion and deviation, a rotation vector (0, y, z) rad about the wrist in the palm's frame."""
 
 TIP_TAPER = 0.85
-"""Radius at the end of a fingertip, of that of its last segment: fingertips are round, not flat."""
+"""Ratio of the radius at a fingertip's end to that of its last segment: fingertips are round, not flat."""
 
 HYPOTHENAR = 0.22
-"""How far the muscles of the little finger's ball stand out beyond its metacarpal, of the palm's thickness: 6 mm of 28.
-In a video of a real hand the palm's contour lies 5.3 mm beyond the metacarpal's where no ball is modelled, in the mean
-over its length (`python benchmarks/contour_offsets.py`)."""
+"""Offset of the hypothenar muscles beyond the little finger's metacarpal, relative to the palm's thickness: 6 mm of 28.
+In a video of a real hand the palm's contour lies 5.3 mm beyond the metacarpal's, in the mean over its length, where
+no muscle is modelled (`python benchmarks/contour_offsets.py`)."""
 
 
 class Surface(NamedTuple):
-    """N capsules. `row` (N,): of the hand's table, ROOT for the palm; `ends` (N, 2, 3) m in that row's frame; `radii`
-    (N, 2) m; `group` (N,): finger, PALM or FOREARM; `open_ends` (N, 2): whether an end's ball may be a contour.
+    """N capsules. `row` (N,): of the hand's DH table, ROOT for the palm; `ends` (N, 2, 3) m in that row's frame;
+    `radii` (N, 2) m; `group` (N,): finger, PALM or FOREARM; `open_ends` (N, 2): whether an end's ball may be a contour.
     `dh`: the hand's table without points; `bone` (R,): the phalanx, 0..14, of each of its rows, else -1.
     """
 
@@ -77,7 +78,7 @@ def surface_of(model: HandModel) -> Surface:
 
 
 def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, bool, bool]]:
-    """Palm, ball of the thumb and wrist, by the same measures as `hand.shape`."""
+    """Capsules of palm, ball of the thumb and wrist, by the dimensions of `hand.shape`."""
     anatomy, mirror = model.anatomy, np.array([1.0, model.mirror, 1.0])
     thick, knuckles, thumb = 0.5e-3 * anatomy.palm_thickness_mm, model.base[1:], model.base[0]
     parts, roots = [], []
@@ -94,9 +95,9 @@ def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, 
         add(carpal, roots[k], radius, 0.5 * (radius + float(model.radii[k + 1, 0])))
     for k in range(3):
         add(roots[k], roots[k + 1], float(model.radii[k + 1, 0]), float(model.radii[k + 2, 0]))
-    # A capsule beside the last one, over 0.7 of its length and a little thinner at its end: chosen by that video.
-    beside = np.array([0.0, -HYPOTHENAR * 2.0 * thick, 0.0])
-    add(carpal + beside, carpal + 0.7 * (roots[3] - carpal) + beside, radius, 0.9 * radius)
+    # The hypothenar: a capsule along 0.7 of the last one, a little thinner at its end. Chosen by that video.
+    aside = np.array([0.0, -HYPOTHENAR * 2.0 * thick, 0.0])
+    add(carpal + aside, carpal + 0.7 * (roots[3] - carpal) + aside, radius, 0.9 * radius)
     heel = np.array([CARPAL_X, 0.4 * thumb[1], -0.006])
     add(heel, thumb, thick, float(model.radii[0, 0]))
     add(thumb, 0.5 * (np.array([CARPAL_X, CARPAL_SPREAD * knuckles[0, 1], -0.002]) + knuckles[0]), 0.8 * thick, thick)
@@ -110,8 +111,8 @@ def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, 
 
 @njit(cache=True)
 def sized_table(dh, bone, shape, a, d):
-    """Fill `a` (R,) and `d` (R,), the lengths of a table for a hand of `shape` (SHAPE,)."""
-    whole = np.exp(shape[WHOLE])
+    """Fill `a` (R,) and `d` (R,), the DH lengths of a hand of `shape` (SHAPE,), m."""
+    whole = np.exp(shape[HAND_SIZE])
     for row in range(a.shape[0]):
         a[row] = dh.a[row] * whole * (np.exp(shape[FINGER_SIZE] + shape[LENGTH + bone[row]]) if bone[row] >= 0 else 1.0)
         d[row] = dh.d[row] * whole
@@ -126,7 +127,7 @@ def place_capsules(surface, world, angles, shape, frames, centres, radii):
     table = DhArrays(dh.parent, dh.theta, d, a, dh.cos_alpha, dh.sin_alpha, dh.angle, dh.sign, dh.point_row,
                      dh.point_offset)
     forward_arrays(table, world, angles, frames, dh.point_offset)
-    whole, turned = np.exp(shape[WHOLE]), np.empty((3, 3))
+    whole, turned = np.exp(shape[HAND_SIZE]), np.empty((3, 3))
     rotation_of(0.0, shape[FOREARM_TURN], shape[FOREARM_TURN + 1], turned)
     forearm = np.dot(np.ascontiguousarray(world[:3, :3]), turned)
     for k in range(centres.shape[0]):
@@ -168,7 +169,7 @@ def capsules_of(surface: Surface, world: Array, angles: Array, shape: Array | No
 
 
 @njit(cache=True)
-def meet(ox, oy, oz, ux, uy, uz, a, b, ra, rb):
+def ray_to_capsule(ox, oy, oz, ux, uy, uz, a, b, ra, rb):
     """Distance along the ray from o with unit direction u to the capsule of the balls at `a`, `b` (3,); -1 for none."""
     bx, by, bz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     px, py, pz = ox - a[0], oy - a[1], oz - a[2]

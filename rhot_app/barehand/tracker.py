@@ -1,8 +1,8 @@
 """Tracks a hand without markers in the images of any number of cameras, each image at its own time.
 
-Contours are one more kind of residual of the estimator (`rhot_app.estimation`): every image is searched along slices
-across the contours that the prediction expects, the state is estimated, and the image is searched once more where the
-contours are then. Marker and landmark residuals of the same state may be added at any time.
+Contours are one kind of residual of the estimator (`rhot_app.estimation`). Every image is searched along slices across
+the predicted contours, and the state is estimated. The image is then searched again about that estimate. Marker and
+landmark residuals of the same state may be added at any time.
 """
 
 from __future__ import annotations
@@ -68,32 +68,32 @@ Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 CONFUSED_PX = 6.0
-"""px: a contour expected this much less certainly may be taken for its neighbour's: half of a finger at 0.5 m."""
+"""px: largest standard deviation of a contour that cannot be confused with its neighbour's: half a finger at 0.5 m."""
 
 REACH = 3.0
-"""Standard deviations of the prediction that a slice reaches to both sides: 99.7 % of contours lie on it."""
+"""Half of a slice in standard deviations of the prediction: 99.7 % of contours lie on it."""
 
 LONGEST_PX = REACH * CONFUSED_PX + 6.0
-"""px: half of the longest slice. Farther away, other fingers' edges are as probable."""
+"""px: half of the longest slice. Farther away, the edges of other fingers are as probable."""
 
 START_SD = 0.015, 0.2, 0.2
-"""m, rad and rad: standard deviation of place, rotation and angles where a start is given: of landmarks, about a
-thumb's breadth."""
+"""m, rad and rad: standard deviations of position, rotation and angles of a given start, such as one from landmarks:
+about a thumb's breadth."""
 
 PASSES, START_PASSES = 2, 6
-"""Searches of an image, and of one in which the hand is not where it was expected. Each halves how far from the contour
-an edge may be: six leave less than a pixel of LONGEST_PX."""
+"""Searches of an image, and of the first one after a start or a relocalisation. Each search halves the standard
+deviation of the expected contour: six leave less than a pixel of LONGEST_PX."""
 
 SIZE_SD = 0.1, 0.05, 0.08
-"""Standard deviations of the logarithms of a hand's size, of its fingers' part of it, and of its thickness beyond that,
-in adults, where they are unknown (`tracking.markers.hand_size`; Buryanov and Kotiuk 2010)."""
+"""Standard deviations, in adults, of the logarithms of a hand's size, of its fingers' length relative to that, and of
+its thickness relative to that (`tracking.markers.hand_size`; Buryanov and Kotiuk 2010)."""
 
 LENGTH_SD, RADIUS_SD = 0.05, 0.08
-"""The same of a phalanx's own length and radius."""
+"""The same of the length and the radius of one phalanx."""
 
 MEASURED_SD = 0.02
-"""The same of a phalanx's length where the bones were measured (`python benchmarks/bones.py`, with noise). Nothing
-measures radii."""
+"""The same of a phalanx's length where the bones were measured (`python benchmarks/bones.py`, with noise). No
+calibration measures radii."""
 
 FOREARM_SD = 0.2, 0.5, 0.25
 """Standard deviations of the logarithm of the forearm's radius, with or without a sleeve, and, rad, of the wrist's
@@ -107,22 +107,22 @@ PHALANGES = MOTION + np.arange(THICKNESS, FOREARM_RADIUS)
 """The phalanges' lengths and radii in the tangent space."""
 
 SAME_POSE_S = 1.0
-"""s: images within this time show the hand in much the same pose, and count as one for its phalanges: a grasp takes a
-second. Errors of edges and of the surface last as long, and would move the lengths otherwise."""
+"""s: images within this time show nearly the same pose, since a grasp takes a second, and count as one for the
+phalanges. Errors of edges and surface are correlated as long; taken as independent, they would move the lengths."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """How well the last image of each camera shows the hand: `seen` (C, GROUPS, 2) slices whose contour was found, and
-    all; of the fingers and the palm."""
+    """How much of the expected contour was found in the last image of each camera. `slice_counts` (C, GROUPS, 2): of
+    each finger, the palm and the forearm, the slices on which the contour was found, and all."""
 
-    seen: Array
+    slice_counts: Array
 
     @property
     def support(self) -> Array:
-        """(6,) part of the contour of fingers and palm that was found, of all cameras together; NaN where none is
+        """(6,) part of the contour of each finger and of the palm that was found by all cameras; NaN where none is
         expected."""
-        total = self.seen[:, :FOREARM].sum(axis=0)
+        total = self.slice_counts[:, :FOREARM].sum(axis=0)
         return np.asarray(total[:, 0] / np.where(total[:, 1] > 0.0, total[:, 1], np.nan))
 
 
@@ -131,11 +131,10 @@ class BareHandTracker:
 
     def __init__(self, rig: Rig, *, mode: Literal["contour", "feature"] = "contour", known_size: bool = True,
                  foreground: Sequence[Foreground] | None = None, row_s: Sequence[float] | None = None) -> None:
-        """`mode`: slices across the visible contour, or across the links' axes (`features`). `known_size`:
-        the hand is as the rig's hand file says, to the standard deviations there; otherwise its size is estimated from
-        there. `foreground`: what each
-        camera's node has learnt of hand and background; nothing by default. `row_s`: each camera's time between two
-        rows, s; 0 by default."""
+        """`mode`: slices across the visible contour, or across the links' axes (`features`). `known_size`: the prior of
+        lengths and radii is the rig's hand file with the standard deviations there; otherwise the variation of adults
+        about it. `foreground`: each camera's model of hand and background; uninformative by default. `row_s`: each
+        camera's time between two rows, s; 0 by default."""
         self.mode = mode
         self.model = with_locked(build_model(rig.hand), rig.tracker.locked_deg)
         plane = rig.tracker.palm_plane
@@ -147,13 +146,13 @@ class BareHandTracker:
         self.row_s = [0.0] * len(self.cameras) if row_s is None else list(row_s)
         self.foreground = list(foreground) if foreground else [no_foreground() for _ in self.cameras]
         prior = self.model.pose_prior
-        stated = _stated_sd(rig.hand) if known_size else None
-        size = SIZE_SD if not known_size else (0.0, 0.0, SIZE_SD[2] if stated is None else 0.0)
-        phalanges = np.repeat((MEASURED_SD if known_size else LENGTH_SD, RADIUS_SD), 15) if stated is None else stated
+        file_sd = _relative_sd(rig.hand) if known_size else None
+        size = SIZE_SD if not known_size else (0.0, 0.0, SIZE_SD[2] if file_sd is None else 0.0)
+        phalanges = np.repeat((MEASURED_SD if known_size else LENGTH_SD, RADIUS_SD), 15) if file_sd is None else file_sd
         spread = np.concatenate([size, phalanges, FOREARM_SD]).reshape(-1, 3)
         self.shape_covariance = np.square(spread)[:, :, None] * np.eye(3)
         self.shape_s = np.append(np.full(len(spread) - 1, SHAPE_S), TURN_S)
-        self.slowest = np.append(SLOWEST[:2], FASTEST)  # fingers begin to move within an image
+        self.slowest = np.append(SLOWEST[:2], FASTEST)  # resting fingers may move fast at the next image
         self.process = HandProcess(self.surface.dh, self.model.limits, prior.mean,
                                    np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, self.slowest, FASTEST,
                                    self.shape_covariance, self.shape_s)
@@ -164,14 +163,14 @@ class BareHandTracker:
         self.tracking = False
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
-        self._sequence, self._epoch_ns, self._fresh = 0, 0, False
+        self._sequence, self._epoch_ns, self._first_update = 0, 0, False
         self.relocaliser = Relocaliser(self.model, self.surface, self.cameras, self.plane)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
     def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD,
               size: Array | None = None) -> None:
-        """Begin at a pose whose place, rotation and angles are known to `place_sd`, m, rad and rad. `size` (SHAPE,): as
-        far as it is known."""
+        """Start a track at a pose whose position, rotation and angles have standard deviations `place_sd`, m, rad and
+        rad. `size` (SHAPE,): the shape to start with, 0 by default."""
         self._epoch_ns = t_ns
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, place_sd[:2])
         known = np.linalg.inv(covariance[6:POSE, 6:POSE]) + np.eye(POSE - 6) / place_sd[2] ** 2
@@ -179,16 +178,16 @@ class BareHandTracker:
         if size is not None:
             state[BIAS:BIAS + SHAPE] = size
         self.filter.start(0.0, state, covariance)
-        self.tracking = self._fresh = True
+        self.tracking = self._first_update = True
         self._taken_s = [-np.inf] * len(self.cameras)
         self.relocaliser.restart()
         self.frames = [None] * len(self.cameras)
 
     def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
-        """Look for a hand of which nothing is known, and begin with the most probable one. False without any.
+        """Search the whole images for a hand and start a track at the most probable pose. False without any.
 
-        The best poses by the foreground are followed in the same images; the one whose contour is found best stays. A
-        pose that is less probable than no hand (a negative score) is none.
+        The best poses by the foreground are fitted to the same images. The one with the best score times contour found
+        is taken. A pose with a negative score is less probable than no hand, and left out.
         """
         size = np.zeros(SHAPE)
         best: tuple[float, Found] | None = None
@@ -197,9 +196,9 @@ class BareHandTracker:
             if found.score <= 0.0:
                 continue
             self.start(found.pose, t_ns)
-            self.see({c: image for c, image in enumerate(images) if image is not None}, t_ns)
-            seen = self.fit.seen.sum(axis=(0, 1))
-            quality = found.score * seen[0] / max(seen[1], 1.0)
+            self.update({c: image for c, image in enumerate(images) if image is not None}, t_ns)
+            counts = self.fit.slice_counts.sum(axis=(0, 1))
+            quality = found.score * counts[0] / max(counts[1], 1.0)
             if best is None or quality > best[0]:
                 best = quality, found
         if best is None:
@@ -209,7 +208,8 @@ class BareHandTracker:
         return True
 
     def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
-        """The hand after one image (H, W, 3) RGB of each camera, None where it has none, of master times `t_ns`."""
+        """The hand after one image (H, W, 3) RGB of each camera, None without one, at master times `t_ns`. Raises
+        TrackingError before a start."""
         begun = time.perf_counter()
         if not self.tracking:
             raise TrackingError("the bare hand has no start; give one by start(pose, t_ns), or find one by "
@@ -217,40 +217,41 @@ class BareHandTracker:
         given = {c: image for c, image in enumerate(images) if image is not None}
         if given:
             newest = max(t_ns[c] for c in given)
-            self.see(given, newest, late_s={c: 1e-9 * (t_ns[c] - newest) for c in given})
+            self.update(given, newest, late_s={c: 1e-9 * (t_ns[c] - newest) for c in given})
         return self.state(begun)
 
-    def see(self, images: dict[int, Image], t_ns: int, extra: Sequence[Residual] = (),
-            late_s: Mapping[int, float] | None = None) -> Knot:
-        """Weigh the images of some cameras at one instant, and other residuals of the same state. `late_s`: each
-        image's time less that instant, 0 by default."""
+    def update(self, images: dict[int, Image], t_ns: int, extra: Sequence[Residual] = (),
+               late_s: Mapping[int, float] | None = None) -> Knot:
+        """Update the state at master time `t_ns` by the images of some cameras and by `extra` residuals of the same
+        state. `late_s`: each image's time less that instant, s; 0 by default."""
         t_s, late = 1e-9 * (t_ns - self._epoch_ns), late_s or {}
         prediction, since_s = self.filter.predict(t_s), t_s - self.filter.newest.t_s
-        self.take(images, t_s)
+        self.prepare_update(images, t_s)
         self.frames = [frame if c in images else None for c, frame in enumerate(self.frames)]
         maps, relocaliser, start = self._maps(images), self.relocaliser, None
         odds = None if maps is None else relocaliser.odds_of(maps)
-        if maps and odds and (self._fresh or relocaliser.search_due(odds, prediction[0], t_s)):
+        if maps and odds and (self._first_update or relocaliser.search_due(odds, prediction[0], t_s)):
             everywhere = relocaliser.global_search_due(maps, t_s)
             start, same = relocaliser.relocalise(maps, prediction, self.process.stationary, since_s, everywhere)
             relocaliser.last_search_s = t_s
             relocaliser.schedule_global_search(t_s, relocalised=start is not None, same=same)
         initial = prediction[0] if start is None else start
-        passes = START_PASSES if self._fresh or start is not None else PASSES
+        passes = START_PASSES if self._first_update or start is not None else PASSES
         knot = self._fit(images, late, t_s, prediction, initial, extra, passes)
         if odds is not None:
             per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
             if start is not None and per_pixel < relocaliser.log_odds_per_pixel(odds, start) - ODDS_DROP:
-                # the contour led away from the foreground
+                # Edges have drawn the pose away from the foreground: restart there, without the prediction.
                 knot = self._fit(images, late, t_s, self.restart(t_s, start), start, extra, START_PASSES)
                 per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
-            relocaliser.average(per_pixel, first=self._fresh)
-        self._fresh = False
+            relocaliser.average(per_pixel, first=self._first_update)
+        self._first_update = False
         return knot
 
-    def take(self, cameras: Iterable[int], t_s: float) -> None:
-        """Note that images of `cameras` at `t_s`, s since the start, are weighed next. Without cameras the phalanges'
-        lengths and radii are considered, not updated (Brink 2017)."""
+    def prepare_update(self, cameras: Iterable[int], t_s: float) -> None:
+        """Prepare for an update at `t_s`, s since the start, by images of `cameras`: how many correlated images count
+        as one, and the share of the partial update of the phalanges (Brink 2017). Without cameras the phalanges are
+        consider states: their uncertainty counts, their values stay."""
         cameras = list(cameras)
         last_s = max(self._taken_s) if np.isfinite(self._taken_s).any() else self.filter.newest.t_s
         rate = float(self.process.rates(self.filter.newest.state)[1])
@@ -261,7 +262,8 @@ class BareHandTracker:
         self.filter.partial = Partial(PHALANGES, share)
 
     def restart(self, t_s: float, start: Array) -> tuple[Array, Array]:
-        """Begin at rest in the state `start`; what is known of the size stays. Returns state and covariance."""
+        """Restart the filter at rest in the pose of the state `start`, with its shape and the shape's present
+        covariance. Returns state and covariance."""
         pose = pose_of(start)
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
         state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
@@ -271,7 +273,7 @@ class BareHandTracker:
 
     def _fit(self, images: dict[int, Image], late_s: Mapping[int, float], t_s: float,
              prediction: tuple[Array, Array], state: Array, extra: Sequence[Residual], passes: int) -> Knot:
-        """Search the images and estimate, `passes` times; the first time about `state`."""
+        """Search the images and estimate the state, `passes` times; the first search is about `state`."""
         residuals: list[Residual] = []
         covariance, velocity = prediction[1], velocity_of(prediction)
         for number in range(passes):
@@ -284,8 +286,8 @@ class BareHandTracker:
         return self.filter.add(t_s, residuals, prediction, state)
 
     def _maps(self, images: dict[int, Image]) -> list[NDArray[np.float32] | None] | None:
-        """The foreground of every STEP-th pixel of each camera, None of one without an image; None while no camera
-        knows any."""
+        """Foreground probabilities of every STEP-th pixel of each camera, None of one without an image or an
+        informative foreground model; None without any."""
         known = [c in images and model.informative for c, model in enumerate(self.foreground)]
         if not any(known):
             return None
@@ -296,16 +298,16 @@ class BareHandTracker:
         """Search one image along the contours of a hand in `state`."""
         if not self.noise[camera]:
             self.noise[camera] = noise_of(image)
-        frame = self.expected(camera, state, covariance, STEP_M if last else 2.0 * STEP_M, late_s)
+        frame = self.expected_contour(camera, state, covariance, STEP_M if last else 2.0 * STEP_M, late_s)
         frame.observe(find_edges(image, frame.slices, self.foreground[camera], self.noise[camera]))
         if last:
             self.frames[camera] = frame
         return frame
 
-    def expected(self, camera: int, state: Array, covariance: Array, step_m: float = STEP_M,
-                 late_s: float = 0.0) -> ContourFrame:
-        """The slices across the contours, `step_m` apart, of a hand in `state` before one camera, in an image of
-        `late_s` s later; not yet searched."""
+    def expected_contour(self, camera: int, state: Array, covariance: Array, step_m: float = STEP_M,
+                         late_s: float = 0.0) -> ContourFrame:
+        """The slices across the contours, `step_m` apart, of a hand in `state` with `covariance` in one camera's image,
+        taken `late_s` s later. They have no edges yet."""
         model, then = self.cameras[camera], state
         if abs(late_s) > SAME_TIME_S:
             step = np.zeros(self.process.size)
@@ -323,43 +325,47 @@ class BareHandTracker:
 
     @property
     def fit(self) -> Fit:
-        """How well the last images show the hand."""
-        return Fit(np.array([np.zeros((GROUPS, 2)) if frame is None else frame.seen for frame in self.frames]))
+        """How much of the expected contour the last images show."""
+        return Fit(np.array([np.zeros((GROUPS, 2)) if frame is None else frame.slice_counts for frame in self.frames]))
 
     def state(self, begun: float | None = None, covariance: Array | None = None) -> HandState:
-        """The hand at the newest instant; `covariance`: if it is less certain than the images say."""
+        """The hand at the newest instant. `covariance` (n, n): published instead of the filter's, where markers
+        contradict it."""
         begun = time.perf_counter() if begun is None else begun
         knot = self.filter.newest
         state, covariance = knot.state, knot.covariance if covariance is None else covariance
         points, covariances, motion = np.empty((26, 3)), np.empty((26, 3, 3)), np.empty((2, 21))
         place_joints(state, covariance, self.model.dh, self.surface.bone, points, covariances, motion)
         deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        shown = np.array([np.sum([frame.seen[:, 0] >= 3.0 for frame in self.frames if frame is not None], axis=0)
-                          ]).reshape(GROUPS) if any(f is not None for f in self.frames) else np.zeros(GROUPS)
+        frames = [frame for frame in self.frames if frame is not None]
+        # cameras that found three slices or more of each finger, the palm and the forearm
+        observing = np.zeros(GROUPS)
+        if frames:
+            observing = np.sum([frame.slice_counts[:, 0] >= 3.0 for frame in frames], axis=0)
         joint_sd = np.sqrt(np.trace(covariances, axis1=1, axis2=2))
         joints, angles = np.empty(21, np.uint8), np.empty(21, np.uint8)
-        joints[0] = knowledge_of(joint_sd[0], shown[PALM] >= 2, MEASURED_M, INFERRED_M)
+        joints[0] = knowledge_of(joint_sd[0], observing[PALM] >= 2, MEASURED_M, INFERRED_M)
         for finger in range(5):
-            seen = shown[finger] >= 2
+            observed = observing[finger] >= 2
             for k in range(JOINT_SLICES[finger].start, JOINT_SLICES[finger].stop):
-                joints[k] = knowledge_of(joint_sd[k], seen, MEASURED_M, INFERRED_M)
+                joints[k] = knowledge_of(joint_sd[k], observed, MEASURED_M, INFERRED_M)
             for k in range(ANGLE_SLICES[finger].start, ANGLE_SLICES[finger].stop):
-                angles[k] = knowledge_of(deviation[6 + k], seen, MEASURED_RAD, INFERRED_RAD)
+                angles[k] = knowledge_of(deviation[6 + k], observed, MEASURED_RAD, INFERRED_RAD)
         turn_sd = float(np.sqrt(np.trace(covariance[3:6, 3:6])))
         world = np.eye(4)
         world[:3] = state[:ANGLES].reshape(3, 4)
         self._sequence += 1
-        nothing, cameras = np.empty((0, 3)), len(self.cameras)
+        no_markers, cameras = np.empty((0, 3)), len(self.cameras)
         t_ns = self._epoch_ns + round(1e9 * knot.t_s)
         return HandState(
             sequence=self._sequence - 1, t_master_ns=t_ns, t_receive_ns=t_ns,
-            condition=Condition.TRACKING if np.all(shown[[*range(6)]] >= 1) else Condition.PARTIAL,
-            marker_ids=(), marker_positions=nothing, marker_raw_positions=nothing,
+            condition=Condition.TRACKING if np.all(observing[[*range(6)]] >= 1) else Condition.PARTIAL,
+            marker_ids=(), marker_positions=no_markers, marker_raw_positions=no_markers,
             marker_covariances=np.empty((0, 3, 3)), marker_knowledge=np.empty(0, np.uint8), camera_names=self.names,
             camera_pixels=np.empty((cameras, 0, 2)), camera_flags=np.empty((cameras, 0), np.uint16),
             joint_positions=points[:21], joint_knowledge=joints, fingertip_positions=points[21:],
             angles=state[ANGLES:VELOCITY].copy(), angle_knowledge=angles, world_from_palm=world,
-            palm_knowledge=Knowledge(knowledge_of(turn_sd, shown[PALM] >= 2, MEASURED_RAD, INFERRED_RAD)),
+            palm_knowledge=Knowledge(knowledge_of(turn_sd, observing[PALM] >= 2, MEASURED_RAD, INFERRED_RAD)),
             epipolar_error_px=np.empty(0),
             **UNESTIMATED | {
                 "joint_covariances": covariances[:21], "fingertip_covariances": covariances[21:],
@@ -371,8 +377,8 @@ class BareHandTracker:
             latency_s={"filter": time.perf_counter() - begun})
 
 
-def _stated_sd(hand: HandAnatomy) -> Array | None:
-    """(30,) relative standard deviations of lengths and radii that a hand file states; None where it does not."""
+def _relative_sd(hand: HandAnatomy) -> Array | None:
+    """(30,) relative standard deviations of lengths and radii from a hand file; None where it has none."""
     found = []
     for field in ("bones", "radii"):
         for name in FINGERS:

@@ -54,4 +54,4 @@ class ContourTracker:
                 kept.append(image)
         if min(len(kept) for kept in self._empty) >= BACKGROUND_PICTURES:
             self._foreground = [learn_background(skin_foreground(), kept) for kept in self._empty]
-            self._follower.know(self._foreground)
+            self._follower.set_foreground(self._foreground)

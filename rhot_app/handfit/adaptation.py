@@ -16,8 +16,16 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import SILHOUETTE
-from rhot_app.barehand.key_frames import OWN, SHAPE_SD, SHARED, KeyFrame, normal_equations, phalanx_sd, with_edge_bias
-from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, LENGTH, RADIUS, SHAPE, THICKNESS, WHOLE
+from rhot_app.barehand.key_frames import (
+    FRAME_COLUMNS,
+    SHAPE_COLUMNS,
+    SHAPE_SD,
+    KeyFrame,
+    normal_equations,
+    phalanx_sd,
+    with_edge_bias,
+)
+from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENGTH, RADIUS, SHAPE, THICKNESS
 from rhot_app.estimation.least_squares import minimise
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.kinematics import move
@@ -56,8 +64,8 @@ class Adapted:
     def document(self) -> dict[str, float]:
         """By how much lengths and radii changed and how well they are known, rms over the phalanges."""
         sizes, own = self.shape[:THICKNESS + 1], self.shape
-        lengths = own[LENGTH:RADIUS] + sizes[WHOLE] + sizes[FINGER_SIZE]
-        radii = own[RADIUS:RADIUS + 15] + sizes[WHOLE] + sizes[THICKNESS]
+        lengths = own[LENGTH:RADIUS] + sizes[HAND_SIZE] + sizes[FINGER_SIZE]
+        radii = own[RADIUS:RADIUS + 15] + sizes[HAND_SIZE] + sizes[THICKNESS]
         return {"key_frames": len(self.states)} | {
             f"{name}_percent": 100.0 * float(np.sqrt(np.mean(values**2)))
             for name, values in (("lengths", lengths), ("lengths_sd", self.length_sd), ("radii", radii),
@@ -148,14 +156,15 @@ class _Iterate:
         away = self._problem.shape[:FOREARM_TURN] + self.step
         matrix, right = np.diag(1.0 / SHAPE_SD**2), -away / SHAPE_SD**2
         for information, pull in self._systems:
-            matrix += information[np.ix_(SHARED, SHARED)]
-            right = right + pull[SHARED]
+            matrix += information[np.ix_(SHAPE_COLUMNS, SHAPE_COLUMNS)]
+            right = right + pull[SHAPE_COLUMNS]
         matrix[np.diag_indices_from(matrix)] *= 1.0 + damping
         followed = []
         for information, pull in self._systems:
-            own, coupled = information[np.ix_(OWN, OWN)], information[np.ix_(OWN, SHARED)]
+            own = information[np.ix_(FRAME_COLUMNS, FRAME_COLUMNS)]
+            coupled = information[np.ix_(FRAME_COLUMNS, SHAPE_COLUMNS)]
             own[np.diag_indices_from(own)] *= 1.0 + damping
-            follows = np.linalg.solve(own, np.column_stack([coupled, pull[OWN]]))
+            follows = np.linalg.solve(own, np.column_stack([coupled, pull[FRAME_COLUMNS]]))
             matrix -= coupled.T @ follows[:, :-1]
             right = right - coupled.T @ follows[:, -1]
             followed.append(follows)

@@ -73,9 +73,9 @@ def find_hand(rig: Rig, hand: HandAnatomy, instant: Instant, progress: Progress)
         progress("looking for the hand", number / SEARCHES)
         if not tracker.find(images, 0):
             continue
-        state = tracker.see(dict(enumerate(images)), 0).state
-        seen = tracker.fit.seen.sum(axis=(0, 1))
-        found = float(seen[0] / max(seen[1], 1.0))
+        state = tracker.update(dict(enumerate(images)), 0).state
+        counts = tracker.fit.slice_counts.sum(axis=(0, 1))
+        found = float(counts[0] / max(counts[1], 1.0))
         best = (found, state) if best is None or found > best[0] else best
         if found > FOUND:
             break
@@ -111,7 +111,7 @@ def _search(hand: HandAnatomy, rig: Rig, state: FitState, k: int, spread: Array,
     covariance[np.ix_(theirs, theirs)] = spread[np.ix_(ours, ours)]
     frames = []
     for number, (_, image) in enumerate(sorted(instant.images.items())):
-        frame = in_a_fit(tracker.expected(number, bare, covariance, step_m))
+        frame = in_a_fit(tracker.expected_contour(number, bare, covariance, step_m))
         frame.observe(find_edges(image, frame.slices, *learnt[number]))
         frames.append(frame)
     return Contour(state.shape, tuple(frames))

@@ -16,10 +16,10 @@ from rhot_app.barehand.surface import (
     FINGER_SIZE,
     FOREARM_RADIUS,
     FOREARM_TURN,
+    HAND_SIZE,
     LENGTH,
     RADIUS,
     THICKNESS,
-    WHOLE,
     Surface,
     surface_of,
 )
@@ -51,7 +51,7 @@ def anatomy_of(base: HandAnatomy, shape: Array) -> HandAnatomy:
 
     A joint between two phalanges has the mean of their radii there, as in any hand file (`barehand.surface`).
     """
-    whole, thick = np.exp(shape[WHOLE]), np.exp(shape[THICKNESS])
+    whole, thick = np.exp(shape[HAND_SIZE]), np.exp(shape[THICKNESS])
     fingers = {}
     for k, name in enumerate(FINGERS):
         old, own = base.fingers[name], slice(3 * k, 3 * k + 3)

@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from rhot_app.barehand.surface import (
     FINGER_SIZE,
     FOREARM_RADIUS,
+    HAND_SIZE,
     LENGTH,
     RADIUS,
     THICKNESS,
-    WHOLE,
 )
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.anatomy import HandAnatomy
@@ -70,7 +70,7 @@ def numbers_of(base: HandAnatomy) -> tuple[Number, ...]:
                   for k, (low, high) in zip(range(own.start, own.stop), limits.tolist(), strict=True)]
     found += [Number("Forearm", name, "°", -limit, limit, "bend", k, "Of the forearm behind the wrist.")
               for k, (name, limit) in enumerate(zip(("flexion", "deviation"), np.degrees(BEND_LIMIT), strict=True))]
-    for name, index, meaning in (("whole hand", WHOLE, "every length"),
+    for name, index, meaning in (("whole hand", HAND_SIZE, "every length"),
                                  ("fingers", FINGER_SIZE, "all phalanges, beside the size of the whole hand"),
                                  ("thickness", THICKNESS, "all radii but the forearm's, and the palm's thickness"),
                                  ("forearm", FOREARM_RADIUS, "the forearm's thickness")):
@@ -150,7 +150,7 @@ def with_value(state: FitState, instant: int, hand: HandAnatomy, number: Number,
         case "length" | "radius":
             shape[(LENGTH if number.kind == "length" else RADIUS) + k] += math.log(max(value, 1e-3) / before)
         case "root":
-            shape[ROOTS + k] += 1e-3 * (value - before) / math.exp(shape[WHOLE])
+            shape[ROOTS + k] += 1e-3 * (value - before) / math.exp(shape[HAND_SIZE])
     shape = np.clip(shape, -SHAPE_LIMIT, SHAPE_LIMIT)
     changed = replace(one, pose=HandPose(world, angles), bend=bend)
     return replace(state.change(instant, changed), shape=shape)
@@ -172,11 +172,12 @@ def sd_of(state: FitState, instant: int, hand: HandAnatomy, number: Number, cova
         case "size":
             row[k] = value_of(state, instant, hand, number)
         case "length":
-            row[[WHOLE, FINGER_SIZE, LENGTH + k]] = value_of(state, instant, hand, number)
+            row[[HAND_SIZE, FINGER_SIZE, LENGTH + k]] = value_of(state, instant, hand, number)
         case "radius":
-            row[[WHOLE, THICKNESS, RADIUS + k]] = value_of(state, instant, hand, number)
+            row[[HAND_SIZE, THICKNESS, RADIUS + k]] = value_of(state, instant, hand, number)
         case "root":
-            row[WHOLE], row[ROOTS + k] = value_of(state, instant, hand, number), 1e3 * math.exp(state.shape[WHOLE])
+            row[HAND_SIZE] = value_of(state, instant, hand, number)
+            row[ROOTS + k] = 1e3 * math.exp(state.shape[HAND_SIZE])
     return math.sqrt(max(float(row @ covariance @ row), 0.0))
 
 

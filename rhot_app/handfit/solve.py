@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.barehand.contour_residual import COLUMNS, compressed, gathered
 from rhot_app.barehand.contours import NEAREST_M, project
 from rhot_app.barehand.joints import add_lengths
-from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, LENGTH, RADIUS, SHAPE, WHOLE
+from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENGTH, RADIUS, SHAPE
 from rhot_app.barehand.tracker import FOREARM_SD, START_SD
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import Dense, minimise
@@ -201,9 +201,9 @@ def joint_places(model: HandModel, bone: NDArray[np.int64], shape: Array, instan
     out[:, :, SIZE:SIZE + POSE] = moves[:count]
     lengths = np.zeros((count, 3, 2 + RADIUS - LENGTH))
     add_lengths(dh, bone, pose.world_from_palm, frames, points[:count], lengths)
-    out[:, :, WHOLE], out[:, :, FINGER_SIZE] = lengths[..., 0], lengths[..., 1]
+    out[:, :, HAND_SIZE], out[:, :, FINGER_SIZE] = lengths[..., 0], lengths[..., 1]
     out[:, :, LENGTH:RADIUS] = lengths[..., 2:]
-    roots = np.exp(shape[WHOLE]) * pose.world_from_palm[:3, :3] * np.array([1.0, model.mirror, 1.0])
+    roots = np.exp(shape[HAND_SIZE]) * pose.world_from_palm[:3, :3] * np.array([1.0, model.mirror, 1.0])
     for joint in range(1, count):
         finger = (joint - 1) // 4
         out[joint, :, ROOTS + 3 * finger:ROOTS + 3 * finger + 3] = roots
@@ -237,7 +237,7 @@ def free_numbers(state: FitState, instants: Sequence[int], freedom: Freedom, *, 
         free[own.stop - 2:own.stop] = surface
     if freedom != "pose":
         free[LENGTH:RADIUS] = True
-        free[[WHOLE, FINGER_SIZE]] = not own_lengths
+        free[[HAND_SIZE, FINGER_SIZE]] = not own_lengths
         if surface:
             free[:ROOTS] = True
     if freedom == "roots" and not surface:

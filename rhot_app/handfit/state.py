@@ -44,8 +44,8 @@ class Contour:
     @property
     def found(self) -> float:
         """Part of the expected contour that was found, 0..1."""
-        seen = np.sum([frame.seen.sum(axis=0) for frame in self.frames], axis=0)
-        return float(seen[0] / max(seen[1], 1.0))
+        counts = np.sum([frame.slice_counts.sum(axis=0) for frame in self.frames], axis=0)
+        return float(counts[0] / max(counts[1], 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import camera_centre
-from rhot_app.barehand.surface import FOREARM, Surface, capsules_of, meet
+from rhot_app.barehand.surface import FOREARM, Surface, capsules_of, ray_to_capsule
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import inverse, rigid
 from rhot_app.hand.skeleton import HandPose
@@ -147,8 +147,8 @@ def _draw(centres, radii, o, rotation, intrinsics, light, colours, out):
                 best, which = 1e9, -1
                 for k in range(len(centres)):
                     if boxes[k, 0] <= x <= boxes[k, 2] and boxes[k, 1] <= y <= boxes[k, 3]:
-                        t = meet(o[0], o[1], o[2], d[0], d[1], d[2], centres[k, 0], centres[k, 1], radii[k, 0],
-                                 radii[k, 1])
+                        t = ray_to_capsule(o[0], o[1], o[2], d[0], d[1], d[2], centres[k, 0], centres[k, 1],
+                                           radii[k, 0], radii[k, 1])
                         if 0.0 < t < best:
                             best, which = t, k
                 if which >= 0:

@@ -61,7 +61,7 @@ def test_other_kinds_of_observations_are_weighed_with_the_contour(film) -> None:
 
     tracker = BareHandTracker(rig_of(film[0][0], right_hand()))
     tracker.start(poses("grasp", TIMES)[0], 0)
-    knot = tracker.see({0: film[0][1][0]}, 0, [Place()])
+    knot = tracker.update({0: film[0][1][0]}, 0, [Place()])
     assert abs(knot.state[3] - 0.5) < 1e-3
 
 

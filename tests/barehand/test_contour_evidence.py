@@ -10,7 +10,7 @@ from pictures import two_cameras
 
 from rhot_app.barehand.contours import SILHOUETTE, STEP_M
 from rhot_app.barehand.observations import EdgeFrame, SliceRequest
-from rhot_app.barehand.surface import SHAPE, WHOLE
+from rhot_app.barehand.surface import HAND_SIZE, SHAPE
 from rhot_app.barehand.tracker import SAME_POSE_S, BareHandTracker
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.motion.hand_process import BIAS, MOTION
@@ -49,7 +49,7 @@ def test_recorded_slices_that_the_hand_does_not_cross_say_nothing(hand: BareHand
     assert all(np.array_equal(column, kept) for column, kept in zip(edges, before, strict=True))
     assert len(contour.slices) == pytest.approx(len(slices), rel=0.03)
     contour.linearise(state_of(pose))
-    found, expected = contour.seen.sum(axis=0)
+    found, expected = contour.slice_counts.sum(axis=0)
     assert found > 0.75 * expected, "the hand is found on the slices across it"
     edges = find_edges(images[0], beside, skin_foreground(), 2.0)
     assert matched(hand, EdgeFrame(0, 0, 0, 0, 0.0, 0.0, SliceRequest(0, beside), edges), state_of(pose),
@@ -85,10 +85,10 @@ def test_edges_of_a_hand_before_an_unknown_wall_are_as_certain_as_they_state(han
 
 def test_phalanges_follow_the_contours_at_the_same_pace_beside_markers(hand: BareHandTracker) -> None:
     hand.start(poses("grasp", (0.5,))[0], 0)
-    hand.take([0, 1], 0.0)
-    hand.take((), 0.1)
+    hand.prepare_update([0, 1], 0.0)
+    hand.prepare_update((), 0.1)
     assert hand.filter.partial.share == 0.0, "their markers explain them, but do not move them"
-    hand.take([0, 1], 0.1)
+    hand.prepare_update([0, 1], 0.1)
     assert hand.filter.partial.share == pytest.approx(0.1 / SAME_POSE_S)
 
 
@@ -119,7 +119,7 @@ def test_markers_lie_on_a_hand_as_large_as_the_contours_say(markers: str) -> Non
     MarkersOfHand(rig, hand)
     state = np.zeros(BIAS + SHAPE + 3 * len(rig.markers.ids))
     state[:BIAS + SHAPE] = state_of(pose)
-    state[BIAS + WHOLE] = np.log(factor)
+    state[BIAS + HAND_SIZE] = np.log(factor)
     model = compile_markers(rig)
     residual = BesideContours(MarkerFrame(model, observations(pixels_of(rig, pose, factor))), model, hand.surface.bone,
                               (state, hand.process.stationary), 0)

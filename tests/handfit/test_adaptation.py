@@ -11,7 +11,7 @@ import pytest
 from bare_scenes import DISTANCE_M, rig_of, right_hand
 from pictures import picture, taken, two_cameras, wall
 
-from rhot_app.barehand.key_frames import APART_S, KEPT, SHAPE_SD, KeyFrame, KeyFrames, phalanx_sd
+from rhot_app.barehand.key_frames import MAX_KEY_FRAMES, MIN_INTERVAL_S, SHAPE_SD, KeyFrame, KeyFrames, phalanx_sd
 from rhot_app.barehand.surface import surface_of
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.engine.rig_watch import JUDGE_NS, HandWatch
@@ -111,11 +111,11 @@ def test_what_tells_least_goes_first() -> None:
     _, key_frames, _, tracker = tracked()
     full = KeyFrames(tracker.model)
     nothing = KeyFrame(0.0, tracker.filter.newest.state, (), np.zeros((len(SHAPE_SD),) * 2))
-    full.kept = [*key_frames.kept, *[nothing] * (KEPT - POSES)]
+    full.kept = [*key_frames.kept, *[nothing] * (MAX_KEY_FRAMES - POSES)]
     full.offer(tracker)
-    assert len(full.kept) == KEPT and sum(one is nothing for one in full.kept) == KEPT - POSES - 1
+    assert len(full.kept) == MAX_KEY_FRAMES and sum(one is nothing for one in full.kept) == MAX_KEY_FRAMES - POSES - 1
     full.offer(tracker)  # the same moment again
-    assert sum(one is nothing for one in full.kept) == KEPT - POSES - 1 and APART_S > 0.0
+    assert sum(one is nothing for one in full.kept) == MAX_KEY_FRAMES - POSES - 1 and MIN_INTERVAL_S > 0.0
     full.clear()
     assert not full.kept
 

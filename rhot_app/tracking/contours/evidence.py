@@ -69,9 +69,9 @@ class Evidence:
     def take_edges(self, weighed: Iterable[tuple[EdgeFrame, ContourFrame]]) -> None:
         """The edges of some frames have been weighed."""
         for frame, contour in weighed:
-            camera, seen = self._shown[frame.camera], contour.seen.sum(axis=0)
+            camera, counts = self._shown[frame.camera], contour.slice_counts.sum(axis=0)
             camera.searched_ns = frame.t_row0_master_ns
-            if seen[0] > MAJORITY * seen[1]:
+            if counts[0] > MAJORITY * counts[1]:
                 camera.supported_ns = frame.t_row0_master_ns
         self._note()
 

@@ -115,7 +115,7 @@ class MarkersOfHand:
         hand, t_s = self._hand, 1e-9 * (MarkerFrame(self._markers, frame).t_ns - self._epoch_ns)
         if t_s < hand.filter.knots[0].t_s:
             return False
-        hand.take((), t_s)
+        hand.prepare_update((), t_s)
         prediction = hand.filter.predict(t_s)
         found = self._residuals([frame], prediction, self._epoch_ns + round(1e9 * t_s))
         if found:
@@ -202,7 +202,7 @@ def weigh(hand: BareHandTracker, markers: MarkersOfHand | None, waiting: Mapping
         contour.late_s = contour.late_s + (1e-9 * (t_ns - epoch_ns) - t_s)
     edges_ns = {number: one.t_row0_master_ns for number, (one, _) in waiting.items()}
     marked = [] if markers is None else markers.beside(edges_ns)
-    hand.take(waiting, t_s)
+    hand.prepare_update(waiting, t_s)
     prediction, spreads = hand.filter.predict(t_s), [contour.expected_sd for contour in contours]
     found: list[BesideContours] = []
     initial = prediction[0]

@@ -7,9 +7,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
-from rhot_app.barehand.contours import BESIDE_M, INNER, JUMP_M
-from rhot_app.barehand.silhouette import FOREARM_M, FOREARM_SPREAD, cover
-from rhot_app.barehand.surface import FOREARM, SHAPE, capsules_of, meet
+from rhot_app.barehand.contours import INNER, JUMP_M, OUTSIDE_M
+from rhot_app.barehand.silhouette import FOREARM_M, FOREARM_SPREAD, rasterise
+from rhot_app.barehand.surface import FOREARM, SHAPE, capsules_of, ray_to_capsule
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
@@ -40,7 +40,7 @@ def visible(hand: BareHandTracker, frame: ContourFrame, camera: CameraModel, sta
     way = (1.0 - along) * ends[:, 0] + along * ends[:, 1] - camera.centre
     r_there = (1.0 - points.along) * r[:, 0] + points.along * r[:, 1]
     far = np.sqrt(np.maximum(np.sum(way * way, axis=1) - r_there**2, 0.0))
-    beside = points.pixel + (BESIDE_M * points.scale)[:, None] * points.normal
+    beside = points.pixel + (OUTSIDE_M * points.scale)[:, None] * points.normal
     met = _nearest(camera.centre, _rays(camera, beside), *other)
     points.behind[np.isfinite(met)] = INNER
     return np.asarray(met > far + JUMP_M)
@@ -50,7 +50,7 @@ def occluded_pixels(camera: CameraModel, other: Capsules, shape: tuple[int, int]
     """Which of every `step`-th pixel, an array of `shape`, another hand covers, or may: its contour is known to about
     one of them."""
     mask = np.zeros(shape, np.uint8)
-    cover(*other, np.ascontiguousarray(camera.camera_from_world[:3]), camera.intrinsics, step, 1.0, mask)
+    rasterise(*other, np.ascontiguousarray(camera.camera_from_world[:3]), camera.intrinsics, step, 1.0, mask)
     return mask > 0
 
 
@@ -72,8 +72,8 @@ def _nearest(o, rays, centres, radii):
     found = np.full(rays.shape[0], np.inf)
     for i in range(rays.shape[0]):
         for k in range(centres.shape[0]):
-            t = meet(o[0], o[1], o[2], rays[i, 0], rays[i, 1], rays[i, 2], centres[k, 0], centres[k, 1], radii[k, 0],
-                     radii[k, 1])
+            t = ray_to_capsule(o[0], o[1], o[2], rays[i, 0], rays[i, 1], rays[i, 2], centres[k, 0], centres[k, 1],
+                               radii[k, 0], radii[k, 1])
             if 0.0 < t < found[i]:
                 found[i] = t
     return found

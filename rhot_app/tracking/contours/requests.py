@@ -173,7 +173,7 @@ def asked(hand: BareHandTracker, camera: int, state: Array, covariance: Array, s
           beside: Capsules | None = None, most: int = SLICES_MAX) -> ContourFrame:
     """The slices across the contours of a hand in `state`, whose centres lie in the image, rounded as they are sent; of
     more than `most`, every second or third. Those that a hand `beside` it hides are left out."""
-    frame, model = hand.expected(camera, state, covariance, step_m), hand.cameras[camera]
+    frame, model = hand.expected_contour(camera, state, covariance, step_m), hand.cameras[camera]
     x, y = frame.slices[:, 0], frame.slices[:, 1]
     good = (x >= 0.0) & (y >= 0.0) & (x <= model.width - 1) & (y <= model.height - 1)
     if beside is not None:
@@ -187,7 +187,7 @@ def matched(hand: BareHandTracker, frame: EdgeFrame, state: Array, covariance: A
             beside: Capsules | None = None) -> ContourFrame | None:
     """The contour of a hand in `state` on the slices of a recorded request that cross it, with their edges; the frame
     stays as it is. None without any. `beside`: as of `asked`."""
-    expected, slices = hand.expected(frame.camera, state, covariance, 0.5 * STEP_M), frame.request.slices
+    expected, slices = hand.expected_contour(frame.camera, state, covariance, 0.5 * STEP_M), frame.request.slices
     if not len(expected.slices) or not len(slices):
         return None
     apart = slices[:, None, :2] - expected.pixel[None]

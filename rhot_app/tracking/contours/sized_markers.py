@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.joints import add_lengths
-from rhot_app.barehand.surface import FINGER_SIZE, LENGTH, RADIUS, SHAPE, WHOLE, sized_table
+from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, SHAPE, sized_table
 from rhot_app.estimation.residual import Rows
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
@@ -24,7 +24,7 @@ from rhot_app.tracking.markers.marker_residual import MarkerFrame
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-LENGTHS = np.concatenate([[WHOLE, FINGER_SIZE], np.arange(LENGTH, RADIUS)])
+LENGTHS = np.concatenate([[HAND_SIZE, FINGER_SIZE], np.arange(LENGTH, RADIUS)])
 """Of a shape: what moves joints and markers."""
 
 
@@ -76,7 +76,7 @@ def sized(markers: MarkerModel, bone: Indices, state: Array) -> MarkerModel:
     dh, shape = markers.dh, np.ascontiguousarray(state[BIAS:BIAS + SHAPE])
     a, d = np.empty(len(dh.a)), np.empty(len(dh.d))
     sized_table(dh, bone, shape, a, d)
-    return replace(markers, dh=dh._replace(a=a, d=d, point_offset=np.exp(shape[WHOLE]) * dh.point_offset))
+    return replace(markers, dh=dh._replace(a=a, d=d, point_offset=np.exp(shape[HAND_SIZE]) * dh.point_offset))
 
 
 def lengths_jacobian(dh: DhArrays, bone: Indices, state: Array) -> Array:

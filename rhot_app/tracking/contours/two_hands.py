@@ -227,7 +227,7 @@ class TwoBareHands(TwoHands):
         state, covariance = one.process.start(world, one.model.pose_prior.mean.copy(), START_SD[:2])
         capsules = capsules_in(one, state)
         occluded_pixels(camera, capsules, (60, 80), STEP)
-        visible(one, one.expected(0, state, covariance), camera, state, capsules)
+        visible(one, one.expected_contour(0, state, covariance), camera, state, capsules)
 
     def wait(self) -> None:
         """Until the hands that are looked for are found or not."""
