@@ -1,1 +1,1 @@
-"""The bare hand: what is observed of it without markers, and trackers of that."""
+"""The bare hand: observations without markers, and trackers by them."""

@@ -23,7 +23,7 @@ from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import HandPose
 
 Array = NDArray[np.float64]
-Maps = Sequence[NDArray[np.float32] | None]
+ForegroundMaps = Sequence[NDArray[np.float32] | None]
 """Foreground probabilities (h, w) of every STEP-th pixel of each camera, None of a camera without an image."""
 
 RELOCALISATION_LOG_ODDS = 20.0
@@ -79,7 +79,7 @@ class Relocaliser:
         late = t_s - self.last_search_s > LOCAL_SEARCH_S
         return bool(late or self.log_odds_per_pixel(odds, state) < self.average_odds - ODDS_DROP)
 
-    def global_search_due(self, maps: Maps, t_s: float) -> bool:
+    def global_search_due(self, maps: ForegroundMaps, t_s: float) -> bool:
         """Whether the whole image should be searched at `t_s`, s; if so, the next interval is twice as long.
 
         Never in the maps of one camera, unless a plane is known: there a start is hardly more accurate than a track.
@@ -104,7 +104,7 @@ class Relocaliser:
 
     # -- how good a pose is --------------------------------------------------------------------------------------------
 
-    def odds_of(self, maps: Maps) -> LogOddsMaps:
+    def odds_of(self, maps: ForegroundMaps) -> LogOddsMaps:
         """Log odds of the foreground, of the cameras that have a map."""
         used = [c for c, one in enumerate(maps) if one is not None]
         return log_odds_maps([one for one in maps if one is not None], STEP,
@@ -129,12 +129,12 @@ class Relocaliser:
 
     # -- where ---------------------------------------------------------------------------------------------------------
 
-    def search_globally(self, maps: Maps, size: Array, rng: np.random.Generator) -> HandPose | None:
+    def search_globally(self, maps: ForegroundMaps, size: Array, rng: np.random.Generator) -> HandPose | None:
         """The most probable hand of `size` (SHAPE,) anywhere in foreground maps; None without any."""
         found = find_in_maps(maps, self.cameras, self.model, self.surface, size, rng, 1, self.plane)
         return found[0].pose if found else None
 
-    def relocalise(self, maps: Maps, prediction: tuple[Array, Array], stationary: Array, dt_s: float,
+    def relocalise(self, maps: ForegroundMaps, prediction: tuple[Array, Array], stationary: Array, dt_s: float,
                    everywhere: bool = False) -> tuple[Array | None, bool]:
         """Search for a pose that is better than the predicted one by RELOCALISATION_LOG_ODDS.
 

@@ -169,7 +169,7 @@ def test_a_hand_that_was_found_wrong_is_found_anew(film, monkeypatch) -> None:
     nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
     with monkeypatch.context() as patched:
         patched.setattr(Finder, "found", lambda _: (HandPose(wrong, pose.angles), FIRST_NS + number * PERIOD_NS))
-        patched.setattr(Finder, "follow", lambda *_: False)
+        patched.setattr(Finder, "verify", lambda *_: False)
         while not nodes.states or not nodes.states[-1].tracked:
             assert number < 20
             nodes.step(number, film[0][1])
@@ -338,7 +338,7 @@ def test_landmarks_and_edges_of_one_picture_are_weighed_at_once(film, monkeypatc
     nodes = SearchedNodes(make_tracker(rig), known(film), 21, rounded_ns=rounded_ns)
     number = until_tracked(nodes, film, 0, 0)
     alone: list[int] = []
-    monkeypatch.setattr(MarkersOfHand, "weigh", lambda _, frame, *__: bool(alone.append(frame.camera)))
+    monkeypatch.setattr(MarkersOfHand, "update", lambda _, frame, *__: bool(alone.append(frame.camera)))
     for _ in range(8):
         nodes.step(number, film[0][1], landmarks(film, poses("grasp", TIMES)[0]))
         number += 1

@@ -18,8 +18,8 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.contours.finder import Finder
 from rhot_app.tracking.contours.markers import MarkersOfHand
-from rhot_app.tracking.contours.requests import Requests, asked, matched
-from rhot_app.tracking.contours.sized_markers import BesideContours
+from rhot_app.tracking.contours.requests import Requests, matched_contour, requested_contour
+from rhot_app.tracking.contours.sized_markers import SizedMarkerResidual
 from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations
@@ -39,12 +39,12 @@ def test_recorded_slices_that_the_hand_does_not_cross_say_nothing(hand: BareHand
     pose = poses("grasp", (0.5,))[0]
     _, images, _ = scene(pose)
     covariance = 1e-6 * np.eye(hand.process.size)
-    slices = asked(hand, 0, state_of(pose), covariance, STEP_M).slices
+    slices = requested_contour(hand, 0, state_of(pose), covariance, STEP_M).slices
     beside = slices[::2] * [1.0, 1.0, 1.0, 1.0, 0.2] + [250.0, 0.0, 0.0, 0.0, 0.0]
     request = SliceRequest(0, np.vstack([beside, slices]))
     edges = find_edges(images[0], request.slices, skin_foreground(), 2.0)
     frame, before = EdgeFrame(0, 0, 0, 0, 0.0, 0.0, request, edges), [column.copy() for column in edges]
-    contour = matched(hand, frame, state_of(pose), covariance)
+    contour = matched_contour(hand, frame, state_of(pose), covariance)
     assert contour is not None and contour.edges is not None
     assert all(np.array_equal(column, kept) for column, kept in zip(edges, before, strict=True))
     assert len(contour.slices) == pytest.approx(len(slices), rel=0.03)
@@ -52,27 +52,27 @@ def test_recorded_slices_that_the_hand_does_not_cross_say_nothing(hand: BareHand
     found, expected = contour.slice_counts.sum(axis=0)
     assert found > 0.75 * expected, "the hand is found on the slices across it"
     edges = find_edges(images[0], beside, skin_foreground(), 2.0)
-    assert matched(hand, EdgeFrame(0, 0, 0, 0, 0.0, 0.0, SliceRequest(0, beside), edges), state_of(pose),
+    assert matched_contour(hand, EdgeFrame(0, 0, 0, 0, 0.0, 0.0, SliceRequest(0, beside), edges), state_of(pose),
                    covariance) is None
 
 
 def test_more_slices_than_a_request_has_are_thinned_out(hand: BareHandTracker) -> None:
     pose, covariance = poses("grasp", (0.5,))[0], 1e-6 * np.eye(hand.process.size)
-    every = asked(hand, 0, state_of(pose), covariance, STEP_M)
+    every = requested_contour(hand, 0, state_of(pose), covariance, STEP_M)
     requests = Requests(hand, lambda _: (state_of(pose), covariance), lambda _: None, 100)
-    requests.ask(0, 0)
+    requests.request_slices(0, 0)
     request, = requests.take()
     assert 50 < len(request.slices) <= 100 < len(every.slices)
     edges = find_edges(scene(pose)[1][0], request.slices, skin_foreground(), 2.0)
     contour = requests.contour(EdgeFrame(0, 0, 0, 0, 0.0, 0.0, request, edges))
-    assert contour is not None, "it is matched"
+    assert contour is not None, "the answer belongs to the request"
     assert set(contour.points.capsule) == set(every.points.capsule), "all of the hand is searched"
 
 
 def test_edges_of_a_hand_before_an_unknown_wall_are_as_certain_as_they_state(hand: BareHandTracker) -> None:
     pose, squares = poses("grasp", (0.5,))[0], []
     for camera, image in enumerate(scene(pose)[1]):
-        contour = asked(hand, camera, state_of(pose), 1e-6 * np.eye(hand.process.size), STEP_M)
+        contour = requested_contour(hand, camera, state_of(pose), 1e-6 * np.eye(hand.process.size), STEP_M)
         true, _, good = contour.predict(state_of(pose))
         edges = find_edges(image, contour.slices, learn_skin(image), noise_of(image))
         for s in np.flatnonzero(good & (contour.points.behind == SILHOUETTE) & (edges.number > 0)):
@@ -106,7 +106,7 @@ def test_a_search_that_ends_while_its_track_is_given_up_gives_no_pose(hand: Bare
             finder.reset()
             return 1
 
-    finder.look(Maps())  # type: ignore[arg-type]
+    finder.search_everywhere(Maps())  # type: ignore[arg-type]
     finder.wait()
     assert finder.found() is None
 
@@ -121,8 +121,8 @@ def test_markers_lie_on_a_hand_as_large_as_the_contours_say(markers: str) -> Non
     state[:BIAS + SHAPE] = state_of(pose)
     state[BIAS + HAND_SIZE] = np.log(factor)
     model = compile_markers(rig)
-    residual = BesideContours(MarkerFrame(model, observations(pixels_of(rig, pose, factor))), model, hand.surface.bone,
-                              (state, hand.process.stationary), 0)
+    frame = MarkerFrame(model, observations(pixels_of(rig, pose, factor)))
+    residual = SizedMarkerResidual(frame, model, hand.surface.bone, (state, hand.process.stationary), 0)
     assert np.abs(residual.linearise(state).error).max() < 1.0, "mm of paint and of creases beside"
     state[BIAS:BIAS + SHAPE] += np.random.default_rng(0).normal(0.0, 0.02, SHAPE)
     rows, size = residual.linearise(state), hand.process.size

@@ -67,7 +67,7 @@ def error_mm(state: HandState, side: str, pose: HandPose) -> float:
 def given(patched: pytest.MonkeyPatch, hands: dict[str, HandPose], t_ns: int = FIRST_NS) -> None:
     """Have each hand found there, instead of searching."""
     found = {model_and_surface(side)[0].mirror: pose for side, pose in hands.items()}
-    patched.setattr(Finder, "_look", lambda *_: None)
+    patched.setattr(Finder, "_search", lambda *_: None)
     patched.setattr(Finder, "found", lambda one: (found[one._hand.model.mirror], t_ns))
 
 

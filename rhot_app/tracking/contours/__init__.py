@@ -1,1 +1,1 @@
-"""Tracking by what nodes find in their images: the edges of a bare hand on slices, and its foreground."""
+"""Tracking of a bare hand by the edges that nodes find on slices, and by its foreground."""

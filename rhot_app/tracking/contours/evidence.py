@@ -1,5 +1,5 @@
-"""Whether the cameras show the hand that is followed: its contour found, its joints on foreground, and nothing that
-contradicts it."""
+"""Whether the cameras observe the tracked hand: most of its contour is found, and most of its joints lie on
+foreground."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIOD
 Array = NDArray[np.float64]
 
 NEAR_SD = 3.0
-"""Standard deviations from the contour within which an edge is shown as the hand's."""
+"""Standard deviations from the contour within which an edge is displayed as the hand's."""
 
 
 @dataclass(slots=True)
-class _Shown:
-    """What one camera has shown. `searched_ns`, `mapped_ns`: its newest frame whose edges and whose foreground came;
-    `supported_ns`, `covered_ns`: the newest of these that showed the contour of the hand where it is estimated, and
-    foreground there; `whole`: most of the hand lies in its image.
+class _CameraEvidence:
+    """The observations of one camera, by the master times of its frames. `searched_ns`, `mapped_ns`: the newest frame
+    with edges, and with foreground. `supported_ns`, `covered_ns`: the newest one of each that agrees with the estimated
+    hand. `whole`: most of the hand lies in the image.
     """
 
     supported_ns: int = NEVER
@@ -42,71 +42,73 @@ class _Shown:
     whole: bool = False
 
     @property
-    def seen_ns(self) -> int:
-        """When it last showed the hand. Edges and foreground of one frame come apart."""
+    def observed_ns(self) -> int:
+        """Newest time at which it observed the hand. Edges and foreground of one frame arrive separately."""
         return min(self.supported_ns, self.covered_ns)
 
     @property
-    def judged_ns(self) -> int:
-        """Until when it could have shown the hand."""
+    def checked_ns(self) -> int:
+        """Newest time at which both edges and foreground are known."""
         return min(self.searched_ns, self.mapped_ns)
 
 
 class Evidence:
-    """What the cameras show of one hand. `confirmed`: it was found twice; `seen_ns`: when all cameras that should show
-    it last did, master ns. Until it is confirmed, all should; then those in whose images most of it lies."""
+    """The observations of one tracked hand. `confirmed`: two searches agree on it. `observed_ns`: newest master time at
+    which all cameras that should observe it did: all of them until it is confirmed, then those in whose images most of
+    it lies."""
 
     def __init__(self, hand: BareHandTracker, cameras: Sequence[CameraFrames]) -> None:
         self._hand, self._cameras = hand, cameras
-        self.begin(NEVER)
+        self.start(NEVER)
 
-    def begin(self, t_ns: int) -> None:
-        """A hand was found at `t_ns`."""
+    def start(self, t_ns: int) -> None:
+        """Start with a hand that was found at `t_ns`."""
         self.confirmed = False
-        self._shown = [_Shown() for _ in self._cameras]
-        self.seen_ns, self._judged_ns = t_ns, NEVER
+        self._of_camera = [_CameraEvidence() for _ in self._cameras]
+        self.observed_ns, self._checked_ns = t_ns, NEVER
 
     def take_edges(self, weighed: Iterable[tuple[EdgeFrame, ContourFrame]]) -> None:
-        """The edges of some frames have been weighed."""
+        """Take the contours of some frames, after the update by their edges."""
         for frame, contour in weighed:
-            camera, counts = self._shown[frame.camera], contour.slice_counts.sum(axis=0)
+            camera, counts = self._of_camera[frame.camera], contour.slice_counts.sum(axis=0)
             camera.searched_ns = frame.t_row0_master_ns
             if counts[0] > MAJORITY * counts[1]:
                 camera.supported_ns = frame.t_row0_master_ns
-        self._note()
+        self._update()
 
     def take_map(self, frame: ForegroundFrame, state: Array) -> None:
-        """See whether the hand, in `state` then, lies on foreground in one frame."""
-        camera = self._shown[frame.camera]
+        """Take the foreground of one frame, at whose time the hand is in `state`."""
+        camera = self._of_camera[frame.camera]
         inside, share = on_foreground(self._hand, frame, state)
         camera.whole = inside > MAJORITY
         camera.mapped_ns = frame.t_row0_master_ns
         if share > MAJORITY and (self.confirmed or camera.whole):
             camera.covered_ns = frame.t_row0_master_ns
-        self._note()
+        self._update()
 
     def lost(self, t_ns: int) -> bool:
-        """Whether no camera has shown the hand for too long, or the images of one contradict it. One that is not
-        confirmed is given more time."""
+        """Whether the track is lost at `t_ns`: no camera has observed the hand for too long, or one contradicts it. The
+        limit is longer until it is confirmed."""
         period_ns = min(camera.period_ns for camera in self._cameras)
         silent_ns = max(LOST_AFTER_NS, 2 * LOST_AFTER_PERIODS * period_ns)
         wrong_ns = max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns) if self.confirmed else silent_ns
-        return bool(t_ns - self.seen_ns > silent_ns + 2 * period_ns or self._judged_ns - self.seen_ns > wrong_ns)
+        return bool(t_ns - self.observed_ns > silent_ns + 2 * period_ns
+                    or self._checked_ns - self.observed_ns > wrong_ns)
 
-    def _note(self) -> None:
-        """Note when all cameras that should show the hand last did, and until when they could have. The others say
-        nothing: it may be there or not."""
-        newest_ns = max(max(one.searched_ns, one.mapped_ns) for one in self._shown)
-        judging = [one for one, camera in zip(self._shown, self._cameras, strict=True)
+    def _update(self) -> None:
+        """Update `observed_ns` and `_checked_ns` by the cameras that should observe the hand. The others have no
+        information: it may be there or not."""
+        newest_ns = max(max(one.searched_ns, one.mapped_ns) for one in self._of_camera)
+        observing = [one for one, camera in zip(self._of_camera, self._cameras, strict=True)
                    if (one.whole or not self.confirmed) and camera.delivers(newest_ns)]
-        if any(one.whole for one in judging):
-            self.seen_ns = max(self.seen_ns, min(one.seen_ns for one in judging))
-        self._judged_ns = min((one.judged_ns for one in judging), default=NEVER)
+        if any(one.whole for one in observing):
+            self.observed_ns = max(self.observed_ns, min(one.observed_ns for one in observing))
+        self._checked_ns = min((one.checked_ns for one in observing), default=NEVER)
 
 
 def on_foreground(hand: BareHandTracker, frame: ForegroundFrame, state: Array) -> tuple[float, float]:
-    """Part of the 21 joints of a hand in `state` that lie in a camera's image where anything is known of it, and of
-    these, that lie on foreground."""
+    """Part of the 21 joints of a hand in `state` that project into a camera's image where the foreground is known, and
+    the part of these that lie on foreground."""
     camera = hand.cameras[frame.camera]
     places = camera.project(joints_of(hand, state))
     with np.errstate(invalid="ignore"):
@@ -119,7 +121,7 @@ def on_foreground(hand: BareHandTracker, frame: ForegroundFrame, state: Array) -
 
 
 def same_hand(hand: BareHandTracker, state: Array, pose: HandPose) -> bool:
-    """Whether the hand in `state` is the one in `pose`, whose fingers are the same and which is not far away."""
+    """Whether the hands in `state` and in `pose` agree: SAME_POSE_M in shape, SAME_HAND_M in position."""
     ours, theirs = joints_of(hand, state), forward(hand.model, pose).joints
     ours_centre, theirs_centre = ours.mean(axis=0), theirs.mean(axis=0)
     shape = np.linalg.norm((ours - ours_centre) - (theirs - theirs_centre), axis=1)
@@ -127,7 +129,7 @@ def same_hand(hand: BareHandTracker, state: Array, pose: HandPose) -> bool:
 
 
 def joints_of(hand: BareHandTracker, state: Array) -> Array:
-    """(21, 3) m of a hand in `state`."""
+    """(21, 3) m, world: the joints of a hand in `state`."""
     points, covariances, motion = np.empty((26, 3)), np.empty((26, 3, 3)), np.empty((2, 21))
     place_joints(state, np.zeros((len(hand.process.stationary),) * 2), hand.model.dh, hand.surface.bone, points,
                  covariances, motion)
@@ -135,7 +137,7 @@ def joints_of(hand: BareHandTracker, state: Array) -> Array:
 
 
 def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array) -> SeenContour:
-    """What one image shows of a hand in `state`."""
+    """The contour of a hand in `state` in one image, with slices and edges, for display."""
     offset, _, good = frame.predict(state)
     centre, normal, half = frame.slices[:, :2], frame.slices[:, 2:4], frame.slices[:, 4:]
     ends = np.hstack([centre - half * normal, centre + half * normal])

@@ -1,4 +1,4 @@
-"""Looks for a bare hand in foreground maps, in a thread: that takes a second, and frames go on meanwhile."""
+"""Searches for a bare hand in foreground maps, in a thread: a search takes a second, and frames keep arriving."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ Array = NDArray[np.float64]
 log = logging.getLogger(__name__)
 
 MOVED_M, TURNED = 0.05, 0.4
-"""m and rad: how far a hand that is being looked for moves while it is, at most: it is held still, more or less."""
+"""m and rad: standard deviations of the motion of a hand during a search: it is held nearly still."""
 
 LEAST_GAIN = RELOCALISATION_LOG_ODDS * CORRELATED
-"""Log odds of pixels by which another pose must cover the foreground better (`barehand.relocalisation`)."""
+"""Log odds of pixels by which another pose must be better (`barehand.relocalisation`)."""
 
 SAME_MAPS_NS = 100_000_000
-"""ns: what was seen so far apart may still be of one place of a hand that is looked for."""
+"""ns: observations nearer in time count as of one position of a hand that is searched for."""
 
-_ROUNDS = 60  # of the search about what was found, in the newest maps: half of `start.LAST_ROUNDS`, for it is near
+_ROUNDS = 60  # of the refinement of a found pose in the newest maps: half of `start.LAST_ROUNDS`, as it is near
 
 
 @dataclass(frozen=True, slots=True)
 class Maps:
-    """Foreground probabilities of every STEP-th pixel of each camera about `t_ns`, None of one without a picture."""
+    """Foreground probabilities of every STEP-th pixel of each camera about `t_ns`, None of one without an image."""
 
     t_ns: int
     probabilities: list[NDArray[np.float32] | None]
@@ -53,16 +53,16 @@ class NewestMaps:
         self._maps: list[ForegroundFrame | None] = [None] * len(cameras)
 
     @property
-    def same_ns(self) -> float:
-        """How far apart maps of one moment are at most, ns: half a period, but for jitter."""
+    def simultaneous_ns(self) -> float:
+        """Longest time between simultaneous maps, ns: half a period, and jitter."""
         return 0.75 * max(camera.period_ns for camera in self._cameras)
 
     def take(self, frame: ForegroundFrame) -> Maps | None:
-        """Take one in. The maps of all cameras that deliver frames, of about its moment; None while one is missing."""
+        """Take one map. Returns the simultaneous maps of all cameras that deliver frames; None while one is missing."""
         self._maps[frame.camera], t_ns = frame, frame.t_row0_master_ns
         maps: list[ForegroundFrame | None] = []
         for camera, one in zip(self._cameras, self._maps, strict=True):
-            fresh = one is not None and abs(t_ns - one.t_row0_master_ns) <= self.same_ns
+            fresh = one is not None and abs(t_ns - one.t_row0_master_ns) <= self.simultaneous_ns
             if camera.delivers(t_ns) and not fresh:
                 return None
             maps.append(one if fresh else None)
@@ -70,12 +70,13 @@ class NewestMaps:
 
 
 class Finder:
-    """Searches in a thread of its own. `look` and `relocalise` begin one, `found` and `change` return its result once.
+    """Searches in a thread of its own. `search_everywhere` and `relocalise` begin one, `found` and `change` return its
+    result once.
 
     One search runs at a time. All methods belong to the tracker's thread."""
 
     def __init__(self, hand: BareHandTracker, *, alone: bool = True) -> None:
-        """`alone`: no other hand is in the images, for which a search everywhere might take it."""
+        """`alone`: there is no second hand, with which a search of the whole image might confuse this one."""
         self._hand, self._alone = hand, alone
         self._rng = np.random.default_rng(0)
         self._thread: threading.Thread | None = None
@@ -86,25 +87,29 @@ class Finder:
         self._searched_s = -np.inf
 
     def reset(self) -> None:
-        """What is being looked for is not wanted any more."""
+        """Discard the result of the running search."""
         self._run += 1
         self._found = self._newest = self._change = None
         self._searched_s = -np.inf
 
-    def look(self, maps: Maps) -> None:
-        """Look for a hand in these maps, or, while another search goes on, follow what it finds into them."""
+    def search_everywhere(self, maps: Maps) -> None:
+        """Search these maps for a hand. While another search runs, its result will be refined in these maps instead."""
         self._newest = maps
-        self._begin(self._look, maps, self._run)
+        self._begin(self._search, maps, self._run)
 
     def relocalise(self, maps: Maps, state: Array, covariance: Array, dt_s: float, everywhere: bool = False) -> None:
-        """See whether a hand in `state` may have gone elsewhere in `dt_s` (`Relocaliser.relocalise`)."""
+        """Search for a better pose than that in `state`, as far as hands move in `dt_s`, s
+        (`Relocaliser.relocalise`)."""
         self._begin(self._relocalise, maps, state.copy(), covariance.copy(), dt_s, everywhere, self._run)
 
-    def follow(self, maps: Maps, t_s: float, dt_s: float) -> bool:
-        """Search anew every SEARCHED_S, and when the hand covers the foreground of `t_s` worse than of late. The search
-        asks whether another pose, as far away as hands go in `dt_s`, covers it better. A change that was found is
-        compared in the newest maps, into which the hand has moved meanwhile. Whether it was moved: edges tell better
-        how, unless they take one finger for another."""
+    def verify(self, maps: Maps, t_s: float, dt_s: float) -> bool:
+        """Verify the predicted pose by maps of `t_s`, s, and relocalise the hand where the last search found a better
+        one. Returns whether it was relocalised.
+
+        A search starts every LOCAL_SEARCH_S, and when the pose's log odds per pixel drop below their average. Its
+        result is compared in the newest maps, into which the hand has moved since. Edges locate a hand more accurately,
+        so small changes are left to them, unless a finger was mistaken for another one.
+        """
         hand, relocaliser = self._hand, self._hand.relocaliser
         state, covariance = hand.filter.predict(t_s)
         odds, (change, same) = relocaliser.odds_of(maps.probabilities), self.change()
@@ -118,7 +123,7 @@ class Finder:
             gain = relocaliser.log_odds(odds, moved) - relocaliser.log_odds(odds, state)
             gain += CORRELATED * (relocaliser.log_prior(moved) - relocaliser.log_prior(state))
             if (worse or confused) and gain > LEAST_GAIN:
-                hand.filter.start(t_s, moved, _widened(covariance, change))
+                hand.filter.start(t_s, moved, _inflated(covariance, change))
                 relocaliser.schedule_global_search(t_s, relocalised=True, same=False)
                 return True
         if worse or t_s - self._searched_s > LOCAL_SEARCH_S:
@@ -129,18 +134,18 @@ class Finder:
         return False
 
     def found(self) -> tuple[HandPose, int] | None:
-        """A pose and its time, master ns, if one was found since it was asked for last."""
+        """The pose of the last search of the whole image and its time, master ns; None without a new one."""
         found, self._found = self._found, None
         return None if found is None or found[0] != self._run else found[1:]
 
     def change(self) -> tuple[Array | None, bool]:
-        """The step in the tangent space to where the hand may be, if it was found since it was asked for last, and
-        whether the same hand was found everywhere."""
+        """The step in the tangent space to the better pose of the last relocalisation, None without a new one, and
+        whether the whole image has the same hand."""
         found, self._change = self._change, None
         return (None, False) if found is None or found[0] != self._run else found[1:]
 
     def wait(self) -> None:
-        """Until the search is over."""
+        """Wait for the running search."""
         if self._thread is not None:
             self._thread.join()
 
@@ -153,13 +158,13 @@ class Finder:
             self._thread = threading.Thread(target=_logged, args=(search_for, *arguments), name="find", daemon=True)
             self._thread.start()
 
-    def _look(self, maps: Maps, run: int) -> None:
+    def _search(self, maps: Maps, run: int) -> None:
         pose = self._hand.relocaliser.search_globally(maps.probabilities, np.zeros(SHAPE), self._rng)
         newest = self._newest
         if pose is None or run != self._run:
             return
         if newest is not None and newest is not maps:
-            pose, maps = self._followed(pose, newest), newest
+            pose, maps = self._refined(pose, newest), newest
         self._found = run, pose, maps.t_ns
 
     def _relocalise(self, maps: Maps, state: Array, covariance: Array, dt_s: float, everywhere: bool, run: int) -> None:
@@ -169,8 +174,8 @@ class Finder:
         if moved is not None or same:
             self._change = run, None if moved is None else process.difference(moved, state), same
 
-    def _followed(self, pose: HandPose, maps: Maps) -> HandPose:
-        """The pose in later maps, near to where it was."""
+    def _refined(self, pose: HandPose, maps: Maps) -> HandPose:
+        """The pose refined in later maps."""
         hand = self._hand
         odds = hand.relocaliser.odds_of(maps.probabilities)
         covariance = np.diag(np.repeat(np.square([MOVED_M, TURNED, TURNED]), (3, 3, 21)))
@@ -182,9 +187,9 @@ class Finder:
         return HandPose(world, angles)
 
 
-def _widened(covariance: Array, change: Array) -> Array:
-    """The covariance of a hand that was wrong by `change`: its pose errs by as much more, and its motion as a hand's
-    does whose pose varies so (`HandProcess.stationary`)."""
+def _inflated(covariance: Array, change: Array) -> Array:
+    """The covariance after a relocalisation by `change`, inflated: the pose by its square, velocity and acceleration by
+    those of a hand whose pose varies as much (`HandProcess.stationary`)."""
     out = covariance.copy()
     for order, scale in enumerate((1.0, FASTEST**2 / 3.0, FASTEST**4 / 3.0)):
         place = range(POSE * order, POSE * (order + 1))
@@ -193,7 +198,7 @@ def _widened(covariance: Array, change: Array) -> Array:
 
 
 def _logged(search_for: Callable[..., None], *arguments: Any) -> None:
-    """A search that fails is logged; the next maps are searched anew."""
+    """Log a search that fails; the next maps are searched again."""
     try:
         search_for(*arguments)
     except Exception:

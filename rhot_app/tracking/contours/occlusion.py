@@ -1,4 +1,4 @@
-"""What one hand covers of another in a camera's image: its contour, and its foreground."""
+"""Occlusion of one hand by another in a camera's image: of its contour, and of its foreground."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Capsules = tuple[Array, Array]
 
 
 def capsules_in(hand: BareHandTracker, state: Array) -> Capsules:
-    """The capsules of a hand in `state`, with its forearm as far as the elbow."""
+    """The capsules of a hand in `state`, with the forearm to the elbow."""
     centres, radii = _own_capsules(hand, state)
     for k in np.flatnonzero(hand.surface.group == FOREARM):
         along = centres[k, 1] - centres[k, 0]
@@ -31,24 +31,24 @@ def capsules_in(hand: BareHandTracker, state: Array) -> Capsules:
 
 
 def visible(hand: BareHandTracker, frame: ContourFrame, camera: CameraModel, state: Array, other: Capsules) -> Mask:
-    """Which points (K,) of a hand's contour in `state` another hand does not hide. Where the other one is behind, the
-    contour is noted as one before skin."""
+    """Which points (K,) of a hand's contour in `state` the `other` hand does not occlude. Sets `frame.points.behind` to
+    INNER where the other hand lies behind the contour: there is skin on both sides."""
     points = frame.points
     centres, radii = _own_capsules(hand, state)
     along = points.along[:, None]
     ends, r = centres[points.capsule], radii[points.capsule]
-    way = (1.0 - along) * ends[:, 0] + along * ends[:, 1] - camera.centre
+    axis = (1.0 - along) * ends[:, 0] + along * ends[:, 1] - camera.centre
     r_there = (1.0 - points.along) * r[:, 0] + points.along * r[:, 1]
-    far = np.sqrt(np.maximum(np.sum(way * way, axis=1) - r_there**2, 0.0))
-    beside = points.pixel + (OUTSIDE_M * points.scale)[:, None] * points.normal
-    met = _nearest(camera.centre, _rays(camera, beside), *other)
+    far = np.sqrt(np.maximum(np.sum(axis * axis, axis=1) - r_there**2, 0.0))
+    outside = points.pixel + (OUTSIDE_M * points.scale)[:, None] * points.normal
+    met = _nearest(camera.centre, _rays(camera, outside), *other)
     points.behind[np.isfinite(met)] = INNER
     return np.asarray(met > far + JUMP_M)
 
 
 def occluded_pixels(camera: CameraModel, other: Capsules, shape: tuple[int, int], step: int) -> Mask:
-    """Which of every `step`-th pixel, an array of `shape`, another hand covers, or may: its contour is known to about
-    one of them."""
+    """Which of every `step`-th pixel, an array of `shape`, the `other` hand occludes. Includes a margin of one such
+    pixel, the accuracy of its contour."""
     mask = np.zeros(shape, np.uint8)
     rasterise(*other, np.ascontiguousarray(camera.camera_from_world[:3]), camera.intrinsics, step, 1.0, mask)
     return mask > 0
@@ -68,7 +68,7 @@ def _rays(camera: CameraModel, pixels: Array) -> Array:
 
 @njit(cache=True)
 def _nearest(o, rays, centres, radii):
-    """(K,) m: how far along each ray (K, 3) from `o` (3,) the nearest capsule is met; inf without any."""
+    """(K,) m: distance along each ray (K, 3) from `o` (3,) to the nearest capsule; inf without any."""
     found = np.full(rays.shape[0], np.inf)
     for i in range(rays.shape[0]):
         for k in range(centres.shape[0]):

@@ -1,8 +1,8 @@
 """Two bare hands at once: a `ContourEstimator` for each. The nodes search the contours of both.
 
-What one hand covers of an image says nothing of the other one. Each is looked for in the rest of the foreground, and
-its contour where the other one does not hide it. Two hands that come to be estimated in one place are one: the
-foreground decides which.
+The part of an image that one hand occludes has no information on the other one. So each hand is searched for in the
+rest of the foreground, and its contour where the other one does not occlude it. Two estimates in one place are one
+hand: the foreground decides which.
 """
 
 from __future__ import annotations
@@ -39,18 +39,18 @@ from rhot_node.detect.edges import Edges
 Array = NDArray[np.float64]
 
 
-class _OfBoth(NamedTuple):
-    """The requests for one camera of which one for both hands was made; None of a hand that has asked for nothing."""
+class _JointRequest(NamedTuple):
+    """The requests of both hands that were joined to one request for a camera; None of a hand without one."""
 
     hand: SliceRequest | None
     other: SliceRequest | None
 
 
-_OF_PALM = [0, *(joints.start for joints in JOINT_SLICES[1:])]  # wrist and knuckles
+_PALM_JOINTS = [0, *(joints.start for joints in JOINT_SLICES[1:])]  # wrist and knuckles
 
 
 class TwoBareHands(TwoHands):
-    """Implements `Tracker` and `ImageTracking` for a rig with an `other_hand`: a state after the edges of every
+    """Implements `Tracker` and `ImageTracking` for a rig with an `other_hand`: a state after the edges of each
     frame."""
 
     def __init__(self, rig: Rig) -> None:
@@ -59,53 +59,54 @@ class TwoBareHands(TwoHands):
         assert isinstance(self._hand, ContourEstimator) and isinstance(self._other, ContourEstimator)
         self._both = self._hand, self._other
         for hand in self._both:
-            hand.beside = partial(self._beside, hand)
+            hand.occluder = partial(self._occluder, hand)
         self._cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
         self._alternatives = Finder(self._other.hand), Finder(self._hand.hand)
         self._thick_m = 1e-3 * rig.hand.palm_thickness_mm
-        self._begin_again()
+        self._clear()
 
     def reset(self) -> None:
-        """Forget everything but the count of states."""
+        """Discard everything but the number of states."""
         super().reset()
-        self._begin_again()
+        self._clear()
 
-    def _begin_again(self) -> None:
+    def _clear(self) -> None:
         self._asked: list[list[SliceRequest | None]] = [[None, None] for _ in self._newest]
         self._maps: list[ForegroundFrame | None] = [None] * len(self._newest)
         self._states: list[HandState | None] = [None, None]
         self._published_ns = NEVER
-        self._beside_ns, self._looked_ns = [NEVER, NEVER], [NEVER, NEVER]
-        self._gains: list[float | None] = [None, None]  # in log odds, if the other hand were where one is
+        self._occluder_ns, self._searched_ns = [NEVER, NEVER], [NEVER, NEVER]
+        # log odds by which the other hand explains a hand's foreground better
+        self._gains: list[float | None] = [None, None]
         for finder in self._alternatives:
             finder.reset()
 
     # -- images --------------------------------------------------------------------------------------------------------
 
     def ingest_image(self, frame: ImageFrame) -> None:
-        """Take the edges or the foreground of one frame in."""
+        """Take the edges or the foreground of one frame."""
         if isinstance(frame, EdgeFrame):
             self._take_edges(frame)
             return
         self._maps[frame.camera] = frame
         t_ns = frame.t_row0_master_ns
         apart_ns = [abs(t_ns - one.t_row0_master_ns) for one in self._maps if one is not None]
-        if not any(self._both[0].same_ns < apart < JUMP_NS for apart in apart_ns):  # all cameras' are of this moment
+        if not any(self._both[0].simultaneous_ns < apart < JUMP_NS for apart in apart_ns):  # all maps are simultaneous
             if self._both[0].tracking and self._both[1].tracking:
-                self._keep_apart(t_ns)
+                self._resolve_duplicate(t_ns)
             for number in range(2):
-                self._compare_sides(number, t_ns)
-        shown = [self._shown_to(number, frame) for number in range(2)]
-        for hand, one in zip(self._both, shown, strict=True):
+                self._check_swap(number, t_ns)
+        masked = [self._masked_for(number, frame) for number in range(2)]
+        for hand, one in zip(self._both, masked, strict=True):
             hand.ingest_image(one)
 
     def _take_edges(self, frame: EdgeFrame) -> None:
-        """Give each hand the edges of its own slices; in a log, which does not say whose they are, all."""
+        """Give each hand the edges of its own slices; from a log, which does not attribute them, all."""
         own = frame.request.expected
         if own is None:
             for hand in self._both:
                 hand.ingest_image(frame)
-        if not isinstance(own, _OfBoth):  # or it was asked by a tracker before this one
+        if not isinstance(own, _JointRequest):  # a log, or the request of an earlier tracker
             return
         first = 0
         for hand, request in zip(self._both, own, strict=True):
@@ -116,15 +117,15 @@ class TwoBareHands(TwoHands):
             edges = Edges._make(column[part] for column in frame.edges)
             hand.ingest_image(replace(frame, request=request, edges=edges))
 
-    def _shown_to(self, number: int, frame: ForegroundFrame) -> ForegroundFrame:
-        """The foreground for one hand: nothing is known where the other one may hide it."""
+    def _masked_for(self, number: int, frame: ForegroundFrame) -> ForegroundFrame:
+        """The foreground for one hand: NaN, not known, where the other one may occlude it."""
         hand, t_ns = self._both[number], frame.t_row0_master_ns
-        other = self._beside(hand, t_ns)
-        if other is None:  # one that was lost beside this hand is there still, for a while
-            if not 0 <= t_ns - self._beside_ns[number] < JUMP_NS:
+        other = self._occluder(hand, t_ns)
+        if other is None:  # a lost one is assumed to be there for JUMP_NS more
+            if not 0 <= t_ns - self._occluder_ns[number] < JUMP_NS:
                 hand.overlaps[frame.camera] = False
             return frame
-        self._beside_ns[number] = t_ns
+        self._occluder_ns[number] = t_ns
         hand.overlaps[frame.camera] = False
         masked = self._without(other, frame)
         if not hand.tracking:
@@ -137,7 +138,7 @@ class TwoBareHands(TwoHands):
                 rows < masked.probability.shape[0])
         hand.overlaps[frame.camera] = bool(np.isnan(
             masked.probability[rows[inside].astype(int), columns[inside].astype(int)]).any())
-        far = [float(np.linalg.norm(one[_OF_PALM].mean(axis=0) - camera.centre)) for one in places]
+        far = [float(np.linalg.norm(one[_PALM_JOINTS].mean(axis=0) - camera.centre)) for one in places]
         return masked if far[1] < far[0] else frame
 
     def _without(self, other: Capsules, frame: ForegroundFrame) -> ForegroundFrame:
@@ -145,19 +146,19 @@ class TwoBareHands(TwoHands):
         probability[occluded_pixels(self._cameras[frame.camera], other, probability.shape, frame.step)] = np.nan
         return replace(frame, probability=probability)
 
-    def _beside(self, hand: ContourEstimator, t_ns: int) -> Capsules | None:
-        """The other hand, once it is confirmed."""
+    def _occluder(self, hand: ContourEstimator, t_ns: int) -> Capsules | None:
+        """The capsules of the other hand at master time `t_ns`; None until it is confirmed."""
         other = self._both[1] if hand is self._both[0] else self._both[0]
         return capsules_in(other.hand, other.state_at(t_ns)) if other.confirmed else None
 
     # -- which hand is which -------------------------------------------------------------------------------------------
 
-    def _keep_apart(self, t_ns: int) -> None:
-        """Where both are nearer to each other than a hand is thick, give the less probable one up, unless it shows
+    def _resolve_duplicate(self, t_ns: int) -> None:
+        """If both hands are nearer to each other than a hand is thick, drop the less probable one, unless it explains
         foreground that the other one does not."""
         states = [one.state_at(t_ns) for one in self._both]
         places = [joints_of(one.hand, state) for one, state in zip(self._both, states, strict=True)]
-        if _apart_m(*places) > self._thick_m:
+        if _palm_distance_m(*places) > self._thick_m:
             return
         maps = self._newest_maps(t_ns)
         odds = [_log_odds(one.hand, state, maps) + RELOCALISATION_LOG_ODDS * one.confirmed
@@ -165,12 +166,13 @@ class TwoBareHands(TwoHands):
         worse = int(odds[0] >= odds[1])
         one, better = self._both[worse], self._both[1 - worse]
         rest = self._newest_maps(t_ns, capsules_in(better.hand, states[1 - worse]))
-        if _shown(one.hand, states[worse], rest) < LEAST_GAIN:
-            one.give_up()
+        if _own_log_odds(one.hand, states[worse], rest) < LEAST_GAIN:
+            one.drop_track()
 
-    def _compare_sides(self, number: int, t_ns: int) -> None:
-        """Once a hand is confirmed, see whether the other one explains the same foreground better: a left hand's back
-        looks much like a right hand's palm. Two that are confirmed can only have changed places."""
+    def _check_swap(self, number: int, t_ns: int) -> None:
+        """Once a hand is confirmed, test whether the other hand explains its foreground better: a left hand's back
+        looks like a right hand's palm. If so, the other hand is started there. Two confirmed hands can only be
+        swapped."""
         hand, other, finder = self._both[number], self._both[1 - number], self._alternatives[number]
         if not hand.confirmed:
             self._gains[number] = None
@@ -179,13 +181,13 @@ class TwoBareHands(TwoHands):
             return
         found = finder.found()
         if found is None:
-            if not 0 <= t_ns - self._looked_ns[number] < 1e9 * LOCAL_SEARCH_S:  # a search takes a processor
-                self._looked_ns[number] = t_ns
-                finder.look(self._newest_maps(t_ns, self._beside(hand, t_ns)))
+            if not 0 <= t_ns - self._searched_ns[number] < 1e9 * LOCAL_SEARCH_S:  # a search occupies a core
+                self._searched_ns[number] = t_ns
+                finder.search_everywhere(self._newest_maps(t_ns, self._occluder(hand, t_ns)))
             return
         pose, found_ns = found
         state = hand.state_at(found_ns)
-        if _apart_m(joints_of(hand.hand, state), forward(other.hand.model, pose).joints) > SAME_HAND_M:
+        if _palm_distance_m(joints_of(hand.hand, state), forward(other.hand.model, pose).joints) > SAME_HAND_M:
             return
         maps = self._newest_maps(t_ns)
         instead, _ = other.hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
@@ -193,19 +195,19 @@ class TwoBareHands(TwoHands):
         self._gains[number] = gain
         others = self._gains[1 - number] if other.confirmed else 0.0
         if others is not None and gain + others > RELOCALISATION_LOG_ODDS:
-            hand.give_up()
+            hand.drop_track()
             other.start(pose, found_ns)
 
     def _newest_maps(self, t_ns: int, without: Capsules | None = None) -> Maps:
-        """The foreground of about `t_ns`, with nothing known where a hand is that is left out."""
-        maps = [one if one is not None and abs(t_ns - one.t_row0_master_ns) <= self._both[0].same_ns else None
+        """The foreground maps of about `t_ns`, NaN where the hand `without` is."""
+        maps = [one if one is not None and abs(t_ns - one.t_row0_master_ns) <= self._both[0].simultaneous_ns else None
                 for one in self._maps]
         if without is not None:
             maps = [None if one is None else self._without(without, one) for one in maps]
         return Maps(t_ns, [None if one is None else one.probability for one in maps])
 
     def requests(self) -> list[SliceRequest]:
-        """What the nodes shall search now, for both hands."""
+        """The newest requests to the nodes, joined for both hands."""
         changed = set()
         for number, hand in enumerate(self._both):
             for request in hand.requests():
@@ -215,7 +217,7 @@ class TwoBareHands(TwoHands):
         for camera in sorted(changed):
             own = [one for one in self._asked[camera] if one is not None]
             found.append(SliceRequest(camera, np.vstack([one.slices for one in own]),
-                                      max(one.map_step for one in own), _OfBoth(*self._asked[camera])))
+                                      max(one.map_step for one in own), _JointRequest(*self._asked[camera])))
         return found
 
     def warm_up(self) -> None:
@@ -230,24 +232,24 @@ class TwoBareHands(TwoHands):
         visible(one, one.expected_contour(0, state, covariance), camera, state, capsules)
 
     def wait(self) -> None:
-        """Until the hands that are looked for are found or not."""
+        """Wait for all running searches."""
         for one in (*self._both, *self._alternatives):
             one.wait()
 
     # -- states --------------------------------------------------------------------------------------------------------
 
     def solve(self) -> HandState | None:
-        """The state after the frames since the last one; None when they tell nothing new."""
+        """The state after the frames since the last one; None when they have no new information."""
         fresh = [hand.solve() for hand in self._both]
         self._states = [before if new is None else new for before, new in zip(self._states, fresh, strict=True)]
         hand, other = self._states
-        if hand is None or other is None:  # both begin with the first frame
+        if hand is None or other is None:  # both have states from the first frame on
             return None
         tracked = hand.tracked or other.tracked
         if not any(new is not None and new.tracked >= tracked for new in fresh):
             return None
         if any(state.tracked and not one.confirmed for state, one in zip((hand, other), self._both, strict=True)):
-            return None  # it was given up; its next state says so
+            return None  # its track was dropped; its next state says so
         t_ns = max(state.t_master_ns for state in (hand, other) if state.tracked >= tracked)
         if tracked and 0 <= self._published_ns - t_ns < JUMP_NS:
             return None
@@ -256,13 +258,13 @@ class TwoBareHands(TwoHands):
         return self._merged_at(t_ns, replace(hand, t_receive_ns=received_ns), replace(other, t_receive_ns=received_ns))
 
     def seen(self) -> list[SeenContour]:
-        """See `ShowsContours`; of both hands in one image."""
+        """See `ShowsContours`. The contours of both hands in one image are joined."""
         found: dict[str, SeenContour] = {}
         for one in (contour for hand in self._both for contour in hand.seen()):
             first = found.get(one.camera)
             found[one.camera] = one if first is None else SeenContour(
                 one.camera, max(first.t_master_ns, one.t_master_ns),
-                *(np.concatenate([getattr(first, name), getattr(one, name)]) for name in _OF_CONTOUR))
+                *(np.concatenate([getattr(first, name), getattr(one, name)]) for name in _CONTOUR_FIELDS))
         return list(found.values())
 
     @property
@@ -271,23 +273,23 @@ class TwoBareHands(TwoHands):
         return self._both[0].key_frames
 
 
-_OF_CONTOUR = "contour", "outline", "slices", "edges", "of_hand"
+_CONTOUR_FIELDS = "contour", "outline", "slices", "edges", "of_hand"
 
 
-def _apart_m(ours: Array, theirs: Array) -> float:
-    """How far apart the palms of two hands with joints (21, 3) m are."""
-    return float(np.linalg.norm((ours - theirs)[_OF_PALM].mean(axis=0)))
+def _palm_distance_m(ours: Array, theirs: Array) -> float:
+    """Distance of the palms of two hands with joints (21, 3) m."""
+    return float(np.linalg.norm((ours - theirs)[_PALM_JOINTS].mean(axis=0)))
 
 
 def _log_odds(hand: BareHandTracker, state: Array, maps: Maps) -> float:
-    """Of a hand in `state`, by the foreground and by how hands are bent."""
+    """Log odds of a hand in `state` by the foreground and the pose prior."""
     relocaliser = hand.relocaliser
     odds = relocaliser.odds_of(maps.probabilities)
     return relocaliser.log_odds(odds, state) / CORRELATED + relocaliser.log_prior(state)
 
 
-def _shown(hand: BareHandTracker, state: Array, maps: Maps) -> float:
-    """Log odds of the pixels that a hand in `state` covers; what lies about it does not count."""
+def _own_log_odds(hand: BareHandTracker, state: Array, maps: Maps) -> float:
+    """Log odds of the pixels of a hand in `state`, without the ring about it."""
     world = np.eye(4)
     world[:3] = state[:ANGLES].reshape(3, 4)
     _, parts = score(hand.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE].copy(),
