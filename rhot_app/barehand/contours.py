@@ -1,8 +1,8 @@
 """Occluding contours of the hand's capsules in one camera: where edges are expected, and their derivatives by the
 state.
 
-A point of a ball's surface with the normal n is on its contour where n is perpendicular to the line of sight, n . (c -
-o) = -r, for a centre c, a radius r and the camera's centre o. A plane tangent to both balls of a capsule makes a
+A point of a ball's surface is on its contour where its normal n is perpendicular to the line of sight. This is n . (c -
+o) = -r for a centre c, a radius r and the camera's centre o. A plane tangent to both balls of a capsule makes a
 straight contour between them. The derivative of a contour point along its normal is that of a point fixed to the bone:
 the point slides on the surface too, but along the line of sight (envelope theorem).
 """

@@ -223,8 +223,11 @@ def rasterise(centres, radii, pose, intrinsics, step, margin, mask):
 
 
 def score(surface: Surface, world: Array, angles: Array, size: Array, odds: LogOddsMaps) -> tuple[float, Array]:
-    """Log odds of the hand at `world` (4, 4), `angles` (21,) rad; and (C, 3), for each camera the sum of log odds on
-    the hand, the number of its pixels with known foreground, and the sum of log odds in the ring."""
+    """Log odds of the hand at `world` (4, 4), `angles` (21,) rad; and (C, 3) of each camera.
+
+    The three are the sum of log odds on the hand, the number of its pixels with known foreground, and the sum of log
+    odds in the ring.
+    """
     parts = np.zeros((len(odds.values), 3))
     mask = np.zeros(odds.values.shape[1:], np.uint8)
     return float(_score(surface, world, angles, size, odds.values, odds.step, odds.poses, odds.intrinsics, mask,

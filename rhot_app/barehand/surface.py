@@ -43,9 +43,10 @@ no muscle is modelled (`python benchmarks/contour_offsets.py`)."""
 
 
 class Surface(NamedTuple):
-    """N capsules. `row` (N,): of the hand's DH table, ROOT for the palm; `ends` (N, 2, 3) m in that row's frame;
-    `radii` (N, 2) m; `group` (N,): finger, PALM or FOREARM; `open_ends` (N, 2): whether an end's ball may be a contour.
-    `dh`: the hand's table without points; `bone` (R,): the phalanx, 0..14, of each of its rows, else -1.
+    """N capsules. `row` (N,): of the hand's DH table, ROOT for the palm. `ends` (N, 2, 3): centres of their balls in
+    that row's frame, m. `radii` (N, 2): m. `group` (N,): finger, PALM or FOREARM. `open_ends` (N, 2): whether an end's
+    ball may make a contour. `dh`: the hand's table without points. `bone` (R,): the phalanx, 0..14, of each of its
+    rows, else -1.
     """
 
     dh: DhArrays

@@ -1,6 +1,6 @@
 """The measures of Rehg 1995, 4.3.5, of the 3-D mouse on the twin: a scripted hand, the twin's observations, a tracker.
 
-The truth scripts the hand and judges what came of it; the mouse gets the tracker's states alone.
+The mouse gets the tracker's states only. The true hand serves to compute the errors.
 """
 
 from __future__ import annotations
@@ -24,21 +24,22 @@ Array = NDArray[np.float64]
 Figures = dict[str, Any]
 
 HUMAN_BITS_PER_S: Final = 3.7
-"""The scripted hand's own throughput: a mouse's, at its lower end (Soukoreff and MacKenzie 2004)."""
+"""bit/s: throughput of the scripted hand, the lower end of that of a mouse (Soukoreff and MacKenzie 2004)."""
 
 TURNS_DEG: Final = (-60.0, -30.0, 0.0, 30.0, 60.0)
 SPEEDS_M_PER_S: Final = (0.5, 1.0, 2.0, 3.0)
-PEAK: Final = 1.875
-"""Peak speed of a way of minimum jerk, in its mean speed."""
+PEAK_TO_MEAN: Final = 1.875
+"""Ratio of the peak speed to the mean speed of a minimum-jerk movement (Flash and Hogan 1985)."""
 
-HELD_M: Final = 0.029
-"""A hand is lost when its wrist is off by more: half the breadth of a wrist (resources/hands)."""
+LOST_M: Final = 0.029
+"""m: a hand is lost when the error of its wrist is larger: half the breadth of a wrist (resources/hands)."""
 
 ORDINARY_SWAY: Final = Sway(position_mm=0.5, rotation_deg=0.3, angle_deg=0.3, tremor_mm=0.05)
-"""Of a hand that rests on a table: a quarter of one held in the air (resources/motions/tap.json), with its tremor."""
+"""Sway of a hand that rests on a table: a quarter of that of a hand held in the air (resources/motions/tap.json), with
+the same tremor."""
 
 SAME_PRESS_S: Final = 0.25
-"""s: a press is that of the true hand if it is no farther away in time: half of what lies between two clicks."""
+"""s: largest time between a tracked press and the true one it is matched with: half the interval of two clicks."""
 
 _AXES: Final = "x_mm", "y_mm", "height_mm"
 _CARRY_M: Final = 0.025  # radius of the ball that is picked and placed
@@ -57,8 +58,8 @@ def _axes(lengths_m: Array) -> Figures:
 # -- resolution, coupling, speed, latency (4.3.5) ----------------------------------------------------------------------
 
 def resolution(turn_deg: float, seed: int, **how: Any) -> Figures:
-    """Jitter of the cursor of a motionless hand that is turned on the table: standard deviation per axis, mm; None
-    where it was not tracked."""
+    """Jitter of the cursor of a motionless hand, turned by `turn_deg` on the table: standard deviation per axis, mm;
+    None where it was not tracked."""
     script = Script(turn_deg=turn_deg)
     script.move((0.0, 0.0, 0.12), 0.5)
     begin_s = script.end_s + 0.5
@@ -70,8 +71,8 @@ def resolution(turn_deg: float, seed: int, **how: Any) -> Figures:
 
 
 def coupling(seed: int, **how: Any) -> list[Figures]:
-    """How far the cursor errs from the true hand's while one degree of freedom alone is moved: `rms` and `peak` per
-    axis, mm; None in a phase in which the hand was not tracked."""
+    """Error of the cursor while one degree of freedom alone is moved: `rms` and `peak` per axis, mm; None in a phase in
+    which the hand was not tracked."""
     script = Script()
     script.move((0.0, 0.0, 0.08), 0.5)
     phases = []
@@ -88,59 +89,60 @@ def coupling(seed: int, **how: Any) -> list[Figures]:
         script.wait(0.2)
         phases.append((button, begin_s, script.end_s))
     run = play(script, seed, **how)
-    off = run.cursor - run.true_cursor
+    error = run.cursor - run.true_cursor
     figures = []
     for name, begin_s, end_s in phases:
         inside = run.during(begin_s, end_s)
-        errors = off[inside] - off[inside][:1]
+        errors = error[inside] - error[inside][:1]
         figures.append({"moved": name, "rms": _rms(errors),
                         "peak": _axes(np.abs(errors).max(axis=0)) if len(errors) else None})
     return figures
 
 
 def speed(metres_per_s: float, seed: int, **how: Any) -> Figures:
-    """How much of the time a hand is held that goes to and fro on the table with such a peak speed."""
+    """Part of the time in which a hand is tracked that moves to and fro on the table at this peak speed."""
     reach = 0.5 * GROUND_M[0] - 0.02
-    way_s = PEAK * 2.0 * reach / MouseSettings().gain / metres_per_s
+    way_s = PEAK_TO_MEAN * 2.0 * reach / MouseSettings().gain / metres_per_s
     script = Script()
     script.move((-reach, 0.0, 0.0), 0.6)
     for number in range(max(4, round(2.0 / way_s))):
         script.move((reach if number % 2 == 0 else -reach, 0.0, 0.0), way_s)
     run = play(script, seed, **how)
     palms = np.array([state.world_from_palm[:3, 3] for state in run.states])
-    near = np.linalg.norm(palms - run.true_palm, axis=1) < HELD_M
+    near = np.linalg.norm(palms - run.true_palm, axis=1) < LOST_M
     moving = run.times_s > LEAD_S + 0.6
     held = near & np.array([state.tracked for state in run.states])
     return {"speed_m_per_s": metres_per_s, "held": float(held[moving].mean())}
 
 
 def latency(run: MouseRun) -> Figures | None:
-    """From the hand to the cursor: until the state is ready, and how far the cursor lags behind the hand at the state's
-    own time, by the shift that fits best; ms. The first is None where no state was timed, all of it when the hand was
-    not tracked."""
+    """Latency, ms: until the state is ready, and the lag of the cursor behind the hand at the state's own time, by the
+    best-fitting shift. The first is None where no state was timed; None when the hand was not tracked."""
     inside = run.during(LEAD_S, run.script.end_s)
     if not inside.any():
         return None
     times, cursor, true = run.times_s[inside], run.cursor[inside], run.true_cursor[inside]
     shifts = np.arange(0.0, 0.1, 0.001)
-    misfits = [sum(np.square(np.interp(times - shift, times, true[:, k]) - cursor[:, k]).mean() for k in range(2))
+    costs = [sum(np.square(np.interp(times - shift, times, true[:, k]) - cursor[:, k]).mean() for k in range(2))
                for shift in shifts]
     p50, p99 = (None if math.isnan(value) else 1e3 * float(value)
                 for value in np.percentile(run.age_s[inside], [50, 99]))
     return {"ready_p50_ms": p50, "ready_p99_ms": p99,
-            "lag_ms": abs(round(1e3 * float(shifts[int(np.argmin(misfits))]), 1))}
+            "lag_ms": abs(round(1e3 * float(shifts[int(np.argmin(costs))]), 1))}
 
 
 def one_camera(seed: int, **how: Any) -> Figures:
-    """Error of the cursor once the second camera is covered, rms per axis, mm: with the palm anywhere, and with it on
-    the table as in Rehg's experiment with one camera; None where it was not tracked."""
+    """Error of the cursor after the second camera is blocked, rms per axis, mm; None where the hand was not tracked.
+
+    `free`: the palm moves anywhere. `on_table`: the palm slides on the table, as in Rehg's experiment with one camera.
+    """
     script = Script()
     for place in ((0.15, 0.1, 0.1), (-0.15, -0.1, 0.0), (0.0, 0.12, 0.1)):
         script.move(place, 1.0)
         script.wait(0.4)
     figures: Figures = {}
     for name, on_table in (("free", False), ("on_table", True)):
-        run = play(script, seed, settings=MouseSettings(on_table=on_table), covered_s=LEAD_S, **how)
+        run = play(script, seed, settings=MouseSettings(on_table=on_table), blocked_s=LEAD_S, **how)
         inside = run.during(LEAD_S, script.end_s)
         figures[name] = _rms(run.cursor[inside] - run.true_cursor[inside])
     return figures
@@ -149,8 +151,8 @@ def one_camera(seed: int, **how: Any) -> Figures:
 # -- buttons -----------------------------------------------------------------------------------------------------------
 
 def buttons(seed: int, **how: Any) -> Figures:
-    """Both buttons clicked in turn at random places and heights: of the presses that the true hand makes, how many the
-    tracked one makes, too (`right`), and how many more it makes (`wrong`); and how late the right ones are, ms."""
+    """Both buttons clicked in turn at random positions. `presses`: of the true hand; `right`: those that the tracked
+    hand makes too; `wrong`: those that it makes alone; `late_ms`: median delay of the right ones."""
     rng, script = np.random.default_rng([seed, 0xB07]), Script()
     for number in range(8):
         script.move(_random_place(rng, 0.35 * np.array(GROUND_M)), 0.6)
@@ -169,7 +171,7 @@ def buttons(seed: int, **how: Any) -> Figures:
 
 
 def _presses(run: MouseRun, mouse: list[MouseState], button: str) -> Array:
-    """(K,) s: when a button went down."""
+    """(K,) s: times at which a button was pressed."""
     down = np.array([one.is_pressed(button) for one in mouse], np.bool_)
     return np.asarray(run.times_s[1:][down[1:] & ~down[:-1]])
 
@@ -177,7 +179,7 @@ def _presses(run: MouseRun, mouse: list[MouseState], button: str) -> Array:
 # -- target test and pick and place ------------------------------------------------------------------------------------
 
 def target_script(seed: int) -> Script:
-    """A hand that clicks all targets, as fast and as scattered as a person."""
+    """A hand that clicks all targets with the speed and the scatter of a person."""
     test, rng, script = TargetTest(), np.random.default_rng([seed, 0x411]), Script()
     bits = np.log2(np.linalg.norm(test.targets[test.order[1]] - test.targets[test.order[0]]) / WIDTH_M + 1.0)
     for number in test.order:
@@ -189,7 +191,7 @@ def target_script(seed: int) -> Script:
 
 
 def throughput(seed: int, **how: Any) -> tuple[Figures, MouseRun]:
-    """The target test by the tracked hand, and by the true one."""
+    """The target test by the tracked hand and by the true one, and the run."""
     run = play(target_script(seed), seed, **how)
     figures: Figures = {}
     for name, mouse in (("tracked", run.mouse), ("true", run.true_mouse)):
@@ -204,7 +206,8 @@ def throughput(seed: int, **how: Any) -> tuple[Figures, MouseRun]:
 
 
 def place_once(seed: int, **how: Any) -> Figures:
-    """Pick a ball at a random place and put it at another: whether it lies within its radius then, and how far off."""
+    """Pick a ball at a random position and place it at another: whether it then lies within its radius, and its
+    error."""
     rng = np.random.default_rng([seed, 0x91C])
     half = 0.35 * np.array(GROUND_M)
     start, end = (_random_place(rng, half) for _ in range(2))
@@ -234,8 +237,8 @@ def _random_place(rng: np.random.Generator, half: Array) -> tuple[float, float, 
 
 
 def measures(seed: int, places: int, *, set_up: SetUp = MARKERS, watch: Watch) -> Figures:
-    """All of it in one set-up. The speeds are always from pictures, because it is the detector that loses a fast
-    hand."""
+    """All measures in one set-up. Speeds are always measured with rendered images, because it is the detector that
+    loses a fast hand."""
     how: dict[str, Any] = {"set_up": set_up, "watch": watch}
     figures: Figures = {"seed": seed, "set_up": set_up.name, "pictures": set_up.pictures or set_up.observe != "markers"}
     figures["speed"] = [speed(one, seed, **how | {"set_up": replace(set_up, pictures=True)}) for one in SPEEDS_M_PER_S]

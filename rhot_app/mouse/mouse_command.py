@@ -1,4 +1,4 @@
-"""``rhot mouse``: a 3-D cursor and two buttons worked by the tracked hand, live, of a recording, on the twin, or
+"""``rhot mouse``: a 3-D cursor and two buttons controlled by the tracked hand, live, of a recording, on the twin, or
 measured there."""
 
 from __future__ import annotations
@@ -22,32 +22,33 @@ if TYPE_CHECKING:
     from rhot_app.mouse.pointer import MouseSettings, MouseState
 
 PATIENCE_S = 5.0
-"""An engine publishes its status ten times a second; after this long without a message there is none."""
+"""s: without a message for this long there is no engine, which publishes its status ten times a second."""
 
 LINE_S = 0.1
-"""Between lines for people."""
+"""s: interval of the lines in text output."""
 
-AGES = 10_000
-"""So many states, the last ones, are in the ages that are printed at the end: a minute and a half at 120 states/s."""
+MAX_AGES = 10_000
+"""Number of last states whose ages are summarised at the end: a minute and a half at 120 states/s."""
 
 PLACES = 20
 MOTION = "mouse"
-"""Of resources/motions; the hand carries the balls of the app's page about."""
+"""Name in resources/motions: the hand carries the balls of the app's mouse window."""
 
 BACKGROUND_S = 2.0
-"""The nodes of a simulated bare hand learn the empty scene for so long, as the app's wizard has them do."""
+"""s: time for which the nodes learn the empty scene, the same as in the app's wizard."""
 
 COMMAND_S = 30.0
-"""A node of a busy machine answers within this time."""
+"""s: time limit of a request to a node, for a busy machine."""
 
 REST_S = 10.0
-"""Until the simulated hand's motion at rest repeats itself."""
+"""s: period of the simulated hand's motion at rest."""
 
 NOTE_S = 15.0
-"""Between notes while the hand is looked for."""
+"""s: interval of the notes while the hand is searched for."""
 
 TRACKED_S = 360.0
-"""The first start of all compiles the numerical code; on a slow or busy machine that takes minutes."""
+"""s: time limit of the search. The very first start compiles the numerical code, which takes minutes on a slow
+machine."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -129,7 +130,7 @@ def _check(args: argparse.Namespace) -> None:
 
 
 def _replay(args: argparse.Namespace, outputs: _Outputs) -> None:
-    """Give the outputs all states of a recording. Raises RecordingError, RigError."""
+    """Write the mouse states of a recording. Raises RecordingError, RigError."""
     from rhot_app.engine.offline.replay_summary import replay_states
     from rhot_app.mouse.model import up_of
     from rhot_app.mouse.pointer import Mouse
@@ -171,11 +172,11 @@ def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs,
     from rhot_app.state import HandState
 
     mouse: Mouse | None = None
-    heard, end = time.monotonic(), float("inf")
+    message_s, end = time.monotonic(), float("inf")
     while time.monotonic() < end:
         messages, now = client.poll(0.1), time.monotonic()
-        heard = now if messages else heard
-        if now - heard > PATIENCE_S:
+        message_s = now if messages else message_s
+        if now - message_s > PATIENCE_S:
             raise EngineError(f"no engine is heard in {client.directory.path}. Start it with `rhot engine --rig FILE "
                               "--start`, or let `rhot mouse --simulated` start a simulated one.")
         if mouse is None and messages:
@@ -191,14 +192,14 @@ def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs,
 
 
 class _Outputs:
-    """Where the mouse's states go: standard output, and what was asked for besides."""
+    """The outputs of mouse states: standard output, OSC and the system's pointer."""
 
     def __init__(self, args: argparse.Namespace, stack: contextlib.ExitStack) -> None:
         """Raises OutputError."""
         from rhot_app.outputs.joints import LIVE_S
 
         self._json, self._next_s, self._live_ms = args.json, 0.0, 1e3 * LIVE_S
-        self._ages_ms: deque[float] = deque(maxlen=AGES)
+        self._ages_ms: deque[float] = deque(maxlen=MAX_AGES)
         self._pointer = self._osc = None
         if args.pointer:
             from rhot_app.mouse.system_pointer import SystemPointer
@@ -212,9 +213,9 @@ class _Outputs:
             self._osc.open()
 
     def write(self, mouse: MouseState, *, every: bool = False) -> None:
-        """Give one state to all of them; people get ten a second, unless `every` one is wanted."""
+        """Write one state to all outputs. Text has one line per LINE_S, or `every` state."""
         age_ms = 1e-6 * (time.monotonic_ns() - mouse.t_master_ns)
-        live = 0.0 <= age_ms < self._live_ms  # else it is of a replayed log
+        live = 0.0 <= age_ms < self._live_ms  # otherwise from a replayed log
         self._ages_ms.extend([age_ms] if live else [])
         if self._osc is not None:
             from rhot_app.outputs.osc import bundles, mouse_messages
@@ -236,7 +237,7 @@ class _Outputs:
             print(line_of(mouse), flush=True)
 
     def close(self) -> None:
-        """Say how old the states were."""
+        """Print the latency of the states."""
         if self._ages_ms:
             import numpy as np
 
@@ -246,7 +247,7 @@ class _Outputs:
 
 
 def line_of(mouse: MouseState) -> str:
-    """One state for people: right, forward and height in mm, the buttons, the state, and what is missing."""
+    """One state as text: right, forward and height in mm, the buttons, the state, and what is missing."""
     place = "        -       -       -" if mouse.cursor is None else "".join(f"{1e3 * v:8.1f}" for v in mouse.cursor)
     buttons = "  ".join(f"{name} {'DOWN' if mouse.is_pressed(name) else 'up':<4}" for name in ("thumb", "little"))
     return f"{place} mm  {buttons}  {mouse.condition.value:<9} {' '.join(mouse.needs)}".rstrip()
@@ -254,10 +255,12 @@ def line_of(mouse: MouseState) -> str:
 
 @contextlib.contextmanager
 def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterator[tuple[Path, Callable[[], object]]]:
-    """A simulated rig whose hand lies at rest, and an engine that tracks it: the engine's directory, and what makes the
-    hand carry balls about. Both processes end with the context. `bare`: the hand wears no markers; its nodes have
-    learnt the background. With one of the `cameras` the engine knows the plane and the mouse's hand. Says on standard
-    error how far it is. Raises SimulatorError, EngineError."""
+    """A simulated rig whose hand lies at rest, and an engine that tracks it. Yields the engine's directory and a
+    function that makes the hand carry balls. Both processes end with the context.
+
+    `bare`: the hand has no markers, and its nodes learn the background first. With one of `cameras` the engine has the
+    palm's plane and the mouse's hand model. Progress goes to standard error. Raises SimulatorError, EngineError.
+    """
     import tempfile
 
     from rhot_app.engine.client import EngineClient
@@ -310,7 +313,7 @@ def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterat
                     raise SimulatorError(f"the simulated hand was not tracked within {TRACKED_S:.0f} s. Is this "
                                          "computer busy? Try again.")
         _note("the hand is tracked, and moves as soon as the mouse has its origin.")
-        yield place / "engine", lambda: remote.show(show(MOTION))  # it begins where the hand rests now
+        yield place / "engine", lambda: remote.show(show(MOTION))  # its first pose is the present one
 
 
 def _note(text: str) -> None:
@@ -333,7 +336,7 @@ def _learn_backgrounds(client: EngineClient, deadline: float) -> None:
                 if time.monotonic() > deadline:
                     raise
                 time.sleep(0.5)
-    while not all((known := ask(node_id, {"request": "state"})["foreground"])["background"] and not known["learning_s"]
+    while not all((model := ask(node_id, {"request": "state"})["foreground"])["background"] and not model["learning_s"]
                   for node_id in nodes):
         if time.monotonic() > deadline:
             raise SimulatorError("the simulated nodes did not learn the background in time. Is this computer busy? Try "

@@ -1,4 +1,4 @@
-"""What the 3-D cursor works on: balls over a ground plane. They are picked, moved and put down, and moves are undone.
+"""The scene of the 3-D cursor: balls over a ground plane, which are picked, moved and put down. Moves can be undone.
 
 Cursor frame, metres. No Qt.
 """
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Ball:
-    """Something to move. `centre` (3,) m."""
+    """A ball. `centre` (3,) m, cursor frame; `rgb` 0..255."""
 
     name: str
     centre: tuple[float, float, float]
@@ -34,11 +34,12 @@ class Ball:
 START: Final = (Ball("orange ball", (-0.12, 0.06, 0.03), 0.03, (213, 94, 0)),
                 Ball("blue ball", (0.12, 0.1, 0.025), 0.025, (0, 114, 178)),
                 Ball("green ball", (0.06, -0.09, 0.035), 0.035, (0, 158, 115)))
-"""Colours that people with any colour vision tell apart (Okabe and Ito 2008)."""
+"""Colours that are distinct with any colour vision (Okabe and Ito 2008)."""
 
 
 class PickScene:
-    """Balls and the mouse. The thumb picks the selected ball and lets go; the little finger puts it on the ground."""
+    """Balls and their selection. The thumb picks and releases the selected ball; the little finger puts it on the
+    ground."""
 
     def __init__(self, balls: tuple[Ball, ...] = START) -> None:
         self.balls = list(balls)
@@ -50,11 +51,11 @@ class PickScene:
         self._pressed: frozenset[str] = frozenset()
 
     def feed(self, mouse: MouseState) -> None:
-        """Follow the mouse: select, pick, carry and let go."""
+        """Update by one mouse state: select, pick, move and release."""
         changed, self._pressed = mouse.pressed ^ self._pressed, mouse.pressed
         if mouse.cursor is None:
             if self.held is not None and "thumb" not in mouse.pressed:
-                self._let_go()
+                self._release()
             return
         if self.held is None:
             self.selected = self._nearest(mouse.cursor)
@@ -64,19 +65,19 @@ class PickScene:
         if self.held is not None:
             self._carry(self.held, mouse.cursor + self._offset)
             if "thumb" not in mouse.pressed:
-                self._let_go()
+                self._release()
         if "little" in changed & mouse.pressed and self.held is None and self.selected is not None:
             self._put(self.selected, self.balls[self.selected].on_ground)
 
     def interrupt(self) -> None:
-        """The mouse does something else for a while: a held ball is let go where it is. A thumb that is spread when it
-        comes back picks nothing."""
+        """Release a held ball where it is, because the mouse is used elsewhere. A thumb that is spread afterwards picks
+        nothing until it returns."""
         if self.held is not None:
-            self._let_go()
+            self._release()
         self.selected, self._pressed = None, frozenset(BUTTONS)
 
     def undo(self) -> str:
-        """Take the last move back; a sentence on what was done, or why nothing was."""
+        """Undo the last move. Returns a sentence on what was done, or why nothing was."""
         if self.held is not None:
             return f"Let go of the {self.balls[self.held].name} first; then its move can be undone."
         if not self._undo:
@@ -86,7 +87,7 @@ class PickScene:
         return f"The {ball.name} is back where it was."
 
     def _nearest(self, cursor: Array) -> int | None:
-        """The nearest ball, if the cursor is in it or as near to its surface as the surface is to its centre."""
+        """The nearest ball, if its centre is within two radii of the cursor; else None."""
         if not self.balls:
             return None
         away = [float(np.linalg.norm(np.array(ball.centre) - cursor)) for ball in self.balls]
@@ -100,7 +101,7 @@ class PickScene:
         z = np.clip(place[2], ball.radius_m, POLE_M)
         self.balls[number] = replace(ball, centre=(float(x), float(y), float(z)))
 
-    def _let_go(self) -> None:
+    def _release(self) -> None:
         assert self.held is not None and self._before is not None
         now, self.balls[self.held] = self.balls[self.held], self._before
         self._put(self.held, now)

@@ -1,6 +1,6 @@
-"""A script played to the twin, and its states to the mouse: markers or a bare hand, two cameras or one.
+"""Plays a script on the twin and feeds the tracker's states to the mouse: markers or a bare hand, two cameras or one.
 
-The truth scripts the hand and judges what came of it; the mouse gets the tracker's states alone.
+The mouse gets the tracker's states only. A second mouse gets the true hand, for comparison.
 """
 
 from __future__ import annotations
@@ -42,31 +42,30 @@ from rhot_node.files import write_document
 Array = NDArray[np.float64]
 
 RATE_HZ: Final = 30.0
-"""Of the cameras before a bare hand."""
+"""Frame rate of the cameras before a bare hand."""
 
 EMPTY_S: Final = 0.4
-"""The bare hand's cameras see the background alone for so long, then the hand comes in."""
+"""s: time of the empty background before a bare hand enters."""
 
 EMPTY_IMAGES: Final = 8
-"""Images of each camera from which the background is learnt."""
+"""Number of images of each camera from which the background is learnt."""
 
 POSTURE_SD_DEG: Final = 3.0
-"""How far the scripted hand's locked joints lie from where the mouse's model has them. Chosen: a goniometer repeats to
-5 degrees."""
+"""Standard deviation of the scripted hand's locked joints from those of the mouse's model. Chosen: a goniometer repeats
+to 5 degrees."""
 
 PLANE_SD: Final = 0.002, math.radians(0.5)
-"""m and rad: how wrong the plane is that a tracker is given. Chosen: a board lies on a table as well as that."""
+"""m and rad: standard deviations of the plane that a tracker is given. Chosen: the accuracy of a board on a table."""
 
 _HANDS: Final = {"markers": "markers", "contours": "bare hand"}
 _TIPS: Final = [JOINTS.index(f"{finger}_tip") for finger in FINGERS]
-_KEY_S: Final = 0.01  # for ways of a tenth of a second
+_KEY_S: Final = 0.01  # interval of motion keys, for movements of a tenth of a second
 
 
 @dataclass(frozen=True, slots=True)
 class SetUp:
-    """How a script is played. `observe`: what the tracker observes. `cameras`: with one, and of a bare hand, it knows
-    the palm's plane and the mouse's posture (`rhot_app.mouse.model`). `pictures`: markers are
-    rendered and detected; a bare hand always is. `facing`: the side of the hand that the cameras see."""
+    """How a script is played. `observe`: what the tracker observes. `cameras`: their number. `pictures`: markers are
+    rendered and detected; a bare hand always is. `facing`: the side of the hand towards the cameras."""
 
     observe: Literal["markers", "contours"] = "markers"
     cameras: int = 2
@@ -75,14 +74,15 @@ class SetUp:
 
     @property
     def modelled(self) -> bool:
-        """Whether the tracker has the mouse's model."""
+        """Whether the tracker has the palm's plane and the mouse's hand model (`rhot_app.mouse.model`): with one
+        camera, or a bare hand."""
         return self.cameras == 1 or self.observe == "contours"
 
     @property
     def name(self) -> str:
-        """For people."""
-        seen = f", {self.facing} seen" if self.facing != "palm" else ""
-        return f"{_HANDS[self.observe]}, {'one camera' if self.cameras == 1 else 'two cameras'}{seen}"
+        """For display."""
+        side = f", {self.facing} seen" if self.facing != "palm" else ""
+        return f"{_HANDS[self.observe]}, {'one camera' if self.cameras == 1 else 'two cameras'}{side}"
 
 
 MARKERS: Final = SetUp()
@@ -90,8 +90,8 @@ MARKERS: Final = SetUp()
 
 @dataclass(frozen=True, slots=True)
 class MouseRun:
-    """One script through the pipeline. N states of the tracker; `mouse` and `true_mouse` are what the mouse makes of
-    them and of the true hand. `times_s` (N,): scene times. `age_s` (N,): until a state was ready."""
+    """One script through the pipeline: N states of the tracker, and the mouse states of them and of the true hand.
+    `times_s` (N,): scene times. `age_s` (N,): latency until a state was ready."""
 
     script: Script
     times_s: Array
@@ -103,7 +103,7 @@ class MouseRun:
 
     @property
     def cursor(self) -> Array:
-        """(N, 3) m, NaN before the rest."""
+        """(N, 3) m, NaN before the resting pose is known."""
         return _cursors(self.mouse)
 
     @property
@@ -112,15 +112,15 @@ class MouseRun:
         return _cursors(self.true_mouse)
 
     def during(self, begin_s: float, end_s: float) -> NDArray[np.bool_]:
-        """Mask (N,) of the states between two scene times at which both cursors are there."""
-        there = np.isfinite(self.cursor).all(axis=1) & np.isfinite(self.true_cursor).all(axis=1)
-        return np.asarray((self.times_s >= begin_s) & (self.times_s <= end_s) & there)
+        """Mask (N,) of the states between two scene times at which both cursors are known."""
+        known = np.isfinite(self.cursor).all(axis=1) & np.isfinite(self.true_cursor).all(axis=1)
+        return np.asarray((self.times_s >= begin_s) & (self.times_s <= end_s) & known)
 
 
 def play(script: Script, seed: int, set_up: SetUp = MARKERS, *, settings: MouseSettings | None = None,
-         sway: Sway | None = None, covered_s: float = math.inf, watch: Watch = lambda title: None) -> MouseRun:
-    """Play a script to the twin and its states to the mouse. From `covered_s` on the second camera is silent. Raises
-    RhotError."""
+         sway: Sway | None = None, blocked_s: float = math.inf, watch: Watch = lambda title: None) -> MouseRun:
+    """Play a script on the twin and feed its states to the mouse. The second camera sends nothing from `blocked_s`, s,
+    on. Raises RhotError."""
     settings, scene = settings or MouseSettings(), twin_scene(set_up, seed)
     posture = drawn_posture(seed) if set_up.modelled else FLAT_DEG
     document = motion_file(script, scene.hand, settings, sway or Sway(), key_s=_KEY_S, posture=posture,
@@ -129,7 +129,7 @@ def play(script: Script, seed: int, set_up: SetUp = MARKERS, *, settings: MouseS
         path = Path(name) / f"mouse-{hashlib.sha256(msgspec.json.encode(document)).hexdigest()[:16]}.json"
         write_document(path, document)
         tracked = _bare_hand if set_up.observe == "contours" else _markers
-        played = tracked(set_up, scene, path, script.end_s, covered_s, watch)
+        played = tracked(set_up, scene, path, script.end_s, blocked_s, watch)
     times = 1e-9 * np.array([state.t_master_ns - T0_MASTER_NS for state in played.states])
     ready = 1e-9 * np.array([state.t_receive_ns - T0_MASTER_NS for state in played.states]) + played.compute_s
     mouse, true_mouse = Mouse(settings, up_of(played.rig)), Mouse(settings)
@@ -149,13 +149,13 @@ class _Played:
     compute_s: float
 
 
-def _markers(set_up: SetUp, scene: Scene, motion: Path, seconds: float, covered_s: float, watch: Watch) -> _Played:
+def _markers(set_up: SetUp, scene: Scene, motion: Path, seconds: float, blocked_s: float, watch: Watch) -> _Played:
     order = Order(scene, str(motion), seconds, sketched=not set_up.pictures)
     data = data_set(order, data_sets_folder() if set_up.pictures else motion.parent / "sets", watch)
     truth, rig = data.truth, tracked_rig(data.rig, set_up, scene)
     second = data.rig.nodes[1].node_id
     records = [one for one in data.records() if one.node_id != second or one.kind is not RecordKind.DATAGRAM
-               or 1e-9 * (one.t_master_ns - T0_MASTER_NS) < covered_s]
+               or 1e-9 * (one.t_master_ns - T0_MASTER_NS) < blocked_s]
     tracker = make_tracker(rig)
     warm_up(tracker, rig)
     timed = Timed(records)
@@ -168,8 +168,8 @@ def _markers(set_up: SetUp, scene: Scene, motion: Path, seconds: float, covered_
     return _Played(states, true, rig, float(np.median(timed.compute_s)))
 
 
-def _bare_hand(set_up: SetUp, scene: Scene, motion: Path, seconds: float, covered_s: float, watch: Watch) -> _Played:
-    """Rendered images, searched as the tracker asks. The hand comes in before the script begins."""
+def _bare_hand(set_up: SetUp, scene: Scene, motion: Path, seconds: float, blocked_s: float, watch: Watch) -> _Played:
+    """Rendered images, searched as the tracker requests. The hand enters before the script begins."""
     lead_s = EMPTY_S + ENTRY_S
     whole = build_rig(scene, (NodePorts(0, 0, 0),) * len(scene.names))
     model = build_model(scene.hand)
@@ -184,14 +184,14 @@ def _bare_hand(set_up: SetUp, scene: Scene, motion: Path, seconds: float, covere
     nodes: SearchedNodes | None = None
     for number, frame in enumerate(sequence.frames()):
         images = list(frame.images[:set_up.cameras])
-        if 1e-9 * frame.t_ns[0] - lead_s >= covered_s:
+        if 1e-9 * frame.t_ns[0] - lead_s >= blocked_s:
             images[1:] = [None] * (len(images) - 1)
         if len(empty) < EMPTY_IMAGES:
             empty.append(tuple(image for image in images if image is not None))
             continue
         if nodes is None:
-            known = [learn_background(skin_foreground(), list(each)) for each in zip(*empty, strict=True)]
-            nodes = SearchedNodes(make_tracker(rig), known, len(rig.markers.ids))
+            foreground = [learn_background(skin_foreground(), list(each)) for each in zip(*empty, strict=True)]
+            nodes = SearchedNodes(make_tracker(rig), foreground, len(rig.markers.ids))
         nodes.step(number, images, times_ns=[T0_MASTER_NS + t_ns - round(1e9 * lead_s) for t_ns in frame.t_ns])
         if progress is not None:
             progress(number, count)
@@ -199,14 +199,14 @@ def _bare_hand(set_up: SetUp, scene: Scene, motion: Path, seconds: float, covere
     true = []
     for state in states:
         truth = sequence.truth_at(state.t_master_ns - T0_MASTER_NS + round(1e9 * lead_s))
-        there = _true_state(state, truth.world_from_palm, truth.joints, truth.joints[_TIPS])
-        coming_in = state.t_master_ns < T0_MASTER_NS
-        true.append(replace(there, condition=Condition.SEARCHING) if coming_in else there)
+        true_state = _true_state(state, truth.world_from_palm, truth.joints, truth.joints[_TIPS])
+        entering = state.t_master_ns < T0_MASTER_NS
+        true.append(replace(true_state, condition=Condition.SEARCHING) if entering else true_state)
     return _Played(states, true, rig, math.nan)
 
 
 def _true_state(state: HandState, palm: Array, joints: Array, tips: Array) -> HandState:
-    """The same instant with the true hand, all of it measured."""
+    """A state of the same instant with the true hand, all measured."""
     return replace(state, condition=Condition.TRACKING, world_from_palm=palm, palm_knowledge=Knowledge.MEASURED,
                    palm_covariance=np.zeros((6, 6)), joint_positions=joints,
                    joint_knowledge=np.full(21, Knowledge.MEASURED, np.uint8), fingertip_positions=tips,
@@ -214,19 +214,19 @@ def _true_state(state: HandState, palm: Array, joints: Array, tips: Array) -> Ha
 
 
 def twin_scene(set_up: SetUp, seed: int) -> Scene:
-    """The twin's own scene, whose hand shows the wanted side."""
+    """The twin's default scene, with the side of the hand of `set_up`."""
     return make_scene(msgspec.structs.replace(twin_defaults(), facing=set_up.facing), seed)
 
 
 def tracked_rig(rig: Rig, set_up: SetUp, scene: Scene) -> Rig:
-    """The rig that the tracker is given, with what a person knows of the table and the hand."""
+    """The rig of the tracker, with the prior knowledge of table and hand."""
     tracker = TrackerSettings("estimator", observe=set_up.observe)
     rig = msgspec.structs.replace(rig, nodes=rig.nodes[:set_up.cameras], tracker=tracker)
     return with_mouse_model(rig, drawn_plane(scene)) if set_up.modelled else rig
 
 
 def drawn_plane(scene: Scene) -> PalmPlane:
-    """The plane on which the scripted palm slides, with the error of a calibration."""
+    """The plane of the scripted palm, with the error of a calibration."""
     rng = np.random.default_rng([scene.seed, 0x91A])
     turn = exp_so3(PLANE_SD[1] * rng.normal(size=3)) @ home_pose(scene.settings.facing)
     normal = turn[:, 2]
@@ -236,7 +236,7 @@ def drawn_plane(scene: Scene) -> PalmPlane:
 
 
 def drawn_posture(seed: int) -> dict[str, float]:
-    """A flat hand, every joint a little otherwise than the mouse's model has it, degrees."""
+    """degrees: a flat hand, each joint with a random error of POSTURE_SD_DEG."""
     rng = np.random.default_rng([seed, 0xF1A7])
     return {name: round(FLAT_DEG.get(name, 0.0) + POSTURE_SD_DEG * float(rng.normal()), 3) for name in ANGLES}
 

@@ -1,4 +1,4 @@
-"""The measures of the 3-D mouse as tables for people."""
+"""The measures of the 3-D mouse as text tables."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ Figures = dict[str, Any]
 
 
 def report(set_ups: list[Figures]) -> str:
-    """All measures of each set-up, a table each, and what matters of all of them beside each other."""
+    """A table of each set-up with all measures, and a comparison of the set-ups."""
     parts = [_report(figures) for figures in set_ups]
     if len(set_ups) > 1:
-        parts.append("\n".join(_beside(set_ups)))
+        parts.append("\n".join(_comparison(set_ups)))
     return "\n\n\n".join(parts)
 
 
-def _beside(set_ups: list[Figures]) -> list[str]:
+def _comparison(set_ups: list[Figures]) -> list[str]:
     """A line per measure, a column per set-up."""
     rows: list[tuple[str, list[str]]] = [("Beside each other", [one["set_up"] for one in set_ups])]
     for axis, name in (("x_mm", "right"), ("y_mm", "forward"), ("height_mm", "height")):
@@ -45,11 +45,11 @@ def _median(values: list[float | None]) -> str:
 
 
 def _report(figures: Figures) -> str:
-    """All measures, a table each."""
-    seen = "rendered images" if figures["pictures"] else "observations without images"
+    """The tables of one set-up."""
+    source = "rendered images" if figures["pictures"] else "observations without images"
     found, place = figures["throughput"], figures["place"]
     late = figures["latency"]
-    lines = [f"3-D mouse on the twin, {figures['set_up']}, seed {figures['seed']}, from {seen}. Lengths are the "
+    lines = [f"3-D mouse on the twin, {figures['set_up']}, seed {figures['seed']}, from {source}. Lengths are the "
              "cursor's.",
              "", "Hand speed along the table (always from images)      time in which the hand is held",
              *(f"  {one['speed_m_per_s']:5.2f} m/s {100.0 * one['held']:40.1f} %" for one in figures["speed"]),

@@ -1,7 +1,7 @@
-"""A scripted hand that works the 3-D mouse: a plan in the cursor's frame becomes a motion of the twin.
+"""A scripted hand that controls the 3-D mouse: waypoints in the cursor frame become a motion of the twin.
 
-It knows the hand's true lengths and the mouse's settings, and nothing of what a tracker makes of it: it moves blindly,
-where a person would correct the cursor by eye. Ways are of minimum jerk (Flash and Hogan 1985).
+The script has the hand's true lengths and the mouse's settings, but not the tracker's result: it does not correct the
+cursor, as a person would. Movements have minimum jerk (Flash and Hogan 1985).
 """
 
 from __future__ import annotations
@@ -29,21 +29,20 @@ Side = Literal["palm", "back"]
 FACINGS: Final = {"palm": FACING, "back": BACK_FACING}
 
 TILT_DEG: Final = 45.0
-"""The hand's plane leans so far towards the cameras: they look at it at 45 degrees, as in Rehg 1995, 4.3.4. RHOT's
-cameras usually see the palm. A finger that bends towards them is then seen from its tip; of a hand on a table they see
-the back, and all of the finger."""
+"""Tilt of the hand's plane towards the cameras, as in Rehg 1995, 4.3.4. RHOT's cameras usually see the palm, and a
+finger that bends towards them from its tip. Of a hand on a table they see the back and the whole finger."""
 
 KEY_S: Final = 0.05
-"""Between keys, unless a faster hand needs more of them; a spline goes through them."""
+"""s: interval of the keys of the motion's spline, unless a faster hand needs more."""
 
 CLICK_S: Final = 0.15
-"""A finger spreads or returns in this time."""
+"""s: time in which a finger spreads or returns."""
 
 LEAD_S: Final = 1.0 + HOME_S
-"""The hand rests so long first: the tracker settles, and the mouse takes the rest."""
+"""s: initial rest, in which the tracker converges and the mouse takes the resting pose."""
 
 SPREAD_DEG: Final = 27.0
-"""A finger spreads so far: 12 degrees, its natural variation (`rhot_app.hand.limits`), beyond a press."""
+"""Spread of a finger that presses: the threshold and 12 degrees, its natural variation (`rhot_app.hand.limits`)."""
 
 _SPREADS: Final = {"thumb": ("thumb_cmc_flexion", -1.0), "little": ("little_mcp_abduction", -1.0)}
 """Angle that spreads each button's finger in the palm's plane, and its sign."""
@@ -51,7 +50,8 @@ _SPREADS: Final = {"thumb": ("thumb_cmc_flexion", -1.0), "little": ("little_mcp_
 
 @dataclass(frozen=True, slots=True)
 class Waypoint:
-    """Where the script wants the mouse at a time: `cursor` (3,) m, spread of each button 0..1, `turn_rad` about up."""
+    """The wanted mouse at a time: `cursor` (3,) m; `spread` 0..1 of each button's finger; `turn_rad`: palm's rotation
+    about the normal."""
 
     t_s: float
     cursor: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -60,10 +60,10 @@ class Waypoint:
 
 
 class Script:
-    """Grows by commands; `end_s` is where it has got to."""
+    """A list of waypoints that commands extend."""
 
     def __init__(self, *, turn_deg: float = 0.0) -> None:
-        """`turn_deg`: how the resting palm is turned on the table."""
+        """`turn_deg`: rotation of the resting palm on the table."""
         turn = float(np.radians(turn_deg))
         self.waypoints = [Waypoint(0.0, turn_rad=turn), Waypoint(LEAD_S, turn_rad=turn)]
 
@@ -73,11 +73,11 @@ class Script:
         return self.waypoints[-1].t_s
 
     def wait(self, seconds: float) -> None:
-        """Do nothing for a while."""
+        """Hold the last waypoint."""
         self._add(seconds)
 
     def move(self, cursor: tuple[float, float, float], seconds: float, *, release: bool = False) -> None:
-        """Bring the cursor somewhere; `release`: fingers that are spread return on the way."""
+        """Move the cursor. `release`: spread fingers return during the movement."""
         self._add(seconds, cursor=cursor, spread=(0.0, 0.0) if release else None)
 
     def spread(self, button: str, *, out: bool) -> None:
@@ -98,7 +98,7 @@ class Script:
         self.waypoints.append(Waypoint(last.t_s + seconds, cursor or last.cursor, spread or last.spread, last.turn_rad))
 
     def sample(self, times_s: Array) -> Array:
-        """(N, 6): cursor, spreads and turn at times (N,), by ways of minimum jerk."""
+        """(N, 6): cursor m, spreads and turn rad at times (N,), by minimum-jerk movements."""
         rows = np.array([[*point.cursor, *point.spread, point.turn_rad] for point in self.waypoints])
         ends = np.array([point.t_s for point in self.waypoints])
         after = np.clip(np.searchsorted(ends, times_s, side="right"), 1, len(ends) - 1)
@@ -108,7 +108,7 @@ class Script:
 
 
 def carrying(balls: tuple[Ball, ...] = START) -> Script:
-    """A hand that picks each ball, carries it to the place of the next one, and lies at rest again."""
+    """A hand that picks each ball, carries it to the position of the next one, and returns to rest."""
     script = Script()
     for ball, following in zip(balls, (*balls[1:], balls[0]), strict=True):
         x, y, z = following.centre
@@ -125,22 +125,22 @@ def carrying(balls: tuple[Ball, ...] = START) -> Script:
 
 
 def resting(seconds: float) -> Script:
-    """A hand that does nothing for a while."""
+    """A hand at rest."""
     script = Script()
     script.wait(seconds)
     return script
 
 
 def home_pose(facing: Side) -> Array:
-    """(3, 3) world_from_palm of a hand at rest, of which the cameras see that side."""
+    """(3, 3) world_from_palm of a hand at rest with the side `facing` towards the cameras."""
     return np.asarray(Rotation.from_rotvec([np.radians(TILT_DEG), 0.0, 0.0]).as_matrix() @ FACINGS[facing])
 
 
 def motion_file(script: Script, anatomy: HandAnatomy, settings: MouseSettings, sway: Sway, *,
                 key_s: float = KEY_S, posture: Mapping[str, float] = FLAT_DEG, facing: Side = "palm"
                 ) -> MotionFile:
-    """The script as a motion of a hand in a flat `posture`, degrees, with a key every `key_s`. `facing`: the side that
-    the scene's cameras see of it (`TwinSettings.facing`)."""
+    """The script as a motion of a hand in a flat `posture`, degrees, with a key every `key_s`. `facing`: the side of
+    the hand towards the scene's cameras (`TwinSettings.facing`)."""
     period = script.end_s + 1.0
     times = np.arange(0.0, period - 0.5 * key_s, key_s)
     home = home_pose(facing)
@@ -167,7 +167,7 @@ def _triple(values: Array) -> tuple[float, float, float]:
 
 
 def _index_heights(anatomy: HandAnatomy, posture: Mapping[str, float]) -> tuple[Array, Array]:
-    """Heights m of the index marker above its rest, and the MCP flexions deg that give them; heights increase."""
+    """Heights, m, of the index marker above its resting position, increasing, and the MCP flexions, deg, of these."""
     model = build_model(anatomy)
     angles = np.radians([posture.get(name, 0.0) for name in ANGLES])
     number = ANGLES.index("index_mcp_flexion")

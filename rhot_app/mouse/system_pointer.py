@@ -1,7 +1,7 @@
 """The 3-D mouse as the system's pointer, by Linux's uinput: an absolute pointing device with two buttons.
 
-The cursor's foot moves the pointer: right is right, forward is up. The thumb is the left button, the little finger the
-right one. Structures and codes are those of <linux/uinput.h> and <linux/input-event-codes.h>.
+The cursor's position on the ground moves the pointer: forward is up. The thumb is the left button, the little finger
+the right one. Structures and codes are those of <linux/uinput.h> and <linux/input-event-codes.h>.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from rhot_app.mouse.pointer import GROUND_M, MouseState
 
 DEVICE: Final = Path("/dev/uinput")
 RANGE: Final = 32767
-"""Steps of each axis: what other absolute pointers have."""
+"""Largest value of each axis, that of other absolute pointers."""
 
 _EV_SYN, _EV_KEY, _EV_ABS = 0, 1, 3
 _ABS_X, _ABS_Y = 0, 1
@@ -32,12 +32,12 @@ Ioctl = Callable[[int, int, Any], Any]
 
 
 class SystemPointer:
-    """Open while it is used; closing removes the device and with it every held button."""
+    """A virtual pointing device. Closing removes it, which releases its buttons."""
 
     def __init__(self, path: Path = DEVICE, ioctl: Ioctl | None = None) -> None:
-        """Make the device. `ioctl`: a stand-in for that of ``fcntl``. Raises OutputError with the permission that is
-        missing."""
-        self._ioctl = ioctl or _system_ioctl()  # first: it says which systems have none
+        """Create the device. `ioctl`: replaces that of ``fcntl`` in tests. Raises OutputError with the missing
+        permission."""
+        self._ioctl = ioctl or _system_ioctl()  # first: its error names the systems without one
         self._file = _open(path)
         self._sent: dict[tuple[int, int], int] = {}
         try:
@@ -48,7 +48,7 @@ class SystemPointer:
                               "uinput device.") from exc
 
     def write(self, mouse: MouseState) -> None:
-        """Move and click; only what has changed is sent. Raises OutputError."""
+        """Send the changes of position and buttons. Raises OutputError."""
         wanted: dict[tuple[int, int], int] = {}
         if mouse.cursor is not None:
             right, forward = (float(mouse.cursor[k]) / GROUND_M[k] for k in range(2))
