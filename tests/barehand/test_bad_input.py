@@ -52,13 +52,13 @@ def wrong(found: list[HandState], distance_m: float = DISTANCE_M) -> list[int]:
 
 
 @pytest.mark.parametrize(("distance_m", "known"), [(0.5, False), (0.7, True)])
-def test_a_face_is_no_hand(distance_m: float, known: bool) -> None:
+def test_no_hand_is_found_in_a_face(distance_m: float, known: bool) -> None:
     place = np.array([0.0, -0.02, distance_m])
     found = states(lambda camera, empty, k: taken(person(camera, empty, place), k), known)
     assert not any(state.tracked for state in found)
 
 
-def test_two_people_are_no_hand() -> None:
+def test_no_hand_is_found_in_two_people() -> None:
     def draw(camera, empty, number) -> np.ndarray:
         both = person(camera, person(camera, empty, np.array([-0.2, 0.0, 0.8])), np.array([0.22, -0.05, 0.85]))
         return taken(both, number)
@@ -66,21 +66,21 @@ def test_two_people_are_no_hand() -> None:
     assert not any(state.tracked for state in states(draw, True))
 
 
-def test_a_hand_before_a_person_is_found_or_none_is() -> None:
+def test_a_hand_before_a_person_is_found_at_the_right_pose_or_not_at_all() -> None:
     place = np.array([0.12, -0.05, 0.95])
     found = states(lambda camera, empty, k: hand(camera, person(camera, empty, place), k), True)
     assert wrong(found) == []
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_a_hand_that_fills_the_picture_is_found_or_none_is(known: bool) -> None:
+def test_a_hand_that_fills_the_image_is_found_at_the_right_pose_or_not_at_all(known: bool) -> None:
     found = states(lambda camera, empty, k: hand(camera, empty, k, 0.16), known)
     assert wrong(found, 0.16) == []
 
 
 @pytest.mark.parametrize("known", [True, False])
 @pytest.mark.parametrize("exposure", [0.03, 0.12, 8.0])
-def test_a_dark_or_burnt_picture_shows_no_hand(exposure: float, known: bool) -> None:
+def test_no_hand_is_found_in_a_dark_or_saturated_image(exposure: float, known: bool) -> None:
     found = states(lambda camera, empty, k: hand(camera, empty, k, exposure=exposure), known)
     assert not any(state.tracked for state in found)
 

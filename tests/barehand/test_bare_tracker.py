@@ -29,7 +29,7 @@ def errors_mm(tracker: BareHandTracker, pose) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("mode", "most_mm"), [("contour", 1.5), ("feature", 3.0)])
-def test_it_follows_a_hand_from_a_start(film, mode, most_mm) -> None:
+def test_a_hand_is_tracked_from_a_given_start(film, mode, most_mm) -> None:
     tracker = BareHandTracker(rig_of(film[0][0], right_hand()), mode=mode)
     moving = poses("grasp", TIMES)
     tracker.start(moving[0], 0)
@@ -41,7 +41,7 @@ def test_it_follows_a_hand_from_a_start(film, mode, most_mm) -> None:
     assert np.nanmin(tracker.fit.support) > 0.5
 
 
-def test_one_camera_is_less_sure_of_the_distance_than_two(film) -> None:
+def test_one_camera_has_a_larger_depth_deviation_than_two(film) -> None:
     pose = poses("grasp", TIMES)[0]
     spread = []
     for second in (True, False):
@@ -52,7 +52,7 @@ def test_one_camera_is_less_sure_of_the_distance_than_two(film) -> None:
     assert spread[1] > 2.0 * spread[0]
 
 
-def test_other_kinds_of_observations_are_weighed_with_the_contour(film) -> None:
+def test_other_residuals_are_used_in_the_same_update(film) -> None:
     class Place:
         def linearise(self, state: np.ndarray) -> Rows:
             jacobian = np.zeros((1, len(state) - BIAS + MOTION))
@@ -65,13 +65,13 @@ def test_other_kinds_of_observations_are_weighed_with_the_contour(film) -> None:
     assert abs(knot.state[3] - 0.5) < 1e-3
 
 
-def test_without_a_start_it_says_what_to_do(film) -> None:
+def test_a_step_without_a_start_raises_an_error_with_advice(film) -> None:
     tracker = BareHandTracker(rig_of(film[0][0], right_hand()))
     with pytest.raises(TrackingError, match="start"):
         tracker.step(film[0][1], [0, 0])
 
 
-def test_it_begins_from_nothing(film) -> None:
+def test_a_hand_is_found_without_a_given_start(film) -> None:
     cameras, images, walls = film[0]
     known = [learn_skin(image, learn_background(skin_foreground(), [empty]))
              for image, empty in zip(images, walls, strict=True)]
@@ -81,14 +81,14 @@ def test_it_begins_from_nothing(film) -> None:
     assert np.median(errors_mm(tracker, poses("grasp", TIMES)[0])) < 10.0
 
 
-def test_an_empty_scene_has_no_hand(film) -> None:
+def test_no_hand_is_found_in_an_empty_scene(film) -> None:
     cameras, _, walls = film[0]
     tracker = BareHandTracker(rig_of(cameras, right_hand()),
                               foreground=[learn_background(skin_foreground(), [empty]) for empty in walls])
     assert not tracker.find(walls, 0)
 
 
-def test_the_overlay_shows_the_contour(film) -> None:
+def test_the_overlay_draws_the_contour(film) -> None:
     pose = poses("grasp", TIMES)[0]
     tracker = BareHandTracker(rig_of(film[0][0], right_hand()))
     tracker.start(pose, 0)

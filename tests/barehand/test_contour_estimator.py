@@ -1,4 +1,4 @@
-"""The bare hand live, with nodes that search drawn pictures: found, followed, lost, replayed, beside landmarks."""
+"""The bare hand live, with nodes that search drawn images: found, tracked, lost, replayed, and with landmarks."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def follow(nodes: SearchedNodes, film: list[tuple[list, list, list]]) -> int:
 
 
 @pytest.mark.parametrize("forget", [False, True], ids=["live", "from a log"])
-def test_a_hand_is_found_followed_and_lost(film, forget: bool) -> None:
+def test_a_hand_is_found_tracked_and_lost(film, forget: bool) -> None:
     rig = bare_rig(film[0][0])
     nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids), forget=forget)
     number = follow(nodes, film)
@@ -116,7 +116,7 @@ def test_maps_that_come_before_the_last_edges_confirm_the_hand(film) -> None:
     assert error_mm(nodes.states[-1], poses("grasp", TIMES)[-1]) < 5.0
 
 
-def test_slow_cameras_find_and_follow_a_hand(film) -> None:
+def test_a_hand_is_found_and_tracked_by_slow_cameras(film) -> None:
     """Of a hand that is found after the first camera's frame, the second one's edges come first."""
     rig = bare_rig(film[0][0])
     nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
@@ -127,7 +127,7 @@ def test_slow_cameras_find_and_follow_a_hand(film) -> None:
 
 
 @pytest.mark.parametrize("apart_ms", [2, 10])
-def test_cameras_that_disagree_do_not_move_a_hand_at_rest(film, apart_ms: int) -> None:
+def test_a_camera_with_a_wrong_pose_gives_a_resting_hand_no_velocity(film, apart_ms: int) -> None:
     """A camera that is turned by a fifth of a degree shows it 2 mm elsewhere, milliseconds later: that is no speed."""
     rig = bare_rig(film[0][0])
     turned = Rotation.from_quat(rig.nodes[1].pose.rotation_wxyz, scalar_first=True) * Rotation.from_rotvec(
@@ -144,7 +144,7 @@ def test_cameras_that_disagree_do_not_move_a_hand_at_rest(film, apart_ms: int) -
     assert np.median(speeds) < 0.1  # m/s
 
 
-def test_a_finger_that_is_taken_for_another_is_found_again(film, monkeypatch) -> None:
+def test_a_confused_finger_is_relocalised(film, monkeypatch) -> None:
     pose = poses("grasp", TIMES)[0]
     curled = pose.angles.copy()
     curled[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
@@ -159,8 +159,8 @@ def test_a_finger_that_is_taken_for_another_is_found_again(film, monkeypatch) ->
     assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.01
 
 
-def test_a_hand_that_was_found_wrong_is_found_anew(film, monkeypatch) -> None:
-    """It is followed 3 cm beside and turned, so that fingers are taken for each other; both searches say so."""
+def test_a_hand_with_a_wrong_start_is_relocalised(film, monkeypatch) -> None:
+    """It is tracked 3 cm off and rotated, so that fingers are confused, and two patched searches confirm it."""
     pose = poses("grasp", TIMES)[0]
     wrong = pose.world_from_palm.copy()
     wrong[:3, :3] = wrong[:3, :3] @ Rotation.from_euler("z", 14.0, degrees=True).as_matrix()
@@ -181,7 +181,7 @@ def test_a_hand_that_was_found_wrong_is_found_anew(film, monkeypatch) -> None:
     assert nodes.states[-1].tracked and error_mm(nodes.states[-1], pose) < 3.0
 
 
-def test_the_whole_image_is_searched_ever_more_rarely_and_not_before_one_camera(film) -> None:
+def test_global_searches_have_growing_intervals_and_need_two_cameras(film) -> None:
     hand = BareHandTracker(bare_rig(film[0][0]))
     both, one = [np.zeros((2, 2), np.float32)] * 2, [np.zeros((2, 2), np.float32), None]
     hand.start(poses("grasp", TIMES)[0], 0)
@@ -194,7 +194,7 @@ def test_the_whole_image_is_searched_ever_more_rarely_and_not_before_one_camera(
     assert not hand.relocaliser.global_search_due(both, 1000.0)
 
 
-def test_slices_lie_across_the_contour_of_the_next_frame(film) -> None:
+def test_requested_slices_cross_the_contour_of_the_next_frame(film) -> None:
     rig = bare_rig(film[0][0])
     nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
     follow(nodes, film)
@@ -210,7 +210,7 @@ def test_slices_lie_across_the_contour_of_the_next_frame(film) -> None:
 
 
 @pytest.mark.parametrize("which", ["followed", "looked for"])
-def test_a_recording_that_starts_again_is_another_one(film, which: str) -> None:
+def test_a_recording_that_restarts_is_a_new_session(film, which: str) -> None:
     rig = bare_rig(film[0][0])
     nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
     number = 0
@@ -232,7 +232,7 @@ def test_a_recording_that_starts_again_is_another_one(film, which: str) -> None:
     assert error_mm(nodes.states[-1], poses("grasp", TIMES)[0]) < 5.0
 
 
-def test_one_camera_goes_on_alone(film) -> None:
+def test_one_camera_continues_the_track_alone(film) -> None:
     rig = bare_rig(film[0][0])
     nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
     number = follow(nodes, film)
@@ -265,7 +265,7 @@ def leaving(frames: int, out: int) -> tuple[list[CameraModel], list[HandPose], l
     return cameras, moved, images, [taken(one, 0) for one in walls]
 
 
-def test_a_hand_out_of_one_cameras_picture_is_kept_while_the_other_shows_it(monkeypatch) -> None:
+def test_a_hand_outside_one_cameras_image_is_tracked_by_the_other(monkeypatch) -> None:
     frames, out = 24, 60
     cameras, moved, images, empty = leaving(frames, out)
     joints = [forward(model_and_surface()[0], pose).joints for pose in moved]
@@ -314,7 +314,7 @@ def until_tracked(nodes: SearchedNodes, film: list[tuple[list, list, list]], num
     return number
 
 
-def test_landmarks_begin_and_contours_go_on_and_landmarks_find_it_again(film, monkeypatch) -> None:
+def test_landmarks_start_a_track_that_contours_continue_and_start_it_again_after_a_loss(film, monkeypatch) -> None:
     monkeypatch.setattr(Finder, "found", lambda _: None)  # no search is as quick
     rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
     nodes = SearchedNodes(make_tracker(rig), known(film), 21)
@@ -331,7 +331,7 @@ def test_landmarks_begin_and_contours_go_on_and_landmarks_find_it_again(film, mo
 
 
 @pytest.mark.parametrize("rounded_ns", [-300_000, 300_000])
-def test_landmarks_and_edges_of_one_picture_are_weighed_at_once(film, monkeypatch, rounded_ns: int) -> None:
+def test_landmarks_and_edges_of_one_image_are_one_update(film, monkeypatch, rounded_ns: int) -> None:
     """Their datagrams come apart, and the node's clock is compared anew for each."""
     monkeypatch.setattr(Finder, "found", lambda _: None)
     rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
@@ -345,12 +345,12 @@ def test_landmarks_and_edges_of_one_picture_are_weighed_at_once(film, monkeypatc
     assert nodes.states[-1].tracked and not alone
 
 
-def test_landmarks_mend_a_finger_that_is_taken_for_its_neighbour(film, monkeypatch) -> None:
+def test_landmarks_correct_a_confused_finger(film, monkeypatch) -> None:
     pose = poses("grasp", TIMES)[0]
     curled = pose.angles.copy()
     curled[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
     rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
-    monkeypatch.setattr(Finder, "relocate", lambda *_, **__: None)  # it would mend the finger, too
+    monkeypatch.setattr(Finder, "relocalise", lambda *_, **__: None)  # it would correct the finger, too
     nodes, number = SearchedNodes(make_tracker(rig), known(film), 21), 0
     with monkeypatch.context() as patched:
         patched.setattr(Finder, "found", lambda _: (HandPose(pose.world_from_palm, curled), FIRST_NS))
@@ -367,8 +367,8 @@ def test_landmarks_mend_a_finger_that_is_taken_for_its_neighbour(film, monkeypat
     assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.003
 
 
-def test_a_fingertip_that_contradicts_the_contours_makes_its_finger_uncertain(film) -> None:
-    """Something of the index finger's colour lies 6 cm beside it. The rest of the hand is bare."""
+def test_a_fingertip_that_contradicts_the_contours_inflates_its_fingers_covariance(film) -> None:
+    """An object of the index finger's colour lies 6 cm from it. The rest of the hand is bare."""
     markers = load_markers(resource_path("markers", "rhot6.json"))
     two = msgspec.structs.replace(markers, markers=tuple(one for one in markers.markers
                                                          if one.role in ("thumb_tip", "index_tip")))
@@ -404,7 +404,7 @@ def test_a_fingertip_that_contradicts_the_contours_makes_its_finger_uncertain(fi
     (lambda rig: msgspec.structs.replace(rig, tracker=TrackerSettings("estimator", observe="landmarks_and_contours")),
      "RHOT six.*has none. Give the rig a set with landmarks"),
 ])
-def test_what_cannot_be_is_a_sentence(film, change: Callable[[Rig], Rig], sentence: str) -> None:
+def test_an_invalid_rig_raises_an_error_with_a_sentence(film, change: Callable[[Rig], Rig], sentence: str) -> None:
     rig = change(bare_rig(film[0][0]))
     if sentence:
         with pytest.raises(RigError, match=sentence):

@@ -1,4 +1,4 @@
-"""What weighs contours live, piece by piece: recorded slices, the finder's runs, markers on a hand of another size."""
+"""Parts of the live contour tracker: recorded slices, the finder's searches, markers on a hand of another size."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def hand() -> BareHandTracker:
     return BareHandTracker(rig_of(two_cameras(distance=DISTANCE_M), right_hand()))
 
 
-def test_recorded_slices_that_the_hand_does_not_cross_say_nothing(hand: BareHandTracker) -> None:
+def test_recorded_slices_that_do_not_cross_the_hand_are_left_out(hand: BareHandTracker) -> None:
     """A log with another calibration or another hand has such slices. It may be replayed twice."""
     pose = poses("grasp", (0.5,))[0]
     _, images, _ = scene(pose)
     covariance = 1e-6 * np.eye(hand.process.size)
     slices = requested_contour(hand, 0, state_of(pose), covariance, STEP_M).slices
-    beside = slices[::2] * [1.0, 1.0, 1.0, 1.0, 0.2] + [250.0, 0.0, 0.0, 0.0, 0.0]
-    request = SliceRequest(0, np.vstack([beside, slices]))
+    off_hand = slices[::2] * [1.0, 1.0, 1.0, 1.0, 0.2] + [250.0, 0.0, 0.0, 0.0, 0.0]
+    request = SliceRequest(0, np.vstack([off_hand, slices]))
     edges = find_edges(images[0], request.slices, skin_foreground(), 2.0)
     frame, before = EdgeFrame(0, 0, 0, 0, 0.0, 0.0, request, edges), [column.copy() for column in edges]
     contour = matched_contour(hand, frame, state_of(pose), covariance)
@@ -51,8 +51,8 @@ def test_recorded_slices_that_the_hand_does_not_cross_say_nothing(hand: BareHand
     contour.linearise(state_of(pose))
     found, expected = contour.slice_counts.sum(axis=0)
     assert found > 0.75 * expected, "the hand is found on the slices across it"
-    edges = find_edges(images[0], beside, skin_foreground(), 2.0)
-    assert matched_contour(hand, EdgeFrame(0, 0, 0, 0, 0.0, 0.0, SliceRequest(0, beside), edges), state_of(pose),
+    edges = find_edges(images[0], off_hand, skin_foreground(), 2.0)
+    assert matched_contour(hand, EdgeFrame(0, 0, 0, 0, 0.0, 0.0, SliceRequest(0, off_hand), edges), state_of(pose),
                    covariance) is None
 
 
@@ -69,7 +69,7 @@ def test_more_slices_than_a_request_has_are_thinned_out(hand: BareHandTracker) -
     assert set(contour.points.capsule) == set(every.points.capsule), "all of the hand is searched"
 
 
-def test_edges_of_a_hand_before_an_unknown_wall_are_as_certain_as_they_state(hand: BareHandTracker) -> None:
+def test_edges_before_an_unknown_background_have_consistent_standard_deviations(hand: BareHandTracker) -> None:
     pose, squares = poses("grasp", (0.5,))[0], []
     for camera, image in enumerate(scene(pose)[1]):
         contour = requested_contour(hand, camera, state_of(pose), 1e-6 * np.eye(hand.process.size), STEP_M)
@@ -83,7 +83,7 @@ def test_edges_of_a_hand_before_an_unknown_wall_are_as_certain_as_they_state(han
     assert len(squares) > 300 and 0.5 < np.mean(squares) < 1.5, "shading displaces them by half a pixel"
 
 
-def test_phalanges_follow_the_contours_at_the_same_pace_beside_markers(hand: BareHandTracker) -> None:
+def test_updates_by_markers_do_not_change_the_share_of_the_partial_update_of_phalanges(hand: BareHandTracker) -> None:
     hand.start(poses("grasp", (0.5,))[0], 0)
     hand.prepare_update([0, 1], 0.0)
     hand.prepare_update((), 0.1)
@@ -92,8 +92,8 @@ def test_phalanges_follow_the_contours_at_the_same_pace_beside_markers(hand: Bar
     assert hand.filter.partial.share == pytest.approx(0.1 / SAME_POSE_S)
 
 
-def test_a_search_that_ends_while_its_track_is_given_up_gives_no_pose(hand: BareHandTracker,
-                                                                      monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_that_ends_after_its_track_gives_no_pose(hand: BareHandTracker,
+                                                          monkeypatch: pytest.MonkeyPatch) -> None:
     finder = Finder(hand)
     pose = poses("grasp", (0.5,))[0]
     monkeypatch.setattr(hand.relocaliser, "search_globally", lambda *_: pose)
@@ -112,7 +112,7 @@ def test_a_search_that_ends_while_its_track_is_given_up_gives_no_pose(hand: Bare
 
 
 @pytest.mark.parametrize("markers", ["landmarks21", "rhot6"])
-def test_markers_lie_on_a_hand_as_large_as_the_contours_say(markers: str) -> None:
+def test_markers_lie_on_a_hand_of_the_states_shape_with_its_jacobian(markers: str) -> None:
     rig = msgspec.structs.replace(rig_of(two_cameras(distance=DISTANCE_M), right_hand()), markers=load_markers(
         resource_path("markers", f"{markers}.json")))
     hand, pose, factor = BareHandTracker(rig, known_size=False), poses("grasp", (0.5,))[0], 1.1

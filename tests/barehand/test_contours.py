@@ -49,8 +49,8 @@ def test_silhouette_points_lie_between_hand_and_background(side: str, motion: st
             assert np.mean(mask[at[:, 1], at[:, 0]] == expected) > most
 
 
-def test_features_of_links_behind_others_are_left_out() -> None:
-    """Where the hand is expected behind a point, there is hand beside it, and background where not."""
+def test_features_of_occluded_links_are_left_out() -> None:
+    """Outside of an inner point lies another part of the hand, outside of a silhouette point the background."""
     _, surface = model_and_surface()
     pose, camera = poses("grasp", (1.4,))[0], two_cameras()[0]
     black = np.zeros((camera.height, camera.width, 3))
@@ -63,7 +63,7 @@ def test_features_of_links_behind_others_are_left_out() -> None:
 
 
 @pytest.mark.parametrize("features", [False, True])
-def test_contours_follow_the_hand_as_their_derivatives_say(features: bool) -> None:
+def test_contours_have_the_jacobian_of_finite_differences(features: bool) -> None:
     _, surface = model_and_surface()
     process, pose = process_of(), poses("grasp", (0.9,))[0]
     camera, state = two_cameras()[1], state_of(pose)
@@ -85,13 +85,13 @@ def test_contours_follow_the_hand_as_their_derivatives_say(features: bool) -> No
 
 
 def _later(late_s: float) -> tuple[ContourFrame, np.ndarray]:
-    """A frame of `late_s` after its state, whose edges lie a little beside the contour, and the state."""
+    """A frame `late_s` after its state, with edges a little off the contour, and the state."""
     frame, state = _observed((0.3,))
     frame.late_s = frame.late_s + late_s
     return frame, state
 
 
-def test_contours_of_a_later_image_follow_the_velocity() -> None:
+def test_contours_of_a_later_image_move_by_the_velocity() -> None:
     process, (frame, state) = process_of(), _later(0.013)
     here, rows, good = frame.predict(state)
     for axis in range(POSE):
@@ -101,7 +101,7 @@ def test_contours_of_a_later_image_follow_the_velocity() -> None:
         assert moved[good] - here[good] == pytest.approx(0.013 * 1e-2 * rows[good, axis], abs=1e-9)
 
 
-def test_a_given_velocity_moves_a_later_image_in_place_of_the_states() -> None:
+def test_a_given_velocity_replaces_the_states_for_a_later_image() -> None:
     process, (frame, state) = process_of(), _later(0.013)
     step, velocity = np.zeros(process.size), np.zeros(POSE)
     step[POSE], velocity[0] = 0.3, 0.3
@@ -111,7 +111,7 @@ def test_a_given_velocity_moves_a_later_image_in_place_of_the_states() -> None:
     assert np.abs(given.error - Contours([frame]).linearise(state).error).max() > 0.1
 
 
-def test_an_uncertain_velocity_makes_a_later_image_uncertain_and_is_not_changed_by_it() -> None:
+def test_a_later_image_has_the_velocitys_uncertainty_and_does_not_update_it() -> None:
     """An error of the velocity moves the pose meanwhile: its covariance adds to that of the pose."""
     frame, state = _later(0.013)
     root = np.diag(np.repeat([0.3, 2.0, 3.0], (3, 3, 21)))
@@ -125,7 +125,7 @@ def test_an_uncertain_velocity_makes_a_later_image_uncertain_and_is_not_changed_
     assert uncertain.error @ uncertain.error < certain.error @ certain.error
 
 
-def test_edges_within_the_hand_are_told_from_its_silhouette() -> None:
+def test_inner_edges_are_distinguished_from_the_silhouette() -> None:
     _, surface = model_and_surface()
     pose, camera = poses("grasp", (1.4,))[0], two_cameras()[0]
     points = contour_points(surface, state_of(pose), np.zeros(SHAPE), camera.camera_from_world[:3].copy(),
@@ -144,7 +144,7 @@ def test_a_slice_without_edges_changes_nothing() -> None:
     assert np.abs(rows.jacobian).max() < 0.1  # as good as no information, per m and rad
 
 
-def test_edges_beside_the_contour_draw_the_hand_to_them() -> None:
+def test_an_update_moves_the_hand_towards_the_edges() -> None:
     left = [_left_after_three_steps(motion, t) for motion, t in
             (("grasp", 0.9), ("grasp", 0.3), ("wave", 0.5), ("pinch", 0.9))]
     assert np.mean(left) < 0.5e-3  # of 2.7 mm
@@ -192,12 +192,12 @@ def _information(frame: ContourFrame, state: np.ndarray) -> float:
     return float((jacobian.T @ jacobian)[0, 0] / frame.points.scale.mean() ** 2)
 
 
-def test_two_edges_that_are_equally_probable_say_little() -> None:
+def test_two_equally_probable_edges_have_little_weight() -> None:
     one, two = (_information(*_observed(offsets)) for offsets in ((0.0,), (-3.0, 3.0)))
     assert two < 0.3 * one
 
 
-def test_more_slices_do_not_tell_the_surfaces_offset_along_a_side() -> None:
+def test_more_slices_do_not_determine_the_surfaces_offset_along_a_side() -> None:
     frame, state = _observed((0.0,))
     together = _information(frame, state)
     frame.side_sd[:] = 0.0

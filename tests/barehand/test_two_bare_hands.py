@@ -1,4 +1,4 @@
-"""Two bare hands at once, with nodes that search drawn pictures: found, followed, lost, one before the other."""
+"""Two bare hands at once, with nodes that search drawn images: found, tracked, lost, one before the other."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def until_tracked(nodes: SearchedNodes, images: list[np.ndarray], number: int) -
 
 
 @pytest.mark.parametrize("forget", [False, True], ids=["live", "from a log"])
-def test_both_are_found_and_one_leaves_and_comes_back(still: list[np.ndarray], forget: bool) -> None:
+def test_both_hands_are_found_and_one_leaves_and_returns(still: list[np.ndarray], forget: bool) -> None:
     nodes, number = nodes_of(two_bare_hands(), forget=forget), 0
     for _ in range(3):
         nodes.step(number, EMPTY)
@@ -116,7 +116,7 @@ def test_both_are_found_and_one_leaves_and_comes_back(still: list[np.ndarray], f
     assert (np.diff(times_ns) > 0).all()
 
 
-def test_a_hand_passes_before_the_other_and_both_are_tracked_afterwards(monkeypatch) -> None:
+def test_both_hands_are_tracked_after_one_has_occluded_the_other(monkeypatch) -> None:
     """The left hand passes 6 cm before the right one, which rests, and covers all of it."""
     nodes, number = nodes_of(two_bare_hands()), 0
     hands = {"right": at("right", (0.0, 0.0, 0.03)), "left": at("left", (-0.13, 0.0, -0.03))}
@@ -138,7 +138,7 @@ def test_a_hand_passes_before_the_other_and_both_are_tracked_afterwards(monkeypa
     assert nodes.states[-1].t_master_ns == FIRST_NS + (number - 1) * PERIOD_NS
 
 
-def test_hands_that_are_taken_for_each_other_change_places(still: list[np.ndarray], monkeypatch) -> None:
+def test_swapped_hands_are_corrected(still: list[np.ndarray], monkeypatch) -> None:
     """The first search takes each one's back for the other one's palm."""
     turned = {}
     for side, other in zip(SIDES, SIDES[::-1], strict=True):
@@ -157,7 +157,7 @@ def test_hands_that_are_taken_for_each_other_change_places(still: list[np.ndarra
         number += 1
 
 
-def test_edges_that_one_hand_alone_was_asked_about_are_left_out() -> None:
+def test_edges_requested_for_one_hand_alone_are_left_out() -> None:
     """The rig has got a second hand while answers were under way."""
     tracker = make_tracker(two_bare_hands())
     slices = np.tile([100.0, 100.0, 1.0, 0.0, 5.0], (3, 1))
@@ -167,7 +167,7 @@ def test_edges_that_one_hand_alone_was_asked_about_are_left_out() -> None:
     assert tracker.solve() is None
 
 
-def test_the_slices_of_both_fit_a_request(monkeypatch) -> None:
+def test_the_slices_of_both_hands_fit_into_a_request(monkeypatch) -> None:
     """Hands so near that each alone would ask for more than its half."""
     near = {side: at(side, (x_m, 0.0, 0.28 - DISTANCE_M)) for side, x_m in zip(SIDES, (0.07, -0.07), strict=True)}
     nodes = nodes_of(two_bare_hands())
@@ -178,7 +178,7 @@ def test_the_slices_of_both_fit_a_request(monkeypatch) -> None:
     assert all(SLICES_MAX // 2 < len(request.slices) <= SLICES_MAX for request in nodes.asked)
 
 
-def test_a_rig_of_two_bare_hands_is_a_file_and_markers_need_a_wearer(tmp_path) -> None:
+def test_a_rig_of_two_bare_hands_is_saved_and_only_one_hand_may_have_markers(tmp_path) -> None:
     rig = two_bare_hands()
     save_rig(tmp_path / "rig.json", rig)
     assert load_rig(tmp_path / "rig.json") == rig

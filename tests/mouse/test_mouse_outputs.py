@@ -43,7 +43,7 @@ def mouse(*cursor: float, pressed: tuple[str, ...] = ()) -> MouseState:
     return MouseState(0, Condition.TRACKING, np.array(cursor) if cursor else None, frozenset(pressed))
 
 
-def test_osc_says_cursor_and_buttons() -> None:
+def test_osc_messages_have_cursor_and_buttons() -> None:
     first, second = mouse_messages((0.5, -1.0, 0.25), {"little"})
     assert first == b"/rhot/mouse/cursor\0\0,fff\0\0\0\0\x3f\0\0\0\xbf\x80\0\0\x3e\x80\0\0"
     assert second == b"/rhot/mouse/buttons\0,ii\0\0\0\0\0\0\0\0\1"
@@ -67,7 +67,7 @@ class Device:
         return [event[2:] for event in struct.iter_unpack("@llHHi", self.path.read_bytes())]
 
 
-def test_the_pointer_is_made_moved_clicked_and_removed(tmp_path: Path) -> None:
+def test_the_pointer_is_created_moved_clicked_and_removed(tmp_path: Path) -> None:
     device = Device(tmp_path)
     pointer = SystemPointer(device.path, device.ioctl)
     assert (0x40045565, 0x110) in device.asked and (0x40045565, 0x111) in device.asked  # both buttons
@@ -86,7 +86,7 @@ def test_the_pointer_is_made_moved_clicked_and_removed(tmp_path: Path) -> None:
     assert device.asked[-1][0] == 0x5502
 
 
-def test_a_pointer_without_device_or_permission_says_what_it_needs(tmp_path: Path, monkeypatch) -> None:
+def test_a_pointer_without_device_or_permission_raises_an_error_with_advice(tmp_path: Path, monkeypatch) -> None:
     with pytest.raises(OutputError, match="modprobe uinput"):
         SystemPointer(tmp_path / "none")
 
@@ -124,13 +124,13 @@ def rhot_mouse(*arguments: str) -> subprocess.CompletedProcess[str]:
     (("--osc", "nowhere"), "HOST:PORT"), (("--measure", "--pointer"), "leave --simulated"),
     (("--bare",), "--simulated and --measure"), (("--rig", "rig.json"), "for a --log"),
     (("--log", "NONE"), "none"), (("--directory", "NONE"), "no engine is heard")])
-def test_what_cannot_be_is_a_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path) -> None:
+def test_contradictory_options_raise_an_error(arguments: tuple[str, ...], words: str, tmp_path: Path) -> None:
     done = rhot_mouse(*(str(tmp_path / "none") if one == "NONE" else one for one in arguments))
     assert done.returncode == 2 and words in done.stderr and not done.stdout
     assert "Traceback" not in done.stderr
 
 
-def test_a_recording_works_the_mouse_as_the_hand_did(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_recording_controls_the_mouse_as_the_hand_did(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     script, scene = Script(), make_scene(twin_defaults(), 1)
     script.move((0.06, -0.03, 0.0), 0.5)
     script.click("thumb")

@@ -19,7 +19,7 @@ def rested(settings: MouseSettings | None = None, **how) -> Mouse:
     return mouse
 
 
-def test_ten_states_a_second_suffice_for_a_rest() -> None:
+def test_ten_states_a_second_suffice_for_a_resting_pose() -> None:
     """As many images as Rehg's mouse had."""
     mouse = Mouse()
     states = [mouse.feed(hand_state(number)) for number in range(0, 61, 10)]
@@ -35,14 +35,14 @@ def test_a_hand_that_jumps_is_not_at_rest() -> None:
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
-def test_the_palm_moves_the_foot_and_nothing_else(side: str) -> None:
+def test_the_palm_moves_the_cursor_over_the_ground_only(side: str) -> None:
     mouse = rested(side=side)
     state = mouse.feed(hand_state(REST, (0.02, -0.03, 0.0), side=side))
     assert state.cursor == pytest.approx([0.06, -0.09, 0.0], abs=1e-9)
     assert not state.pressed and not state.needs
 
 
-def test_the_index_finger_moves_the_height_and_nothing_else() -> None:
+def test_the_index_finger_changes_the_height_only() -> None:
     mouse = rested()
     before, after = hand_state(REST), hand_state(REST + 1, index_mcp_flexion=5.0)
     lift = after.fingertip_positions[1, 2] - before.fingertip_positions[1, 2]
@@ -65,7 +65,7 @@ def test_the_palm_alone_suffices() -> None:
     assert len(state.needs) == 2 and "thumb" in state.needs[0] and "little" in state.needs[1]
 
 
-def test_without_the_index_fingertip_the_height_stays_and_a_sentence_says_why() -> None:
+def test_without_the_index_fingertip_the_height_stays_with_a_sentence() -> None:
     mouse = rested()
     height = mouse.feed(hand_state(REST, index_mcp_flexion=10.0)).cursor[2]
     state = mouse.feed(hand_state(REST + 1, (0.01, 0.0, 0.0), unseen=("index_tip",)))
@@ -82,7 +82,7 @@ def test_a_spread_finger_presses_its_button_until_it_returns(button: str, side: 
 
 
 @pytest.mark.parametrize("button", ["thumb", "little"])
-def test_between_the_two_thresholds_a_button_stays_as_it_is(button: str) -> None:
+def test_a_button_has_hysteresis(button: str) -> None:
     mouse, full = rested(), SPREAD[button]
     (name, value), = full.items()
     between = {name: 0.45 * value}
@@ -91,7 +91,7 @@ def test_between_the_two_thresholds_a_button_stays_as_it_is(button: str) -> None
     assert mouse.feed(hand_state(REST + 2, **between)).pressed
 
 
-def test_a_guess_and_an_uncertain_finger_press_nothing() -> None:
+def test_a_guessed_or_uncertain_finger_presses_nothing() -> None:
     mouse, spread = rested(), SPREAD["thumb"]
     assert not mouse.feed(hand_state(REST, unseen=("thumb_tip",), **spread)).pressed
     assert not mouse.feed(hand_state(REST + 1, tip_sd_m=0.02, **spread)).pressed
@@ -99,7 +99,7 @@ def test_a_guess_and_an_uncertain_finger_press_nothing() -> None:
     assert mouse.feed(hand_state(REST + 3, unseen=("thumb_tip",))).pressed, "a guess released the button"
 
 
-def test_a_lost_hand_releases_and_the_cursor_stays() -> None:
+def test_a_lost_hand_releases_the_buttons_and_the_cursor_stays() -> None:
     mouse = rested()
     before = mouse.feed(hand_state(REST, (0.02, 0.0, 0.0), **SPREAD["thumb"]))
     state = mouse.feed(lost(REST + 1))
@@ -108,7 +108,7 @@ def test_a_lost_hand_releases_and_the_cursor_stays() -> None:
     assert "No hand is tracked" in state.needs[0]
 
 
-def test_another_rest_moves_the_origin() -> None:
+def test_a_new_resting_pose_moves_the_origin() -> None:
     mouse = rested()
     mouse.rest()
     assert mouse.feed(hand_state(REST, (0.05, 0.02, 0.0))).cursor is None
@@ -117,7 +117,7 @@ def test_another_rest_moves_the_origin() -> None:
     assert state.cursor == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
 
 
-def test_a_known_table_is_the_plane_however_the_palm_lies() -> None:
+def test_a_known_table_defines_the_plane() -> None:
     tilted = [replace(state, world_from_palm=state.world_from_palm @ tilt(0.3)) for state in
               (hand_state(number) for number in range(REST))]
     mouse = Mouse(up=np.array([0.0, 0.0, 1.0]))
@@ -135,7 +135,7 @@ def tilt(angle: float) -> np.ndarray:
     return out
 
 
-def test_one_cameras_palm_slides_along_the_line_of_sight_to_the_table() -> None:
+def test_with_one_camera_the_palm_is_projected_to_the_table_along_the_line_of_sight() -> None:
     """The covariance is long along the line of sight; a palm that was put too far along it comes back."""
     sight = np.array([0.0, np.sqrt(0.5), -np.sqrt(0.5)])
     state = hand_state(0, tuple(0.03 * sight))

@@ -14,7 +14,7 @@ from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_node.files import resource_path
 
 
-def test_the_shipped_motion_fits_the_mouse_and_its_scene() -> None:
+def test_the_shipped_motion_is_that_of_the_script() -> None:
     made = motion_file(carrying(), make_scene(twin_defaults(), 1).hand, MouseSettings(), Sway())
     assert read_motion_file(resource_path("motions", "mouse.json")) == made, "write resources/motions/mouse.json anew"
 
@@ -40,7 +40,7 @@ def test_one_camera_and_a_known_plane_pick_and_place(seed: int) -> None:
 
 
 @pytest.mark.parametrize("cameras", [1, 2])
-def test_markers_press_the_buttons_that_the_hand_presses(cameras: int) -> None:
+def test_tracked_presses_are_those_of_the_hand(cameras: int) -> None:
     for one in buttons(1, set_up=SetUp(cameras=cameras)).values():
         assert one["presses"] == one["right"] == 4 and one["wrong"] == 0
 

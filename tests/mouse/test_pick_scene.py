@@ -34,7 +34,7 @@ def test_a_ball_follows_the_cursor_while_the_thumb_holds_it() -> None:
     assert scene.balls[0].centre == pytest.approx((0.0, 0.1, 0.13))
 
 
-def test_only_what_is_near_is_selected_and_a_thumb_that_was_down_picks_nothing() -> None:
+def test_only_near_balls_are_selected_and_a_thumb_spread_before_picks_nothing() -> None:
     scene = PickScene((BALL,))
     scene.feed(mouse((0.0, 0.0, 0.1), "thumb"))
     assert scene.selected is None
@@ -57,7 +57,7 @@ def test_the_little_finger_puts_a_ball_on_the_ground() -> None:
     assert scene.balls[0].centre == pytest.approx((0.0, 0.1, 0.03))
 
 
-def test_moves_are_undone_one_after_the_other_and_nothing_is_said_to_be_nothing() -> None:
+def test_moves_are_undone_in_order_with_a_sentence_when_there_is_none() -> None:
     scene = PickScene((BALL,))
     assert "nothing to undo" in scene.undo()
     moved(scene)
@@ -68,7 +68,7 @@ def test_moves_are_undone_one_after_the_other_and_nothing_is_said_to_be_nothing(
     assert "nothing to undo" in scene.undo() and scene.balls[0] == BALL
 
 
-def test_a_held_ball_is_not_undone_under_the_hand() -> None:
+def test_the_move_of_a_held_ball_cannot_be_undone() -> None:
     scene = PickScene((BALL,))
     moved(scene)
     scene.feed(mouse((0.0, 0.1, 0.15), "thumb"))
@@ -76,7 +76,7 @@ def test_a_held_ball_is_not_undone_under_the_hand() -> None:
     assert scene.held == 0
 
 
-def test_a_lost_hand_lets_go_where_it_was_and_that_can_be_undone() -> None:
+def test_a_lost_hand_releases_the_ball_and_the_move_can_be_undone() -> None:
     scene = PickScene((BALL,))
     scene.feed(mouse((0.1, 0.0, 0.05)))
     scene.feed(mouse((0.1, 0.0, 0.05), "thumb"))
@@ -107,7 +107,7 @@ def test_throughput_of_clicks_with_a_known_spread() -> None:
     assert found.bits_per_s == pytest.approx(math.log2(straight / found.effective_width_m + 1.0) / 0.5, rel=0.02)
 
 
-def test_clicks_beside_the_target_are_missed() -> None:
+def test_clicks_outside_the_target_are_missed() -> None:
     test, t_s = TargetTest(), 0.0
     while (wanted := test.wanted) is not None:
         t_s += 1.0
@@ -117,7 +117,7 @@ def test_clicks_beside_the_target_are_missed() -> None:
     assert found is not None and found.missed == found.clicks
 
 
-def test_a_held_ball_stays_where_it_was_let_go_when_the_mouse_does_something_else() -> None:
+def test_an_interruption_releases_a_held_ball_where_it_is() -> None:
     scene = PickScene((BALL,))
     scene.feed(mouse((0.1, 0.0, 0.05)))
     scene.feed(mouse((0.1, 0.0, 0.05), "thumb"))
