@@ -186,8 +186,8 @@ class BareHandTracker:
     def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
         """Search the whole images for a hand and start a track at the most probable pose. False without any.
 
-        The best poses by the foreground are fitted to the same images. The one with the best score times contour found
-        is taken. A pose with a negative score is less probable than no hand, and left out.
+        The best poses by the foreground are fitted to the same images. The one with the largest product of score and
+        part of the contour found is taken. A negative score is less probable than no hand, and left out.
         """
         size = np.zeros(SHAPE)
         best: tuple[float, Found] | None = None
