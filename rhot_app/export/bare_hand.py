@@ -23,18 +23,17 @@ from rhot_app.export.states import BLOCK, states_of
 from rhot_app.handfit.adaptation import REASON, Adapted, adapt
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
-from rhot_app.rig_history import accept_hand
+from rhot_app.rig_history import accept_hand, require_hand_place
 from rhot_app.sources.frame_sets import CameraVideo, FrameSet, frame_sets, frames_left_out, overlap
 from rhot_app.state import HandState
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
-from rhot_node.files import require_replaceable, why
 
 Image = NDArray[np.uint8]
 
 BACKGROUND_PICTURES: Final = 16
 """Pictures of each camera from which its background is learnt: a pixel's noise is then known to 1/sqrt(2 n), 18 %."""
 
-TABLES: Final = ("csv", "parquet", "npz")
+TABLES: Final = (".csv", ".parquet", ".npz")
 _TEXT_RGB: Final = (255, 255, 255)
 
 
@@ -92,20 +91,9 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
     table of the states (docs/export.md). `pictures`: an .avi or .mp4 file, or a folder of PNG files, with what was
     found. `hand_file`: where the rig's hand, adapted to the one that was found last, is written; what was there is kept
     beside it; a loss is noted where too little was seen of it (`errors.note_loss`). Files appear when they are whole.
-    Raises RecordingError, ExportError.
+    Raises RecordingError, ExportError, RigError.
     """
-    for video in videos:
-        if out is not None:
-            check_table(video.path, out, again)
-        if pictures is not None:
-            check_pictures(video.path, pictures, again)
-    if hand_file is not None:
-        try:
-            require_replaceable(hand_file)
-        except OSError as exc:
-            raise ExportError(f"--adapt {hand_file}: cannot be written ({why(exc)}).") from exc
-        if not hand_file.absolute().parent.is_dir():
-            raise ExportError(f"--adapt {hand_file}: the folder {hand_file.parent} does not exist; create it first.")
+    check_outputs(videos, out, pictures, again, hand_file)
     first, last = overlap(videos)
     run = HandFollower(rig, foreground, known_size=known_size,
                        empty_until_ns=first + round(1e9 * empty_s) if empty_s else first)
@@ -154,9 +142,27 @@ def lost_intervals(spent: Sequence[tuple[int, bool]]) -> tuple[tuple[float, floa
 
 # -- What is written --------------------------------------------------------------------------------------------------
 
+def check_outputs(videos: Sequence[CameraVideo], out: Path | None, pictures: Path | None, again: bool,
+                  hand_file: Path | None) -> None:
+    """Refuse what cannot be written, before anything is tracked. Raises ExportError, RigError."""
+    named = [(option, path.resolve()) for option, path in (("--out", out), ("--overlay", pictures),
+                                                           ("--adapt", hand_file)) if path is not None]
+    for k, (option, path) in enumerate(named):
+        other = next((earlier for earlier, place in named[:k] if place == path), None)
+        if other is not None:
+            raise ExportError(f"{path}: {other} and {option} would both write it; give each a file of its own.")
+    for video in videos:
+        if out is not None:
+            check_table(video.path, out, again)
+        if pictures is not None:
+            check_pictures(video.path, pictures, again)
+    if hand_file is not None:
+        require_hand_place(hand_file)
+
+
 def check_table(video: Path, target: Path, again: bool) -> None:
-    """Refuse a table that cannot be written, before anything is tracked. Raises ExportError."""
-    if format_of(None, target) not in TABLES:
+    """Refuse a table that cannot be written. Raises ExportError."""
+    if target.suffix.lower() not in TABLES:
         raise ExportError(f"{target}: a bare hand is written as .csv, .parquet or .npz; rhot export has the other "
                           "formats for raw logs.")
     check_place(video, target, again)

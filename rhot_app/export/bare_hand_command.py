@@ -76,6 +76,7 @@ def run(args: argparse.Namespace) -> int:
         foreground = learn_backgrounds(empty)
     elif args.background_seconds is not None:
         empty_s = checked_seconds(args.background_seconds, "--background-seconds")
+        _check_empty(videos, empty_s)
         foreground = learn_backgrounds(videos, empty_s)
     line = ProgressLine("tracking")
     summary = track_videos(rig, videos, foreground, known_size=not args.unknown_size, empty_s=empty_s, out=args.out,
@@ -85,6 +86,20 @@ def run(args: argparse.Namespace) -> int:
                                      "hand_file": str(args.adapt) if args.adapt and summary.adapted else None}
     print(json.dumps(document) if args.json else "\n".join(sentences(document)))
     return 0
+
+
+def _check_empty(videos: Sequence[CameraVideo], seconds: float) -> None:
+    """Raises RecordingError where the videos cannot begin with so many seconds without a hand."""
+    from rhot_app.sources.frame_sets import overlap
+
+    if not seconds > 0.0:
+        raise RecordingError(f"--background-seconds {seconds:g}: give a number above 0, the seconds without a hand at "
+                             "the beginning.")
+    first, last = overlap(videos)
+    if round(1e9 * seconds) >= last - first:
+        raise RecordingError(f"--background-seconds {seconds:g}: the videos show only {1e-9 * (last - first):.2f} s "
+                             "together, so no time is left for the hand. Give fewer seconds, or videos of the empty "
+                             "scene with --background.")
 
 
 def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:

@@ -159,6 +159,12 @@ def test_videos_without_a_hand_say_so(recorded: Recorded, tmp_path: Path, capsys
     (("--offset-s", "right=100"), "no common time"), (("--out", "hand.bvh"), ".csv, .parquet or .npz"),
     (("--background-seconds", "0.01"), "two pictures without a hand"),
     (("--overlay", "nowhere/pictures"), "does not exist"),
+    (("--background-seconds", "2"), "only 1.07 s together"), (("--background-seconds", "0"), "a number above 0"),
+    (("--background-seconds=-1",), "a number above 0"),
+    (("--out", "hand.xyz"), ".csv, .parquet or .npz; rhot export"),
+    (("--adapt", "hand.csv", "--out", "hand.csv"), "--out and --adapt would both write it"),
+    (("--overlay", "hand.avi", "--adapt", "./hand.avi"), "--overlay and --adapt would both write it"),
+    (("--adapt", "nowhere/hand.json"), "does not exist"),
     (("--out", "nowhere/hand.csv"), "does not exist")])
 def test_mistakes_have_a_sentence(recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                   capsys: pytest.CaptureFixture[str], more: tuple[str, ...], says: str) -> None:
@@ -192,6 +198,25 @@ def test_an_existing_table_stays(recorded: Recorded, tmp_path: Path, capsys: pyt
     out.write_text("mine")
     assert main(recorded.arguments("--out", str(out))) == 2
     assert "--again" in capsys.readouterr().err and out.read_text() == "mine"
+
+
+def test_an_existing_film_stays(recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    film = tmp_path / "hand.avi"
+    film.write_text("mine")
+    assert main(recorded.arguments("--overlay", str(film))) == 2
+    assert "choose another --overlay" in capsys.readouterr().err and film.read_text() == "mine"
+
+
+@pytest.mark.parametrize("content", ["rig", "{broken", "[]"])
+def test_adapt_replaces_a_hand_file_alone(recorded: Recorded, tmp_path: Path, content: str,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text(recorded.rig.read_text() if content == "rig" else content)
+    before = path.read_text()
+    assert main(recorded.arguments("--adapt", str(path))) == 2
+    said = capsys.readouterr().err
+    assert f"{path}: " in said and "is no hand file" in said and path.read_text() == before
+    assert list(tmp_path.iterdir()) == [path], "nor is there a history"
 
 
 def test_an_interrupt_leaves_nothing(recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
