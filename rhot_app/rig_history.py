@@ -62,8 +62,8 @@ def require_hand_place(path: Path) -> None:
     except RigError as exc:
         raise RigError(f"{exc} It is no hand file and stays as it is; name another file for the hand.") from exc
     if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise RigError(f"{path}: it is there already, is no hand file ({FORMAT}), and stays as it is; name another file "
-                       "for the hand.")
+        raise RigError(f"{path}: it is there already, is no hand file ({FORMAT}), and stays as it is; name another "
+                       "file for the hand.")
 
 
 def _accept(path: Path, reason: str, same: Callable[[], bool], save: Callable[[], None]) -> Version | None:

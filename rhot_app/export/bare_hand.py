@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -41,14 +42,15 @@ _TEXT_RGB: Final = (255, 255, 255)
 class BareHandSummary:
     """What came of a run. `frame_sets`: states, one after every set of frames; `tracked` of them show the hand;
     `starts`: how often it was found; `lost`: intervals without a hand, s from the first state. `step_s` (K,): times
-    that the tracked steps took. `left_out`: frames outside the time that all videos show. `adapted`: the hand that was
-    written, None without."""
+    that the tracked steps took; `seconds`: the whole run, with reading, searching and drawing. `left_out`: frames
+    outside the time that all videos show. `adapted`: the hand that was written, None without."""
 
     frame_sets: int
     tracked: int
     starts: int
     lost: tuple[tuple[float, float], ...]
     step_s: NDArray[np.float64]
+    seconds: float
     left_out: int
     adapted: Adapted | None = None
 
@@ -56,7 +58,7 @@ class BareHandSummary:
         """The same for JSON."""
         steps = [None if not len(self.step_s) else float(np.quantile(self.step_s, q)) for q in (0.5, 0.99)]
         return {"frame_sets": self.frame_sets, "tracked": self.tracked / max(self.frame_sets, 1), "starts": self.starts,
-                "rate_hz": None if not steps[0] else 1.0 / steps[0],
+                "computed_per_s": self.frame_sets / self.seconds,
                 "step_p50_ms": None if steps[0] is None else 1e3 * steps[0],
                 "step_p99_ms": None if steps[1] is None else 1e3 * steps[1],
                 "lost_s": [list(one) for one in self.lost], "frames_left_out": self.left_out,
@@ -98,6 +100,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
     run = HandFollower(rig, foreground, known_size=known_size,
                        empty_until_ns=first + round(1e9 * empty_s) if empty_s else first)
     spent: list[tuple[int, bool]] = []
+    begun = time.perf_counter()
     with contextlib.ExitStack() as stack:
         table = stack.enter_context(_table(rig, videos[0].path.name, out)) if out is not None else None
         fps = 1e9 / min(video.period_ns for video in videos)
@@ -112,6 +115,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
                 drawn.add(side_by_side(run, frames, state))
         if table is not None:
             table.finish()
+    seconds = time.perf_counter() - begun
     adapted = None
     if hand_file is not None and run.key_frames.sufficient:
         adapted = adapt(rig.hand, run.key_frames.kept)
@@ -121,7 +125,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
                                   "videos tell too little of its lengths. Show it from all sides, and bend and spread "
                                   "every finger; a hand that is hardly tracked tells nothing.")
     return BareHandSummary(len(spent), sum(tracked for _, tracked in spent), run.starts, lost_intervals(spent),
-                           np.array(run.step_s), frames_left_out(videos), adapted)
+                           np.array(run.step_s), seconds, frames_left_out(videos), adapted)
 
 
 def lost_intervals(spent: Sequence[tuple[int, bool]]) -> tuple[tuple[float, float], ...]:

@@ -139,8 +139,10 @@ def sentences(document: dict[str, Any]) -> list[str]:
     else:
         times = document["starts"]
         out.append(f"A hand in {100 * tracked:.0f} % of them; found {times} time{'' if times == 1 else 's'}.")
-    if document["rate_hz"] is not None:
-        out.append(f"Rate: {document['rate_hz']:.1f} Hz; a frame set took {document['step_p50_ms']:.0f} ms (median), "
+    out.append(f"Computed: {document['computed_per_s']:.1f} frame sets a second overall, with reading, searching and "
+               "drawing.")
+    if document["step_p50_ms"] is not None:
+        out.append(f"Following the hand into the next set took {document['step_p50_ms']:.0f} ms (median), "
                    f"{document['step_p99_ms']:.0f} ms (99 %).")
     if document["lost_s"] and tracked:
         intervals = ", ".join(f"{begin:.2f} to {end:.2f}" for begin, end in document["lost_s"] if not math.isnan(end))

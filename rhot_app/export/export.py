@@ -103,7 +103,7 @@ def check_options(name: str | None, options: ExportOptions) -> None:
 
 
 def check_place(log: Path, out: Path, again: bool, option: str = "--out") -> None:
-    """Refuse before anything of a recording is tracked what cannot be written; `option` named it. Raises ExportError."""
+    """Refuse before anything is tracked what cannot be written; `option` named it. Raises ExportError."""
     if out.absolute() == log.absolute() or (out.exists() and log.exists() and out.samefile(log)):
         raise ExportError(f"{out} is the recording itself, which is never written over; choose another {option}.")
     if out.parent.exists() and not out.parent.is_dir():

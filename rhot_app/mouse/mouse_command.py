@@ -249,8 +249,8 @@ class _Outputs:
 
             p50, p99 = np.percentile(self._ages_ms, [50, 99])
             rate = (len(self._came_s) - 1) / max(self._came_s[-1] - self._came_s[0], 1e-9)
-            slow = (f" The mouse needs {LEAST_HZ:g} or more: this computer is too slow or too busy. Close other programs, "
-                    "or lower the nodes' frame rate; markers need less than a bare hand." if rate < LEAST_HZ else "")
+            slow = (f" The mouse needs {LEAST_HZ:g} or more: this computer is too slow or too busy. Close other "
+                    "programs; markers need less time than a bare hand." if rate < LEAST_HZ else "")
             _note(f"the last {len(self._ages_ms)} states: {rate:.1f} a second; from the hand to the cursor "
                   f"{p50:.0f} ms (p50), {p99:.0f} ms (p99).{slow}")
 
@@ -359,7 +359,8 @@ def _measure(args: argparse.Namespace) -> int:
 
     chosen = SetUp("contours", args.cameras, args.pictures, "back") if args.bare else SetUp(
         "markers", args.cameras, args.pictures)
-    figures = [measures(args.seed, PLACES if args.places is None else args.places, set_up=one, watch=lambda title: ProgressLine(f"rendering {title}"))
+    places = PLACES if args.places is None else args.places
+    figures = [measures(args.seed, places, set_up=one, watch=lambda title: ProgressLine(f"rendering {title}"))
                for one in dict.fromkeys((SetUp(pictures=args.pictures), chosen))]
     print(json.dumps(figures) if args.json else report(figures))
     return 0

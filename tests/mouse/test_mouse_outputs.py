@@ -142,7 +142,8 @@ def rhot_mouse(*arguments: str) -> subprocess.CompletedProcess[str]:
     (("--bare",), "--simulated and --measure"), (("--rig", "rig.json"), "for a --log"),
     (("--places", "3"), "for --measure"), (("--pictures", "--simulated"), "for --measure"),
     (("--seconds", "abc"), "abc is not a number above 0"), (("--gain", "-1"), "-1 is not a number above 0"),
-    (("--seed", "1.5"), "1.5 is not a whole number of 0 or more"), (("--log", "NONE"), "none"), (("--directory", "NONE"), "no engine is heard")])
+    (("--seed", "1.5"), "1.5 is not a whole number of 0 or more"), (("--log", "NONE"), "none"),
+    (("--directory", "NONE"), "no engine is heard")])
 def test_what_cannot_be_is_a_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path) -> None:
     done = rhot_mouse(*(str(tmp_path / "none") if one == "NONE" else one for one in arguments))
     assert done.returncode == 2 and words in done.stderr and not done.stdout
