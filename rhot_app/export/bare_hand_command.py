@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import RecordingError, input_file
+from rhot_app.errors import RecordingError, input_file, positive_number
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     background.add_argument("--background-seconds", default=None, metavar="S",
                             help="the videos show no hand for so long at their beginning (default: the background is "
                                  "not known, the hand is found by the colour of skin)")
-    parser.add_argument("--fps", type=float, default=None, metavar="N",
+    parser.add_argument("--fps", type=positive_number, default=None, metavar="N",
                         help="frames per second of ordinary videos, instead of what the files say")
     parser.add_argument("--offset-s", action="append", default=[], metavar="NAME=S",
                         help="seconds to add to a camera's times, where the videos did not begin together")

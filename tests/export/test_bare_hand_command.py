@@ -159,7 +159,7 @@ def test_videos_without_a_hand_say_so(recorded: Recorded, tmp_path: Path, capsys
 
 @pytest.mark.parametrize(("more", "says"), [
     (("--video", "top=x.avi"), "no camera 'top'"), (("--video", "left"), "give a camera and its value"),
-    (("--fps", "0"), "from 1 to 1000"), (("--offset-s", "left=soon"), "no number of seconds"),
+    (("--fps", "2000"), "from 1 to 1000"), (("--offset-s", "left=soon"), "no number of seconds"),
     (("--offset-s", "right=100"), "no common time"), (("--out", "hand.bvh"), ".csv, .parquet or .npz"),
     (("--background-seconds", "0.01"), "two pictures without a hand"),
     (("--overlay", "nowhere/pictures"), "does not exist"),
@@ -176,6 +176,13 @@ def test_mistakes_have_a_sentence(recorded: Recorded, tmp_path: Path, monkeypatc
     assert main(recorded.arguments(*more)) == 2
     assert says in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("rate", ["0", "abc"])
+def test_a_rate_is_a_number_above_0(recorded: Recorded, rate: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(recorded.arguments("--fps", rate))
+    assert f"--fps: {rate} is not a number above 0" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("content", "says"), [(None, "no such file"), (b"no video", "Is it a video"),
