@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import math
 from pathlib import Path
 
 
@@ -60,6 +62,17 @@ def input_file(text: str) -> Path:
     except ValueError as exc:
         raise RhotError(f"{path}: cannot be read (a file's name has no NUL).") from exc
     return path
+
+
+def positive_number(text: str) -> float:
+    """Type of a command's argument that is a number above 0, for argparse."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < 1e6:
+        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+    return value
 
 
 _losses: dict[str, str] = {}  # by file

@@ -13,9 +13,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rhot_app.errors import RigError
-from rhot_app.hand.anatomy import HandAnatomy, load_hand, save_hand
+from rhot_app.hand.anatomy import FORMAT, HandAnatomy, load_hand, save_hand
 from rhot_app.project import Rig, load_rig, save_rig
-from rhot_node.files import require_replaceable
+from rhot_node.files import read_json, require_replaceable, why
 
 KEPT = 50  # versions; the oldest go first
 
@@ -44,6 +44,26 @@ def accept(path: Path, rig: Rig, reason: str) -> Version | None:
 def accept_hand(path: Path, hand: HandAnatomy, reason: str) -> Version | None:
     """The same of a hand file."""
     return _accept(path, reason, lambda: load_hand(path) == hand, lambda: save_hand(path, hand))
+
+
+def require_hand_place(path: Path) -> None:
+    """Raises RigError unless a hand file can be written to `path`: its folder is there, and nothing else than a hand
+    file, which a person may have broken, stands there already."""
+    if not path.absolute().parent.is_dir():
+        raise RigError(f"{path}: the folder {path.parent} does not exist; create it first.")
+    try:
+        require_replaceable(path)
+    except (OSError, ValueError) as exc:
+        raise RigError(f"{path}: cannot be written ({why(exc)}).") from exc
+    if not path.exists():
+        return
+    try:
+        document = read_json(path, RigError)
+    except RigError as exc:
+        raise RigError(f"{exc} It is no hand file and stays as it is; name another file for the hand.") from exc
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise RigError(f"{path}: it is there already, is no hand file ({FORMAT}), and stays as it is; name another "
+                       "file for the hand.")
 
 
 def _accept(path: Path, reason: str, same: Callable[[], bool], save: Callable[[], None]) -> Version | None:

@@ -39,7 +39,7 @@ class End:
     def __init__(self, parent: int | None) -> None:
         """`parent` is the process id of the parent to end with; None: live on."""
         self._parent = parent
-        self._asked = False
+        self._asked, self._starting = False, True
         signal.signal(signal.SIGTERM, self._end)
         signal.signal(signal.SIGINT, self._end)
         if parent is not None:
@@ -51,7 +51,13 @@ class End:
         """Whether to end now; an interrupt raised inside a finaliser would be lost without this."""
         return self._asked or (self._parent is not None and os.getppid() != self._parent)
 
+    def started(self) -> None:
+        """From now on end in order; until then there is nothing to be put in order."""
+        self._starting = False
+
     def _end(self, _number: int, _frame: FrameType | None) -> None:
+        if self._starting:  # the compiler's calls back to Python would swallow an exception, and take many seconds
+            os._exit(0)
         if not self._asked:
             self._asked = True
             raise KeyboardInterrupt
@@ -166,6 +172,7 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
                       Reception(trust, offers, lambda: {**daemon.introduce(), **ports}))
         daemon.prepare()
         gc.freeze()
+        end.started()
         if trust is not None and not trust.masters:  # not before: a code is only for a node that has started
             _invite(settings, offers)
         width, height = daemon.size

@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     bare = parser.add_argument_group("a tracker without markers on a bare hand, without real time (docs/twin.md)")
     bare.add_argument("--bare-hand", action="store_true",
                       help="matched and mismatched hands, lost cameras, random starts; takes --seeds (default 10), "
-                           "--seconds (default 3), --seed, --logs and --json")
+                           "--seconds (from 2.5, default 3), --seed, --logs and --json")
     bare.add_argument("--cases", metavar="TEXT", default=None, help="only the cases whose names begin with TEXT")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -23,18 +24,17 @@ from rhot_app.export.states import BLOCK, states_of
 from rhot_app.handfit.adaptation import REASON, Adapted, adapt
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
-from rhot_app.rig_history import accept_hand
+from rhot_app.rig_history import accept_hand, require_hand_place
 from rhot_app.sources.frame_sets import CameraVideo, FrameSet, frame_sets, frames_left_out, overlap
 from rhot_app.state import HandState
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
-from rhot_node.files import require_replaceable, why
 
 Image = NDArray[np.uint8]
 
 BACKGROUND_PICTURES: Final = 16
 """Pictures of each camera from which its background is learnt: a pixel's noise is then known to 1/sqrt(2 n), 18 %."""
 
-TABLES: Final = ("csv", "parquet", "npz")
+TABLES: Final = (".csv", ".parquet", ".npz")
 _TEXT_RGB: Final = (255, 255, 255)
 
 
@@ -42,14 +42,15 @@ _TEXT_RGB: Final = (255, 255, 255)
 class BareHandSummary:
     """What came of a run. `frame_sets`: states, one after every set of frames; `tracked` of them show the hand;
     `starts`: how often it was found; `lost`: intervals without a hand, s from the first state. `step_s` (K,): times
-    that the tracked steps took. `left_out`: frames outside the time that all videos show. `adapted`: the hand that was
-    written, None without."""
+    that the tracked steps took; `seconds`: the whole run, with reading, searching and drawing. `left_out`: frames
+    outside the time that all videos show. `adapted`: the hand that was written, None without."""
 
     frame_sets: int
     tracked: int
     starts: int
     lost: tuple[tuple[float, float], ...]
     step_s: NDArray[np.float64]
+    seconds: float
     left_out: int
     adapted: Adapted | None = None
 
@@ -57,7 +58,7 @@ class BareHandSummary:
         """The same for JSON."""
         steps = [None if not len(self.step_s) else float(np.quantile(self.step_s, q)) for q in (0.5, 0.99)]
         return {"frame_sets": self.frame_sets, "tracked": self.tracked / max(self.frame_sets, 1), "starts": self.starts,
-                "rate_hz": None if not steps[0] else 1.0 / steps[0],
+                "computed_per_s": self.frame_sets / self.seconds,
                 "step_p50_ms": None if steps[0] is None else 1e3 * steps[0],
                 "step_p99_ms": None if steps[1] is None else 1e3 * steps[1],
                 "lost_s": [list(one) for one in self.lost], "frames_left_out": self.left_out,
@@ -92,24 +93,14 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
     table of the states (docs/export.md). `pictures`: an .avi or .mp4 file, or a folder of PNG files, with what was
     found. `hand_file`: where the rig's hand, adapted to the one that was found last, is written; what was there is kept
     beside it; a loss is noted where too little was seen of it (`errors.note_loss`). Files appear when they are whole.
-    Raises RecordingError, ExportError.
+    Raises RecordingError, ExportError, RigError.
     """
-    for video in videos:
-        if out is not None:
-            check_table(video.path, out, again)
-        if pictures is not None:
-            check_pictures(video.path, pictures, again)
-    if hand_file is not None:
-        try:
-            require_replaceable(hand_file)
-        except OSError as exc:
-            raise ExportError(f"--adapt {hand_file}: cannot be written ({why(exc)}).") from exc
-        if not hand_file.absolute().parent.is_dir():
-            raise ExportError(f"--adapt {hand_file}: the folder {hand_file.parent} does not exist; create it first.")
+    check_outputs(videos, out, pictures, again, hand_file)
     first, last = overlap(videos)
     run = HandFollower(rig, foreground, known_size=known_size,
                        empty_until_ns=first + round(1e9 * empty_s) if empty_s else first)
     spent: list[tuple[int, bool]] = []
+    begun = time.perf_counter()
     with contextlib.ExitStack() as stack:
         table = stack.enter_context(_table(rig, videos[0].path.name, out)) if out is not None else None
         fps = 1e9 / min(video.period_ns for video in videos)
@@ -124,6 +115,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
                 drawn.add(side_by_side(run, frames, state))
         if table is not None:
             table.finish()
+    seconds = time.perf_counter() - begun
     adapted = None
     if hand_file is not None and run.key_frames.sufficient:
         adapted = adapt(rig.hand, run.key_frames.kept)
@@ -133,7 +125,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
                                   "videos tell too little of its lengths. Show it from all sides, and bend and spread "
                                   "every finger; a hand that is hardly tracked tells nothing.")
     return BareHandSummary(len(spent), sum(tracked for _, tracked in spent), run.starts, lost_intervals(spent),
-                           np.array(run.step_s), frames_left_out(videos), adapted)
+                           np.array(run.step_s), seconds, frames_left_out(videos), adapted)
 
 
 def lost_intervals(spent: Sequence[tuple[int, bool]]) -> tuple[tuple[float, float], ...]:
@@ -154,9 +146,27 @@ def lost_intervals(spent: Sequence[tuple[int, bool]]) -> tuple[tuple[float, floa
 
 # -- What is written --------------------------------------------------------------------------------------------------
 
+def check_outputs(videos: Sequence[CameraVideo], out: Path | None, pictures: Path | None, again: bool,
+                  hand_file: Path | None) -> None:
+    """Refuse what cannot be written, before anything is tracked. Raises ExportError, RigError."""
+    named = [(option, path.resolve()) for option, path in (("--out", out), ("--overlay", pictures),
+                                                           ("--adapt", hand_file)) if path is not None]
+    for k, (option, path) in enumerate(named):
+        other = next((earlier for earlier, place in named[:k] if place == path), None)
+        if other is not None:
+            raise ExportError(f"{path}: {other} and {option} would both write it; give each a file of its own.")
+    for video in videos:
+        if out is not None:
+            check_table(video.path, out, again)
+        if pictures is not None:
+            check_pictures(video.path, pictures, again)
+    if hand_file is not None:
+        require_hand_place(hand_file)
+
+
 def check_table(video: Path, target: Path, again: bool) -> None:
-    """Refuse a table that cannot be written, before anything is tracked. Raises ExportError."""
-    if format_of(None, target) not in TABLES:
+    """Refuse a table that cannot be written. Raises ExportError."""
+    if target.suffix.lower() not in TABLES:
         raise ExportError(f"{target}: a bare hand is written as .csv, .parquet or .npz; rhot export has the other "
                           "formats for raw logs.")
     check_place(video, target, again)

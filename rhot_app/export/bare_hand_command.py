@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import RecordingError, input_file
+from rhot_app.errors import RecordingError, input_file, positive_number
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     background.add_argument("--background-seconds", default=None, metavar="S",
                             help="the videos show no hand for so long at their beginning (default: the background is "
                                  "not known, the hand is found by the colour of skin)")
-    parser.add_argument("--fps", type=float, default=None, metavar="N",
+    parser.add_argument("--fps", type=positive_number, default=None, metavar="N",
                         help="frames per second of ordinary videos, instead of what the files say")
     parser.add_argument("--offset-s", action="append", default=[], metavar="NAME=S",
                         help="seconds to add to a camera's times, where the videos did not begin together")
@@ -76,6 +76,7 @@ def run(args: argparse.Namespace) -> int:
         foreground = learn_backgrounds(empty)
     elif args.background_seconds is not None:
         empty_s = checked_seconds(args.background_seconds, "--background-seconds")
+        _check_empty(videos, empty_s)
         foreground = learn_backgrounds(videos, empty_s)
     line = ProgressLine("tracking")
     summary = track_videos(rig, videos, foreground, known_size=not args.unknown_size, empty_s=empty_s, out=args.out,
@@ -85,6 +86,20 @@ def run(args: argparse.Namespace) -> int:
                                      "hand_file": str(args.adapt) if args.adapt and summary.adapted else None}
     print(json.dumps(document) if args.json else "\n".join(sentences(document)))
     return 0
+
+
+def _check_empty(videos: Sequence[CameraVideo], seconds: float) -> None:
+    """Raises RecordingError where the videos cannot begin with so many seconds without a hand."""
+    from rhot_app.sources.frame_sets import overlap
+
+    if not seconds > 0.0:
+        raise RecordingError(f"--background-seconds {seconds:g}: give a number above 0, the seconds without a hand at "
+                             "the beginning.")
+    first, last = overlap(videos)
+    if round(1e9 * seconds) >= last - first:
+        raise RecordingError(f"--background-seconds {seconds:g}: the videos show only {1e-9 * (last - first):.2f} s "
+                             "together, so no time is left for the hand. Give fewer seconds, or videos of the empty "
+                             "scene with --background.")
 
 
 def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:
@@ -124,8 +139,10 @@ def sentences(document: dict[str, Any]) -> list[str]:
     else:
         times = document["starts"]
         out.append(f"A hand in {100 * tracked:.0f} % of them; found {times} time{'' if times == 1 else 's'}.")
-    if document["rate_hz"] is not None:
-        out.append(f"Rate: {document['rate_hz']:.1f} Hz; a frame set took {document['step_p50_ms']:.0f} ms (median), "
+    out.append(f"Computed: {document['computed_per_s']:.1f} frame sets a second overall, with reading, searching and "
+               "drawing.")
+    if document["step_p50_ms"] is not None:
+        out.append(f"Following the hand into the next set took {document['step_p50_ms']:.0f} ms (median), "
                    f"{document['step_p99_ms']:.0f} ms (99 %).")
     if document["lost_s"] and tracked:
         intervals = ", ".join(f"{begin:.2f} to {end:.2f}" for begin, end in document["lost_s"] if not math.isnan(end))

@@ -102,18 +102,18 @@ def check_options(name: str | None, options: ExportOptions) -> None:
         raise ExportError(f"{name} files are in {chosen.units}, as their readers expect; leave --units out.")
 
 
-def check_place(log: Path, out: Path, again: bool) -> None:
-    """Refuse before anything of a recording is tracked what cannot be written. Raises ExportError."""
+def check_place(log: Path, out: Path, again: bool, option: str = "--out") -> None:
+    """Refuse before anything is tracked what cannot be written; `option` named it. Raises ExportError."""
     if out.absolute() == log.absolute() or (out.exists() and log.exists() and out.samefile(log)):
-        raise ExportError(f"{out} is the recording itself, which is never written over; choose another --out.")
+        raise ExportError(f"{out} is the recording itself, which is never written over; choose another {option}.")
     if out.parent.exists() and not out.parent.is_dir():
-        raise ExportError(f"{out}: {out.parent} is not a folder; choose another --out.")
+        raise ExportError(f"{out}: {out.parent} is not a folder; choose another {option}.")
     if not out.parent.is_dir():
         raise ExportError(f"{out}: the folder {out.parent} does not exist; create it first.")
     if out.is_dir():
         raise ExportError(f"{out} is a folder; name a file in it.")
     if out.exists() and not again:
-        raise ExportError(f"{out} exists already; choose another --out, or write over it with --again.")
+        raise ExportError(f"{out} exists already; choose another {option}, or write over it with --again.")
 
 
 def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path, ready: Callable[[], None]) -> list[str]:

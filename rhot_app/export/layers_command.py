@@ -40,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="where the camera stands, degrees about the vertical and above the object (60,50)")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE",
                         help="the picture (.png, .jpg), or a film of one turn about the object (.avi, .mp4)")
+    parser.add_argument("--again", action="store_true", help="write over a file that exists")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
 
 
@@ -53,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
 
     bodies, names, angles = _posed(args.file, args.angle)
     azimuth, elevation = _eye(args.eye)
-    film = _is_film(args.out)
+    film = _is_film(args.out, again=args.again)
     announce_compilation("some seconds")
     placed = place(bodies, np.eye(4), angles)
     cameras = [_camera(bodies, placed, azimuth + turn, elevation) for turn in
@@ -104,7 +105,9 @@ def _posed(path: Path | None, wanted: list[str]) -> tuple[Bodies, tuple[str, ...
         bodies, layers = hand_bodies(surface_of(hand))
         names, angles, limits = ANGLES, pose_prior().mean.copy(), hand.limits
     for one in wanted:
-        name, _, value = one.partition("=")
+        name, equals, value = one.partition("=")
+        if not equals:
+            raise RigError(f"--angle {one}: give a name and its degrees, as in --angle {names[0]}=30.")
         if name not in names:
             raise RigError(f"--angle {one}: {path.name} has no angle {name!r}; it has {', '.join(names)}.")
         angles[names.index(name)] = np.radians(_number(f"--angle {one}", value))
@@ -136,11 +139,13 @@ def _eye(text: str) -> tuple[float, float]:
     return azimuth, elevation
 
 
-def _is_film(path: Path) -> bool:
+def _is_film(path: Path, *, again: bool) -> bool:
     if path.suffix not in (".png", ".jpg", ".avi", ".mp4"):
         raise RigError(f"--out {path}: a picture ends in .png or .jpg, a film in .avi or .mp4.")
     if not path.parent.is_dir():
         raise RigError(f"{path}: there is no folder {path.parent}. Make it first, or name another place.")
+    if path.exists() and not again:
+        raise RigError(f"{path} exists already; choose another --out, or write over it with --again.")
     return path.suffix in (".avi", ".mp4")
 
 

@@ -24,7 +24,7 @@ _CODECS: Final = {".avi": "MJPG", ".mp4": "mp4v"}
 def check_pictures(video: Path, target: Path, again: bool) -> None:
     """Refuse a film or a folder that cannot be written, before anything is tracked. Raises ExportError."""
     if target.suffix.lower() in _CODECS:
-        check_place(video, target, again)
+        check_place(video, target, again, "--overlay")
     elif target.exists():
         raise ExportError(f"{target} exists already; name a new folder for the pictures, or a film (.avi, .mp4).")
     elif not target.absolute().parent.is_dir():

@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
 
     rig = load_rig(args.rig) if args.rig else None
     hand = _wanted(args, rig.hand if rig else None)
-    _require_folders(args)
+    _require_places(args)
     if rig and isinstance(hand, Articulated):
         raise RigError(f"--rig {args.rig}: a rig tracks a rhot-hand, not a rhot-articulated object.")
     picture = _picture(hand) if args.draw else b""
@@ -113,7 +113,9 @@ def _read(path: Path | None) -> HandAnatomy | Articulated:
     return load_articulated(path) if rows else load_hand(path)
 
 
-def _require_folders(args: argparse.Namespace) -> None:
+def _require_places(args: argparse.Namespace) -> None:
+    if args.draw is not None and args.draw.suffix.lower() != ".png":
+        raise RigError(f"--draw {args.draw}: the picture is a PNG file; give it a name that ends in .png.")
     for path in (args.out, args.draw):
         if path is not None and not path.parent.is_dir():
             raise RigError(f"{path}: there is no folder {path.parent}. Make it first, or name another place.")

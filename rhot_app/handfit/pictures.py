@@ -38,6 +38,9 @@ def files_by_camera(rig: Rig, given: Sequence[str]) -> dict[int, Path]:
     found: dict[int, Path] = {}
     for place, text in enumerate(given):
         named = max((name for name in names if text.startswith(f"{name}=")), key=len, default=None)
+        other, equals, _ = text.partition("=")
+        if named is None and equals and Path(other).name == other and not Path(text).exists():
+            raise CalibrationError(f"{text}: there is no camera {other!r} in the rig; there are {', '.join(names)}.")
         if named is None and place >= len(names):
             raise CalibrationError(f"{text}: the rig has {len(names)} cameras ({', '.join(names)}), and this is one "
                                    "picture more.")

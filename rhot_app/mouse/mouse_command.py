@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import EngineError, OutputError, RecordingError, SimulatorError, input_file
+from rhot_app.errors import EngineError, OutputError, RecordingError, SimulatorError, input_file, positive_number
 
 if TYPE_CHECKING:
     from rhot_app.engine.client import EngineClient
@@ -29,6 +29,9 @@ LINE_S = 0.1
 
 MAX_AGES = 10_000
 """Number of last states whose ages are summarised at the end: a minute and a half at 120 states/s."""
+
+LEAST_HZ = 5.0
+"""states/s: with fewer, the half second of a hand's rest holds two of them at most."""
 
 PLACES = 20
 MOTION = "mouse"
@@ -67,10 +70,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="with --simulated or --measure: 1 leaves one camera, and the palm on a known plane "
                              "(default 2)")
     parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="of the simulated rig (default 1)")
-    parser.add_argument("--seconds", type=_positive, default=None, metavar="S", help="end after so long")
-    parser.add_argument("--gain", type=_positive, default=None, metavar="G",
+    parser.add_argument("--seconds", type=positive_number, default=None, metavar="S", help="end after so long")
+    parser.add_argument("--gain", type=positive_number, default=None, metavar="G",
                         help="metres of the cursor per metre of the palm (default 3)")
-    parser.add_argument("--height-gain", type=_positive, default=None, metavar="G",
+    parser.add_argument("--height-gain", type=positive_number, default=None, metavar="G",
                         help="metres of the cursor's height per metre of the finger (default 6)")
     parser.add_argument("--height-from", choices=("index", "palm"), default="index",
                         help="what sets the height: the index fingertip above the palm (default), or the palm itself")
@@ -83,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="print speed, coupling, resolution, buttons, latency, target test and pick-and-place on "
                              "the twin, of --bare or --cameras 1 beside those of markers with two cameras; takes "
                              "minutes, a bare hand an hour")
-    parser.add_argument("--places", type=_seed, default=PLACES, metavar="N",
+    parser.add_argument("--places", type=_seed, default=None, metavar="N",
                         help=f"how often --measure picks and places (default {PLACES})")
     parser.add_argument("--pictures", action="store_true",
                         help="let --measure render all images of markers; else only those of the speeds are rendered")
@@ -118,6 +121,8 @@ def _check(args: argparse.Namespace) -> None:
     """Raises OutputError when options contradict each other."""
     if args.measure and (args.simulated or args.log is not None or args.osc is not None or args.pointer):
         raise OutputError("--measure runs on the twin by itself; leave --simulated, --log, --osc and --pointer out.")
+    if not args.measure and (args.places is not None or args.pictures):
+        raise OutputError("--places and --pictures are for --measure, which is not there; add it, or leave them out.")
     if args.log is not None and (args.simulated or args.directory is not None or args.seconds is not None):
         raise OutputError("--log reads a recording to its end; leave --simulated, --directory and --seconds out.")
     if args.log is not None and (args.pointer or args.osc is not None):
@@ -200,6 +205,7 @@ class _Outputs:
 
         self._json, self._next_s, self._live_ms = args.json, 0.0, 1e3 * LIVE_S
         self._ages_ms: deque[float] = deque(maxlen=MAX_AGES)
+        self._came_s: deque[float] = deque(maxlen=MAX_AGES)
         self._pointer = self._osc = None
         if args.pointer:
             from rhot_app.mouse.system_pointer import SystemPointer
@@ -217,6 +223,7 @@ class _Outputs:
         age_ms = 1e-6 * (time.monotonic_ns() - mouse.t_master_ns)
         live = 0.0 <= age_ms < self._live_ms  # otherwise from a replayed log
         self._ages_ms.extend([age_ms] if live else [])
+        self._came_s.extend([time.monotonic()] if live else [])
         if self._osc is not None:
             from rhot_app.outputs.osc import bundles, mouse_messages
 
@@ -237,13 +244,16 @@ class _Outputs:
             print(line_of(mouse), flush=True)
 
     def close(self) -> None:
-        """Print the latency of the states."""
-        if self._ages_ms:
+        """Print the latency of the states, and how many came a second."""
+        if len(self._ages_ms) > 1:
             import numpy as np
 
             p50, p99 = np.percentile(self._ages_ms, [50, 99])
-            print(f"rhot: the last {len(self._ages_ms)} states: from the hand to the cursor {p50:.0f} ms (p50), "
-                  f"{p99:.0f} ms (p99).", file=sys.stderr)
+            rate = (len(self._came_s) - 1) / max(self._came_s[-1] - self._came_s[0], 1e-9)
+            slow = (f" The mouse needs {LEAST_HZ:g} or more: this computer is too slow or too busy. Close other "
+                    "programs; markers need less time than a bare hand." if rate < LEAST_HZ else "")
+            _note(f"the last {len(self._ages_ms)} states: {rate:.1f} a second; from the hand to the cursor "
+                  f"{p50:.0f} ms (p50), {p99:.0f} ms (p99).{slow}")
 
 
 def line_of(mouse: MouseState) -> str:
@@ -352,21 +362,15 @@ def _measure(args: argparse.Namespace) -> int:
 
     chosen = SetUp("contours", args.cameras, args.pictures, "back") if args.bare else SetUp(
         "markers", args.cameras, args.pictures)
-    figures = [measures(args.seed, args.places, set_up=one, watch=lambda title: ProgressLine(f"rendering {title}"))
+    places = PLACES if args.places is None else args.places
+    figures = [measures(args.seed, places, set_up=one, watch=lambda title: ProgressLine(f"rendering {title}"))
                for one in dict.fromkeys((SetUp(pictures=args.pictures), chosen))]
     print(json.dumps(figures) if args.json else report(figures))
     return 0
 
 
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < 1e6:
-        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
-    return value
-
-
 def _seed(text: str) -> int:
-    value = int(text)
+    value = int(text) if text.isdecimal() else -1
     if value < 0:
         raise argparse.ArgumentTypeError(f"{text} is not a whole number of 0 or more")
     return value

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rhot_app.errors import RecordingError, input_file
+from rhot_app.errors import RecordingError, input_file, positive_number
 from rhot_app.hand.landmarks import ANATOMY_SD_M, COMMON_M, LASTING_M, NOISE_M
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rig", type=input_file, required=True, metavar="FILE",
                         help="the calibrated rig, with the marker set landmarks21")
     parser.add_argument("--out", type=Path, required=True, metavar="LOG", help="the raw log to write; a new file")
-    parser.add_argument("--fps", type=float, default=None, metavar="N",
+    parser.add_argument("--fps", type=positive_number, default=None, metavar="N",
                         help="frames per second of tables without times")
     parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
 

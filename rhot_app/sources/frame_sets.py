@@ -1,6 +1,7 @@
 """Recorded videos of several cameras as frame sets: a picture of each camera near one instant, with its own time.
 
-Ordinary videos have the time of a frame by its number. The nodes' own recordings carry a time for every frame, which
+Ordinary videos have the time of a frame by its number, the twin's recordings of raw frames as they say. The nodes' own
+recordings carry a time for every frame, which
 the log beside them takes to the master's clock. Bytes are decoded as they are asked for; no video is kept in memory.
 """
 
@@ -22,7 +23,9 @@ from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import video_path
 from rhot_app.sources.clock import ClockEstimate
 from rhot_app.sources.replay import LogValidator
-from rhot_node.errors import VideoError
+from rhot_node.capture.yuv import HEADER_NAME, read_header, read_images
+from rhot_node.detect.image import to_bgr
+from rhot_node.errors import CameraError, VideoError
 from rhot_node.files import open_input, require_file, why
 from rhot_node.video.avi import Stamp, pictures_of, read_stamps
 
@@ -38,7 +41,7 @@ _CLOCK_EVERY_NS = 1_000_000_000
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraVideo:
     """One camera's video. `times_ns` (N,): mid-exposure of the middle row of every frame. `stamped`: the node wrote
-    these times, by its own clock until `on_master_clock`; else they are frame number / frame rate."""
+    these times, by its own clock until `on_master_clock`; else they are of a clock that all videos have."""
 
     camera: str
     path: Path
@@ -55,7 +58,8 @@ class CameraVideo:
         """(time ns, picture (H, W, 3) RGB) of every frame, or of those that are `wanted` (N,). Raises RecordingError
         where a frame has another size; a video that ends too early is noted as a loss."""
         chosen = np.ones(len(self.times_ns), np.bool_) if wanted is None else wanted
-        decode = self._stamped_pictures if self.stamped else self._pictures
+        decode = (self._raw_pictures if self.path.is_dir() else self._stamped_pictures if self.stamped
+                  else self._pictures)
         read = 0
         for k, picture in decode(chosen):
             read = k + 1
@@ -74,6 +78,10 @@ class CameraVideo:
                     return
                 picture = capture.retrieve()[1] if keep else None
                 yield k, None if picture is None else np.asarray(picture, np.uint8)
+
+    def _raw_pictures(self, chosen: NDArray[np.bool_]) -> Iterator[tuple[int, Image | None]]:
+        for k, image in enumerate(read_images(self.path)):
+            yield k, to_bgr(image) if chosen[k] else None
 
     def _stamped_pictures(self, chosen: NDArray[np.bool_]) -> Iterator[tuple[int, Image | None]]:
         with open_input(self.path) as file:
@@ -96,10 +104,13 @@ class CameraVideo:
 
 
 def open_video(node: RigNode, path: Path, fps: float | None = None) -> CameraVideo:
-    """The video of a camera of the rig. `fps`: of an ordinary video, instead of the rate that its file says.
+    """The video of a camera of the rig, a file or a folder of raw frames (``rhot-yuv``). `fps`: of an ordinary video,
+    instead of the rate that its file says.
 
     Raises RecordingError: no video, a picture of another size than the lens's, or no frame rate.
     """
+    if path.is_dir():
+        return _open_raw(node, path, fps)
     try:
         require_file(path)
         stamps = read_stamps(path) if path.suffix.lower() == ".avi" else ()
@@ -126,6 +137,23 @@ def open_video(node: RigNode, path: Path, fps: float | None = None) -> CameraVid
         raise RecordingError(f"{path}: it does not say how many frames it has. Write it anew with a video program.")
     times = np.round(1e9 / rate * np.arange(count)).astype(np.int64)
     return CameraVideo(node.name, path, node.intrinsics, times, False)
+
+
+def _open_raw(node: RigNode, folder: Path, fps: float | None) -> CameraVideo:
+    """A recording of raw frames, as ``rhot simulate`` writes. Raises RecordingError."""
+    if not (folder / HEADER_NAME).exists():
+        raise RecordingError(f"{folder}: this folder has no {HEADER_NAME}, so it is no recording of `rhot simulate`. "
+                             "Name a video, or one of the folders left and right of such a recording.")
+    if fps is not None:
+        raise RecordingError(f"{folder}: it has the time of every frame; leave --fps out.")
+    try:
+        header = read_header(folder)
+        next(read_images(folder))
+    except CameraError as exc:
+        raise RecordingError(str(exc)) from exc
+    _check_size(folder, node.name, (header.width, header.height), node.intrinsics)
+    later = round(0.5 * (header.height - 1) * header.row_time_ns) + round(1e9 * node.time_offset_s)
+    return CameraVideo(node.name, folder, node.intrinsics, np.array(header.times_ns, np.int64) + later, False)
 
 
 @contextlib.contextmanager

@@ -10,6 +10,7 @@ import contextlib
 import mmap
 import time
 from bisect import bisect_right
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Annotated, Final, Literal, Self
@@ -20,9 +21,9 @@ from msgspec import Meta
 
 from rhot_node.capture.camera import NS_PER_S, EndOfRecording, Frame, available_delay_ns, sleep_until
 from rhot_node.clock import NodeClock
-from rhot_node.detect.image import Plane, from_i420
+from rhot_node.detect.image import Plane, YuvImage, from_i420
 from rhot_node.errors import CameraError
-from rhot_node.files import open_input, read_document, read_input, write_document
+from rhot_node.files import open_input, read_document, read_input, require_file, write_document
 
 FORMAT: Final = "rhot-yuv"
 VERSION: Final = 1
@@ -203,6 +204,20 @@ def read_header(folder: Path) -> YuvHeader:
     if not header.times_ns:
         raise CameraError(f"{path}: the recording has no frames. Record it again.")
     return header
+
+
+def read_images(folder: Path) -> Iterator[YuvImage]:
+    """The images of the recording in `folder`, as views of the file. Raises CameraError."""
+    header = read_header(folder)
+    shape = len(header.times_ns), header.frame_bytes
+    try:
+        require_file(folder / FRAMES_NAME)
+        frames = np.memmap(folder / FRAMES_NAME, dtype=np.uint8, mode="r", shape=shape)
+    except (OSError, ValueError) as exc:
+        raise CameraError(f"{folder / FRAMES_NAME}: cannot be read as {shape[0]} frames ({exc}). "
+                          "Record it again.") from exc
+    for frame in frames:
+        yield from_i420(np.asarray(frame), header.width, header.height)
 
 
 def read_start_file(path: Path) -> int | None:

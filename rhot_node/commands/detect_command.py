@@ -9,15 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rhot_node.capture.paced import IMAGE_SUFFIXES, ImageFiles, ImageSource, VideoFile
-from rhot_node.capture.yuv import FRAMES_NAME, HEADER_NAME, read_header
+from rhot_node.capture.yuv import HEADER_NAME, read_images
 from rhot_node.detect.fast import FastDetector
-from rhot_node.detect.image import YuvImage, from_bgr, from_i420
+from rhot_node.detect.image import YuvImage, from_bgr
 from rhot_node.detect.reference import ReferenceDetector
 from rhot_node.errors import CameraError
-from rhot_node.files import require_file
 from rhot_node.markers import MarkerSet, load_markers
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
@@ -99,7 +96,7 @@ def _open(path: Path) -> tuple[Iterator[NamedImage], bool]:
     """The images of `path`, and whether they follow each other in time."""
     if path.is_dir():
         if (path / HEADER_NAME).exists():
-            return _recorded(path), True
+            return ((None, image) for image in read_images(path)), True
         files = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in IMAGE_SUFFIXES)
         if not files:
             raise CameraError(f"{path}: a folder without images ({', '.join(sorted(IMAGE_SUFFIXES))}).")
@@ -124,19 +121,6 @@ def _decoded(path: Path, source: ImageSource, names: list[str]) -> Iterator[Name
             index += 1
     finally:
         source.close()
-
-
-def _recorded(folder: Path) -> Iterator[NamedImage]:
-    header = read_header(folder)
-    shape = len(header.times_ns), header.frame_bytes
-    try:
-        require_file(folder / FRAMES_NAME)
-        frames = np.memmap(folder / FRAMES_NAME, dtype=np.uint8, mode="r", shape=shape)
-    except (OSError, ValueError) as exc:
-        raise CameraError(f"{folder / FRAMES_NAME}: cannot be read as {shape[0]} frames ({exc}). "
-                          "Record it again.") from exc
-    for frame in frames:
-        yield None, from_i420(np.asarray(frame), header.width, header.height)
 
 
 def _entry(seen: MarkerObservation) -> dict[str, Any]:

@@ -45,7 +45,7 @@ def test_a_film_turns_about_the_object(tmp_path, capsys):
 
 @pytest.mark.parametrize(("arguments", "sentence"), [
     (["--angle", "wink=3"], "has no angle 'wink'; it has first_mcp"),
-    (["--angle", "first_mcp"], "'' is no number of degrees"),
+    (["--angle", "first_mcp"], "as in --angle first_mcp"), (["--angle", "first_mcp="], "'' is no number of degrees"),
     (["--angle", "first_mcp=200"], "the limits of first_mcp are -10 and 95"),
     (["--from", "30"], "give two numbers"),
     (["--from", "30,89"], "between -85 and 85")])
@@ -61,6 +61,11 @@ def test_other_endings_and_missing_folders_are_refused(tmp_path, capsys):
     assert ".png or .jpg" in capsys.readouterr().err
     assert main(["layers", "--out", str(tmp_path / "none" / "layers.png")]) == 2
     assert "no folder" in capsys.readouterr().err
+    mine = tmp_path / "mine.png"
+    mine.write_text("mine")
+    assert main(["layers", FINGERS, "--out", str(mine)]) == 2
+    assert "--again" in capsys.readouterr().err and mine.read_text() == "mine"
+    assert main(["layers", FINGERS, "--out", str(mine), "--again"]) == 0 and cv2.imread(str(mine)) is not None
     nothing = tmp_path / "nothing.json"
     nothing.write_text(json.dumps({"format": "rhot-articulated", "version": 1, "name": "x", "root": {"name": "a"},
                                    "frames": []}))

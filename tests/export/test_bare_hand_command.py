@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.__main__ import main
 from rhot_app.barehand.follower import HandFollower
 from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.errors import RecordingError
 from rhot_app.export.bare_hand import lost_intervals
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.skeleton import JOINTS
@@ -24,6 +25,7 @@ from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, load_rig, sav
 from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
 from rhot_app.simulator.bare_hand.sequence import BareHandFrame, BareHandOptions, bare_hand_frames, bare_hand_rig
 from rhot_app.sources.frame_sets import frame_sets, frames_left_out, on_one_clock, open_video
+from rhot_node.capture.yuv import YuvWriter
 from rhot_node.detect.foreground import learn_background, skin_foreground
 from rhot_node.detect.image import from_bgr
 from rhot_node.video.avi import Stamp, append_picture, begin_video, encode_picture, finish_video
@@ -108,6 +110,7 @@ def test_a_hand_in_two_videos_is_a_table_and_a_film(recorded: Recorded, tmp_path
     np.testing.assert_allclose([float(row["time_s"]) for row in rows], np.arange(len(rows)) / FPS, atol=1e-6)
     tracked = [row["condition"] in ("TRACKING", "PARTIAL") for row in rows]
     assert said["tracked"] == pytest.approx(np.mean(tracked)) and any(tracked)
+    assert 0.0 < said["computed_per_s"] < 1e3 / said["step_p50_ms"], "searches and reading count, too"
     assert said["starts"] >= 1 and said["lost_s"][0][0] == 0.0
     for row, frame in [(rows[k], recorded.frames[k]) for k in np.flatnonzero(tracked)[:4]]:  # before it drifts
         middle = 1e-3 * np.array([float(row[f"joint_middle_mcp_{axis}_mm"]) for axis in "xyz"])
@@ -145,7 +148,8 @@ def test_videos_without_a_hand_say_so(recorded: Recorded, tmp_path: Path, capsys
     arguments = ["bare-hand", "--rig", str(recorded.rig), "--video", f"{name}={empty}", "--background",
                  f"{name}={path}"]
     assert main(arguments) == 0
-    assert "No hand was found" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "No hand was found" in said and "frame sets a second overall" in said
     out, mine = tmp_path / "hand.csv", tmp_path / "mine.json"
     assert main([*arguments, "--out", str(out), "--adapt", str(mine)]) == 3, "of what was asked for, a part is there"
     said = capsys.readouterr()
@@ -155,10 +159,16 @@ def test_videos_without_a_hand_say_so(recorded: Recorded, tmp_path: Path, capsys
 
 @pytest.mark.parametrize(("more", "says"), [
     (("--video", "top=x.avi"), "no camera 'top'"), (("--video", "left"), "give a camera and its value"),
-    (("--fps", "0"), "from 1 to 1000"), (("--offset-s", "left=soon"), "no number of seconds"),
+    (("--fps", "2000"), "from 1 to 1000"), (("--offset-s", "left=soon"), "no number of seconds"),
     (("--offset-s", "right=100"), "no common time"), (("--out", "hand.bvh"), ".csv, .parquet or .npz"),
     (("--background-seconds", "0.01"), "two pictures without a hand"),
     (("--overlay", "nowhere/pictures"), "does not exist"),
+    (("--background-seconds", "2"), "only 1.07 s together"), (("--background-seconds", "0"), "a number above 0"),
+    (("--background-seconds=-1",), "a number above 0"),
+    (("--out", "hand.xyz"), ".csv, .parquet or .npz; rhot export"),
+    (("--adapt", "hand.csv", "--out", "hand.csv"), "--out and --adapt would both write it"),
+    (("--overlay", "hand.avi", "--adapt", "./hand.avi"), "--overlay and --adapt would both write it"),
+    (("--adapt", "nowhere/hand.json"), "does not exist"),
     (("--out", "nowhere/hand.csv"), "does not exist")])
 def test_mistakes_have_a_sentence(recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                   capsys: pytest.CaptureFixture[str], more: tuple[str, ...], says: str) -> None:
@@ -166,6 +176,13 @@ def test_mistakes_have_a_sentence(recorded: Recorded, tmp_path: Path, monkeypatc
     assert main(recorded.arguments(*more)) == 2
     assert says in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("rate", ["0", "abc"])
+def test_a_rate_is_a_number_above_0(recorded: Recorded, rate: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(recorded.arguments("--fps", rate))
+    assert f"--fps: {rate} is not a number above 0" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("content", "says"), [(None, "no such file"), (b"no video", "Is it a video"),
@@ -192,6 +209,25 @@ def test_an_existing_table_stays(recorded: Recorded, tmp_path: Path, capsys: pyt
     out.write_text("mine")
     assert main(recorded.arguments("--out", str(out))) == 2
     assert "--again" in capsys.readouterr().err and out.read_text() == "mine"
+
+
+def test_an_existing_film_stays(recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    film = tmp_path / "hand.avi"
+    film.write_text("mine")
+    assert main(recorded.arguments("--overlay", str(film))) == 2
+    assert "choose another --overlay" in capsys.readouterr().err and film.read_text() == "mine"
+
+
+@pytest.mark.parametrize("content", ["rig", "{broken", "[]"])
+def test_adapt_replaces_a_hand_file_alone(recorded: Recorded, tmp_path: Path, content: str,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text(recorded.rig.read_text() if content == "rig" else content)
+    before = path.read_text()
+    assert main(recorded.arguments("--adapt", str(path))) == 2
+    said = capsys.readouterr().err
+    assert f"{path}: " in said and "is no hand file" in said and path.read_text() == before
+    assert list(tmp_path.iterdir()) == [path], "nor is there a history"
 
 
 def test_an_interrupt_leaves_nothing(recorded: Recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -238,6 +274,27 @@ def test_a_recording_of_a_node_has_its_own_times(tmp_path: Path) -> None:
     read = list(video.frames())
     assert [t for t, _ in read] == times
     assert [round(float(picture.mean()) / 8) for _, picture in read] == [0, 1, 2]
+
+
+def test_a_folder_of_raw_frames_has_its_own_times(tmp_path: Path) -> None:
+    rig, times = bare_hand_rig(width=64), [5_000_000, 45_000_000, 95_000_000]
+    lens = rig.nodes[0].intrinsics
+    with YuvWriter(tmp_path / "left", lens.width, lens.height, 4_000_000, 10_000) as writer:
+        for t_ns, picture in zip(times, shades(3, rig), strict=True):
+            image = from_bgr(picture)
+            writer.append(t_ns, np.concatenate([image.y.ravel(), image.u.ravel(), image.v.ravel()]))
+    (video,) = on_one_clock([open_video(rig.nodes[0], tmp_path / "left")], {})
+    read = list(video.frames())
+    assert [t for t, _ in read] == [t + 10_000 * (lens.height - 1) // 2 for t in times], "of the middle row"
+    assert [round(float(picture.mean()) / 8) for _, picture in read] == [0, 1, 2]
+
+
+@pytest.mark.parametrize(("header", "says"), [(None, "no recording of `rhot simulate`"), ("{}", "rhot-yuv")])
+def test_a_folder_that_is_no_recording_is_refused(tmp_path: Path, header: str | None, says: str) -> None:
+    if header is not None:
+        (tmp_path / "recording.json").write_text(header)
+    with pytest.raises(RecordingError, match=says):
+        open_video(bare_hand_rig(width=64).nodes[0], tmp_path)
 
 
 def test_recordings_of_two_nodes_need_their_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -87,6 +87,11 @@ def test_mistakes_are_sentences_and_write_nothing(arguments, complaint, tmp_path
     assert not out.exists()
 
 
+def test_a_drawing_of_another_kind_is_refused(tmp_path, capsys):
+    assert main(["hand", "--draw", str(tmp_path / "h.xyz")]) == 2
+    assert "ends in .png" in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
 def test_a_missing_folder_is_noticed_before_anything_is_written(tmp_path, capsys):
     out = tmp_path / "mine.json"
     assert main(["hand", "--out", str(out), "--draw", str(tmp_path / "nowhere" / "hand.png")]) == 2

@@ -21,7 +21,7 @@ from rhot_app.hand.model import build_model
 from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.handfit.adaptation import adapt
-from rhot_app.rig_history import accept_hand, versions
+from rhot_app.rig_history import accept_hand, require_hand_place, versions
 from rhot_app.simulator.scene.motion import load_motion
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground
 
@@ -135,6 +135,7 @@ def test_a_hand_file_keeps_what_it_was(tmp_path: Path) -> None:
     adapted = msgspec.structs.replace(hand, fingers={**hand.fingers, "thumb": thumb})
     save_hand(path, hand)
     assert "sd_mm" not in path.read_text(), "what is not known is left out, so that earlier programs read the file"
+    require_hand_place(path)  # which lets a hand file be replaced
     kept = accept_hand(path, adapted, "hand adapted while it was tracked")
     assert load_hand(path) == adapted
     assert kept is not None and load_hand(kept.path) == hand

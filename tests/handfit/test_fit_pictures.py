@@ -33,6 +33,18 @@ def test_pictures_are_in_the_order_of_the_cameras_or_named(files):
     assert set(read_instant(rig, [f"camera 2={second}"])) == {1}
 
 
+@pytest.mark.parametrize(("second", "choose"), [(-2.0, "a later one"), (9.0, "an earlier one")])
+def test_a_second_that_no_video_shows_is_refused(tmp_path, second, choose):
+    rig, _, images = drawn()
+    height, width = images[0].shape[:2]
+    writer = cv2.VideoWriter(str(tmp_path / "a.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (width, height))
+    for _ in range(3):
+        writer.write(images[0])
+    writer.release()
+    with pytest.raises(CalibrationError, match=choose):
+        read_instant(rig, [str(tmp_path / "a.avi")], second)
+
+
 def test_what_is_no_picture_of_a_camera_is_said(files, tmp_path):
     rig, (first, second) = files
     (tmp_path / "notes.txt").write_text("no picture")
@@ -42,6 +54,7 @@ def test_what_is_no_picture_of_a_camera_is_said(files, tmp_path):
                             ([str(tmp_path)], "cannot be read"),
                             ([str(tmp_path / "small.png")], "320 x 240 px.*calibrated at 640 x 480"),
                             ([first, second, first], "one picture more"),
+                            (["up=left.avi"], "there is no camera 'up'"),
                             ([first, f"camera 1={first}"], "two pictures"), ([], "No picture was given")):
         with pytest.raises(CalibrationError, match=sentence):
             read_instant(rig, given)

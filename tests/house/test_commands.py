@@ -23,7 +23,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot refine": ("LOG", "--rig", "--out", "--use", "--no-scale", "--json"),
     "rhot report": ("LOG", "--out", "--rig", "--directory"),
     "rhot video": ("collect", "LOG", "--rig", "--out", "--keep"),
-    "rhot layers": ("FILE", "--angle", "--from", "--out", "--json"),
+    "rhot layers": ("FILE", "--angle", "--from", "--out", "--again", "--json"),
     "rhot fit-hand": ("--rig", "--pictures", "--at", "--hand", "--save", "--settings"),
     "rhot recover": ("LOG", "--out", "--rig"),
     "rhot landmarks": ("CSV", "--rig", "--out", "--fps", "--json"),

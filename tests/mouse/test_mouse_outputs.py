@@ -115,6 +115,23 @@ def test_a_replayed_state_has_no_age(capsys) -> None:
     assert new["age_ms"] >= 0.0 and new["cursor_m"] is None and new["pressed"] == ["thumb"]
 
 
+@pytest.mark.parametrize(("every_s", "slow"), [(0.4, True), (0.1, False)])
+def test_the_last_line_says_whether_enough_states_came(every_s: float, slow: bool, capsys: pytest.CaptureFixture[str],
+                                                       monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = [100.0]
+    monkeypatch.setattr(mouse_command.time, "monotonic", lambda: now_s[0])
+    monkeypatch.setattr(mouse_command.time, "monotonic_ns", lambda: round(1e9 * now_s[0]))
+    with contextlib.ExitStack() as stack:
+        outputs = mouse_command._Outputs(argparse.Namespace(json=False, pointer=False, osc=None), stack)
+        for _ in range(11):
+            outputs.write(replace(mouse(), t_master_ns=round(1e9 * (now_s[0] - 0.05))))
+            now_s[0] += every_s
+        outputs.close()
+    said = capsys.readouterr().err
+    assert f"11 states: {1 / every_s:.1f} a second" in said and "50 ms (p50)" in said
+    assert ("too slow or too busy" in said) == slow
+
+
 def rhot_mouse(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-m", "rhot_app", "mouse", *arguments], capture_output=True, text=True,
                           check=False, cwd=ROOT)
@@ -123,7 +140,10 @@ def rhot_mouse(*arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(("arguments", "words"), [
     (("--osc", "nowhere"), "HOST:PORT"), (("--measure", "--pointer"), "leave --simulated"),
     (("--bare",), "--simulated and --measure"), (("--rig", "rig.json"), "for a --log"),
-    (("--log", "NONE"), "none"), (("--directory", "NONE"), "no engine is heard")])
+    (("--places", "3"), "for --measure"), (("--pictures", "--simulated"), "for --measure"),
+    (("--seconds", "abc"), "abc is not a number above 0"), (("--gain", "-1"), "-1 is not a number above 0"),
+    (("--seed", "1.5"), "1.5 is not a whole number of 0 or more"), (("--log", "NONE"), "none"),
+    (("--directory", "NONE"), "no engine is heard")])
 def test_contradictory_options_raise_an_error(arguments: tuple[str, ...], words: str, tmp_path: Path) -> None:
     done = rhot_mouse(*(str(tmp_path / "none") if one == "NONE" else one for one in arguments))
     assert done.returncode == 2 and words in done.stderr and not done.stdout

@@ -168,6 +168,26 @@ def test_a_lost_camera_is_reported_and_the_stream_goes_on_when_it_is_back(run_no
     assert code == 0 and "streaming -> fault" in err and "fault -> streaming" in err
 
 
+@pytest.mark.parametrize(("started", "said"), [(False, ""), (True, "in order")])
+def test_a_node_that_starts_ends_even_where_an_exception_is_swallowed(started: bool, said: str) -> None:
+    """As in the compiler's calls back to Python."""
+    program = f"""
+import os, signal
+from rhot_node.__main__ import End
+end = End(None)
+if {started}:
+    end.started()
+try:
+    os.kill(os.getpid(), signal.SIGTERM)
+except KeyboardInterrupt:
+    print("in order" if end.due() else "not asked")
+else:
+    print("alive")
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and done.stdout.strip() == said, done.stderr
+
+
 def test_it_ends_with_the_process_that_started_it(tmp_path: Path, recording: Path) -> None:
     arguments = [sys.executable, "-m", "rhot_node", "--settings", str(write_settings(tmp_path)), "--camera",
                  f"yuv:{recording}", "--loop", "--exit-with-parent"]

@@ -7,6 +7,8 @@ import sys
 import threading
 
 import pytest
+import shiboken6
+from PySide6.QtCore import QObject
 
 from rhot_app.errors import RigError
 from rhot_app.ui.common.job import Job
@@ -63,6 +65,23 @@ def test_a_cancelled_job_is_silent(qtbot, heard):
     assert job.wait(5.0)
     qtbot.wait(50)
     assert heard == [] and not job.running
+
+
+def test_a_job_that_outlives_its_window_ends_quietly(qtbot, heard, caplog):
+    gate, left = threading.Event(), threading.Event()
+
+    def op(progress):
+        gate.wait(5.0)
+        progress.report("half", 0.5)
+        left.set()
+
+    window = QObject()
+    job = Job(op, heard.append, heard.append, lambda *args: heard.append(args), window).start()
+    shiboken6.delete(window)
+    gate.set()
+    assert job.wait(5.0) and left.is_set()
+    qtbot.wait(50)
+    assert heard == [] and "a job failed" not in caplog.text
 
 
 def test_what_a_job_starts_is_not_as_nice_as_the_window():

@@ -33,7 +33,8 @@ def run(args: argparse.Namespace) -> int:
         _show(args, versions)
         return 0
     if not 1 <= args.restore <= len(versions):
-        raise RigError(f"{rig} has no version {args.restore}: {_count(versions)}.")
+        counted = "; counting begins at 1, the newest" if versions else ""
+        raise RigError(f"{rig} has no version {args.restore}: {_count(versions)}{counted}.")
     chosen = versions[args.restore - 1]
     rig_history.restore(rig, chosen)
     if args.json:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import logging
 import queue
@@ -9,7 +10,7 @@ import threading
 from collections.abc import Callable
 from typing import Any, ClassVar
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Qt, Signal, SignalInstance
 
 from rhot_app.errors import RhotError
 from rhot_node.errors import NodeError
@@ -88,7 +89,7 @@ class Job(QObject):
                  progress: Callable[[str, float], None] | None = None, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._op, self._done, self._failed, self._show = op, done, failed, progress
-        self.progress = Progress(self._reported.emit)
+        self.progress = Progress(lambda text, fraction: _emit(self._reported, text, fraction))
         queued = Qt.ConnectionType.QueuedConnection
         self._finished.connect(self._on_done, queued)
         self._broke.connect(self._on_failed, queued)
@@ -121,15 +122,15 @@ class Job(QObject):
         except CancelledError:
             return
         except (RhotError, NodeError, OSError) as exc:
-            self._broke.emit(str(exc))
+            _emit(self._broke, str(exc))
         except Exception as exc:
-            self._broke.emit(f"The program made a mistake ({type(exc).__name__}: {exc}). Please report it.")
+            _emit(self._broke, f"The program made a mistake ({type(exc).__name__}: {exc}). Please report it.")
             raise
         else:
-            self._finished.emit(result)
+            _emit(self._finished, result)
         finally:
             self._ended.set()
-            self._stopped.emit()
+            _emit(self._stopped)
 
     def _on_stopped(self) -> None:
         Job._under_way.discard(self)
@@ -145,3 +146,9 @@ class Job(QObject):
     def _on_progress(self, text: str, fraction: float) -> None:
         if self._show is not None and not self.progress.cancelled:
             self._show(text, fraction)
+
+
+def _emit(signal: SignalInstance, *values: object) -> None:
+    """Tell the window's thread, unless the window is gone and Qt has deleted the job with it."""
+    with contextlib.suppress(RuntimeError):
+        signal.emit(*values)

@@ -35,8 +35,9 @@ def read_instant(rig: Rig, given: Sequence[str], at_s: float = 0.0) -> dict[int,
     first, last = overlap(timed)
     wanted = first + round(1e9 * at_s)
     if not first <= wanted <= last:
+        beyond, choose = ("before", "a later") if wanted < first else ("beyond", "an earlier")
         raise CalibrationError(f"The videos show {1e-9 * (last - first):.2f} s together, and second {at_s:g} is "
-                               "beyond. Choose an earlier one.")
+                               f"{beyond} that. Choose {choose} one.")
     for camera, video in zip(videos, timed, strict=True):
         nearest = np.zeros(len(video.times_ns), np.bool_)
         nearest[int(np.argmin(np.abs(video.times_ns - wanted)))] = True

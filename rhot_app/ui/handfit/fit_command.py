@@ -36,20 +36,14 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.hand.anatomy import load_hand
     from rhot_app.handfit.session import HandFit, warm_up
     from rhot_app.project import load_rig
+    from rhot_app.rig_history import accept, require_hand_place
     from rhot_app.ui.handfit.files import read_instant
     from rhot_node.compiled import announce_compilation
-    from rhot_node.files import require_replaceable, why
 
     rig = load_rig(args.rig)
     hand = None if args.hand is None else load_hand(args.hand)
     if args.save is not None:
-        if not args.save.parent.is_dir():
-            raise CalibrationError(f"--save {args.save}: the folder {args.save.parent} does not exist; create it "
-                                   "first.")
-        try:
-            require_replaceable(args.save)
-        except OSError as exc:
-            raise CalibrationError(f"--save {args.save}: cannot be written ({why(exc)}).") from exc
+        require_hand_place(args.save)
     fit = HandFit(rig, hand)
     if len(args.at) > len(args.pictures):
         raise CalibrationError(f"--at names {len(args.at)} seconds, and --pictures was given {len(args.pictures)} "
@@ -62,7 +56,6 @@ def run(args: argparse.Namespace) -> int:
     warm_up(rig)
     from PySide6.QtWidgets import QApplication
 
-    from rhot_app.rig_history import accept
     from rhot_app.ui.app import choose_gl_platform
     from rhot_app.ui.common.settings import Settings
     from rhot_app.ui.common.theme import apply_theme, scheme_named

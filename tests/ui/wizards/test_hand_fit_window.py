@@ -418,6 +418,8 @@ def test_command_refusals_are_sentences_before_a_window_opens(tmp_path, capsys, 
             (["fit-hand", "--rig", str(tmp_path / "rig.json"), "--pictures", str(tmp_path / "rig.json")],
              "is not a picture"),
             ([*good, "--save", str(tmp_path / "none" / "hand.json")], "does not exist"),
+            ([*good, "--save", str(tmp_path / "rig.json")], "is no hand file"),
+            (["fit-hand", "--rig", str(tmp_path / "rig.json"), "--pictures", "up=left.avi"], "no camera 'up'"),
             ([*good, "--hand", str(tmp_path / "rig.json")], "rig.json")):
         assert main(arguments) == 2
         assert sentence in capsys.readouterr().err
