@@ -1,8 +1,8 @@
 """Recorded videos of several cameras as frame sets: a picture of each camera near one instant, with its own time.
 
-Ordinary videos have the time of a frame by its number, the twin's recordings of raw frames as they say. The nodes' own
-recordings carry a time for every frame, which
-the log beside them takes to the master's clock. Bytes are decoded as they are asked for; no video is kept in memory.
+In ordinary videos the time of a frame follows from its number; the twin's recordings of raw frames state it. The nodes'
+own recordings state it too, and the log beside them takes it to the master's clock. Frames are decoded as they are
+asked for; no video is kept in memory.
 """
 
 from __future__ import annotations
