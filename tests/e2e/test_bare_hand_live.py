@@ -94,6 +94,7 @@ def test_a_bare_hand_is_tracked_by_what_its_nodes_find(bench: Bench, capsys: pyt
             errors_mm.append(1e3 * float(np.median(np.linalg.norm(state.joint_positions - truth, axis=1))))
             ages_s.append(1e-9 * (t_received_ns - state.t_master_ns))
     before = [state for _, state in received if state.t_master_ns < t0_ns]
+    assert errors_mm, "the hand is tracked while it moves"
     rate_hz = len(errors_mm) * FPS / len(MOVING)
     with capsys.disabled():
         print(f"\nbare hand, live: median joint {np.median(errors_mm):.1f} mm, worst state {np.max(errors_mm):.1f} mm, "

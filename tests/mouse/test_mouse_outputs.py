@@ -6,12 +6,9 @@ import argparse
 import contextlib
 import json
 import os
-import signal
-import socket
 import struct
 import subprocess
 import sys
-import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -34,9 +31,6 @@ from rhot_app.state import Condition
 from rhot_node.files import write_document
 
 ROOT = Path(__file__).parents[2]
-
-BARE_S = 400.0
-"""After so long a hand that does not work the mouse fails the test; the command itself looks for it for 360 s."""
 
 
 def mouse(*cursor: float, pressed: tuple[str, ...] = ()) -> MouseState:
@@ -168,42 +162,3 @@ def test_a_recording_controls_the_mouse_as_the_hand_did(tmp_path: Path, capsys: 
     assert all(state["age_ms"] is None for state in states)
     assert mouse_command.run(parser.parse_args(asked)) == 0
     assert len(capsys.readouterr().out.splitlines()) == len(states)
-
-
-def test_the_simulated_hand_works_the_mouse_by_itself() -> None:
-    """Twin, nodes, engine and command as processes; the cursor moves, and OSC says the same."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
-        receiver.bind(("127.0.0.1", 0))
-        receiver.settimeout(1.0)
-        done = rhot_mouse("--simulated", "--seconds", "10", "--json", "--osc", f"127.0.0.1:{receiver.getsockname()[1]}")
-        heard = {message.address for message in OscBundle(receiver.recv(65536))}
-    assert done.returncode == 0, done.stderr
-    lines = [json.loads(line) for line in done.stdout.splitlines()]
-    cursors = np.array([line["cursor_m"] for line in lines if line["cursor_m"] is not None])
-    assert len(cursors) > 10 and np.ptp(cursors[:, 0]) > 0.05
-    assert "/rhot/mouse/buttons" in heard
-    assert "from the hand to the cursor" in done.stderr
-
-
-def test_the_simulated_bare_hand_works_the_mouse_live() -> None:
-    """The same without markers, before cameras that are not synchronised and have rolling shutters, for as long as a
-    busy machine needs."""
-    command = [sys.executable, "-m", "rhot_app", "mouse", "--simulated", "--bare", "--json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT) as running:
-        late = threading.Timer(BARE_S, running.kill)
-        late.start()
-        places, moved_m = [], 0.0
-        for line in running.stdout:
-            cursor = json.loads(line)["cursor_m"]
-            if cursor is not None:
-                places.append(cursor[0])
-                moved_m = max(places) - min(places)
-            if moved_m > 0.05:
-                running.send_signal(signal.SIGINT)
-                break
-        _, notes = running.communicate()
-        late.cancel()
-    assert moved_m > 0.05 and len(places) > 10, notes
-    assert running.returncode == 0, notes
-    for stage in ("a simulated rig and an engine start", "learn the empty scene", "looked for", "is tracked"):
-        assert stage in notes

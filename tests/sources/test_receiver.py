@@ -110,7 +110,8 @@ def test_a_flood_waits_in_the_buffer_and_nothing_is_lost() -> None:
     # A sender that is interrupted between reading the clock and sending looks late; that is told, and nothing is lost.
     late = receiver.door.dropped.get("time", 0) + receiver.door.dropped.get("clock_in_doubt", 0)
     assert late < 400
-    assert (receiver.door.accepted, receiver.door.sequence.lost, receiver.overflowed) == (4000 - late, late, 0)
+    assert (receiver.door.accepted, receiver.overflowed) == (4000 - late, 0)
+    assert receiver.door.sequence.lost <= late  # none of them, if they were the first or the last
     receiver.close()
 
 
