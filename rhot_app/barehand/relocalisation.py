@@ -8,12 +8,13 @@ until that search finds the hand that is tracked.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.silhouette import CORRELATED, LogOddsMaps, log_odds_maps, score
-from rhot_app.barehand.start import STEP, find_in_maps, settle
+from rhot_app.barehand.silhouette import LogOddsMaps, log_odds_maps, score
+from rhot_app.barehand.start import STEP, find_hand, log_odds, settle
 from rhot_app.barehand.surface import SHAPE, Surface
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import forward
@@ -26,10 +27,10 @@ Array = NDArray[np.float64]
 ForegroundMaps = Sequence[NDArray[np.float32] | None]
 """Foreground probabilities (h, w) of every STEP-th pixel of each camera, None of a camera without an image."""
 
-RELOCALISATION_LOG_ODDS = 20.0
-"""Log odds by which another pose must be better than the predicted one: twice what the surface's own error changes them
-by. By estimate, 0.5 mm along each side of a finger and 1 mm along the palm (`contour_residual.COMMON`) are 10 before
-two cameras."""
+RELOCALISATION_LOG_ODDS = 7.0
+"""Log odds by which another pose must be better than the predicted one: what the surface's own error changes them by.
+By estimate, that is 0.5 mm along each side of a finger and 1 mm along the palm (`contour_residual.COMMON`), before two
+cameras. A wrongly bent finger changes them by 12 at 0.5 m."""
 
 LOCAL_SEARCH_S = 0.2
 """s: interval of the searches about the prediction, and so the longest time of a wrong pose that they correct. Chosen:
@@ -46,12 +47,21 @@ Neighbouring knuckles are so far apart in the hand files."""
 SAME_HAND_M = 0.1
 """m: palms of one hand are nearer to each other: a hand's breadth."""
 
-ODDS_DROP = 0.3
+ODDS_DROP = 0.25
 """Log odds per pixel below their average at which a search is due at once: a twentieth of the hand, half a finger, off
-the foreground (`silhouette.MISLABELLED`: 5.9 for each of its pixels)."""
+the foreground (`silhouette.MISLABELLED`: 5 for each of its pixels)."""
 
 ODDS_SMOOTHING = 0.1
 """Weight of a new image in that average. Chosen: ten images, a third of a second at 30 a second."""
+
+
+class Relocalisation(NamedTuple):
+    """Result of a search: a better `state` (n,) than the predicted one, None without any; whether it begins a track
+    `anew`, at rest and with the file's shape; whether the whole image has the `same` hand as the prediction."""
+
+    state: Array | None
+    anew: bool
+    same: bool
 
 
 class Relocaliser:
@@ -96,7 +106,8 @@ class Relocaliser:
         if same:
             self._global_s = np.inf
         elif relocalised:
-            self._global_s, self._interval_s = t_s + GLOBAL_SEARCH_S[0], GLOBAL_SEARCH_S[0]
+            self._global_s = min(self._global_s, t_s + GLOBAL_SEARCH_S[0])
+            self._interval_s = GLOBAL_SEARCH_S[0]
 
     def average(self, odds_per_pixel: float, *, first: bool) -> None:
         """Take the log odds per pixel of one estimate into the average, or begin it with them."""
@@ -112,55 +123,51 @@ class Relocaliser:
                              [self.cameras[c].intrinsics for c in used])
 
     def log_odds(self, odds: LogOddsMaps, state: Array) -> float:
-        """Log odds of the hand in `state` by the foreground (`silhouette.score`)."""
+        """Log odds of the hand in `state` by the foreground (`silhouette.score`) and the pose prior, up to a
+        constant."""
         pose = pose_of(state)
-        return score(self.surface, pose.world_from_palm, pose.angles, state[BIAS:BIAS + SHAPE], odds)[0]
+        return log_odds(self.surface, pose.world_from_palm, pose.angles, self.model, state[BIAS:BIAS + SHAPE], odds)
 
     def log_odds_per_pixel(self, odds: LogOddsMaps, state: Array) -> float:
-        """The same, without the forearm's, per pixel of the hand."""
+        """Log odds by the foreground per pixel of the hand, without the forearm's."""
         pose = pose_of(state)
         _, parts = score(self.surface, pose.world_from_palm, pose.angles, state[BIAS:BIAS + SHAPE], odds)
-        return float((parts[:, 0] - parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
-
-    def log_prior(self, state: Array) -> float:
-        """Log probability density of the joint angles in `state`, up to a constant."""
-        prior, angles = self.model.pose_prior, state[ANGLES:VELOCITY]
-        return -0.5 * float((angles - prior.mean) @ prior.information @ (angles - prior.mean))
+        return float((parts[:, 0] + parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
 
     # -- where ---------------------------------------------------------------------------------------------------------
 
     def search_globally(self, maps: ForegroundMaps, size: Array, rng: np.random.Generator) -> HandPose | None:
         """The most probable hand of `size` (SHAPE,) anywhere in foreground maps; None without any."""
-        found = find_in_maps(maps, self.cameras, self.model, self.surface, size, rng, 1, self.plane)
-        return found[0].pose if found else None
+        return find_hand(maps, self.cameras, self.model, self.surface, size, rng, self.plane)
 
     def relocalise(self, maps: ForegroundMaps, prediction: tuple[Array, Array], stationary: Array, dt_s: float,
-                   everywhere: bool = False) -> tuple[Array | None, bool]:
+                   everywhere: bool = False) -> Relocalisation:
         """Search for a pose that is better than the predicted one by RELOCALISATION_LOG_ODDS.
 
         `prediction`: state and covariance (n, n). The search reaches as far as hands move in `dt_s`, s, by the motion's
-        `stationary` covariance (n, n). `everywhere`: the whole image too; there, what is farther away than SAME_HAND_M
-        is another hand. Returns the better state or None, and whether the whole image has the same hand as the
-        prediction. Only `rng` changes, so it may run in a thread.
+        `stationary` covariance (n, n). `everywhere`: the whole image too. The shape of a hand that was tracked in a
+        wrong pose is wrong, so what is found there begins anew. Only `rng` changes, so it may run in a thread.
         """
         (state, covariance), odds, old = prediction, self.odds_of(maps), pose_of(prediction[0])
         size, pace = state[BIAS:BIAS + SHAPE].copy(), FASTEST / np.sqrt(3.0) * dt_s
         spread = covariance[:POSE, :POSE] + pace**2 * stationary[:POSE, :POSE]
-        world, angles, value = settle(self.surface, old.world_from_palm, old.angles, spread, self.model, size, odds,
-                                      self.rng, self.plane)
-        least = self.log_odds(odds, state) / CORRELATED + RELOCALISATION_LOG_ODDS
-        best = _with_pose(state, HandPose(world, angles)) if value > least else None
-        pose = self.search_globally(maps, size, self.rng) if everywhere else None
+        world, angles = settle(self.surface, old.world_from_palm, old.angles, spread, self.model, size, odds,
+                                  self.rng, self.plane)
+        best, least = None, self.log_odds(odds, state) + RELOCALISATION_LOG_ODDS
+        moved = _with_pose(state, HandPose(world, angles))
+        if (value := self.log_odds(odds, moved)) > least:
+            best, least = moved, value
+        pose = self.search_globally(maps, np.zeros(SHAPE), self.rng) if everywhere else None
         if pose is None:
-            return best, False
-        apart = forward(self.model, pose).joints - forward(self.model, old).joints
-        if np.linalg.norm(apart, axis=1).max() < SAME_POSE_M:
-            return best, True
-        other, prior = _with_pose(state, pose), self.log_prior(state)
-        gains = [self.log_odds(odds, one) / CORRELATED + self.log_prior(one) - prior
-                 for one in (other, state if best is None else best)]
-        near = np.linalg.norm(apart.mean(axis=0)) < SAME_HAND_M
-        return (other if near and gains[0] > max(gains[1], least) else best), False
+            return Relocalisation(best, False, False)
+        joints = [forward(self.model, one).joints for one in (pose, old, HandPose(world, angles))]
+        if any(np.linalg.norm(joints[0] - one, axis=1).max() < SAME_POSE_M for one in joints[1:]):
+            return Relocalisation(best, False, True)
+        other = _with_pose(state, pose)
+        other[VELOCITY:] = 0.0
+        if self.log_odds(odds, other) > least:
+            return Relocalisation(other, True, False)
+        return Relocalisation(best, False, False)
 
 
 def pose_of(state: Array) -> HandPose:

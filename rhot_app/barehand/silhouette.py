@@ -1,9 +1,9 @@
 """The log odds of a posed hand by the foreground of small images: a fast score for many poses, and a search with it.
 
-The score sums, over the pixels of the hand, the log odds that they are foreground, and over a ring about it the log
-odds that they are not. The ring is left out where the forearm may be, because the wrist bends. Other pixels do not
-count. The search samples poses from a Gaussian and adapts it to the better ones (CMA-ES, Hansen, "The CMA Evolution
-Strategy: A Tutorial", arXiv:1604.00772).
+The score is the logarithm of a likelihood ratio: pixels on the hand are foreground and pixels in a ring about it are
+background, against images in which every pixel is foreground with the same probability. Where the forearm may be there
+is no ring, because the wrist bends. Other foreground does not count. The search samples poses from a Gaussian and
+adapts it to the better ones (CMA-ES, Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772).
 """
 
 from __future__ import annotations
@@ -53,25 +53,31 @@ _U0, _V0, _U1, _V1, _R0, _R1, _DU, _DV, _PER_SQUARE = range(9)
 
 
 class LogOddsMaps(NamedTuple):
-    """Log odds of the foreground: `values` (C, h, w) of every `step`-th pixel of C images; `poses` (C, 3, 4) and
-    `intrinsics` (C, 9) of their cameras. Smaller images are padded with 0."""
+    """Of every `step`-th pixel of C images: log likelihood ratios (C, h, w) of lying `inside` and `outside` a hand or a
+    bare forearm against lying anywhere; `poses` (C, 3, 4) and `intrinsics` (C, 9) of their cameras. Smaller images are
+    padded with 0."""
 
-    values: Array
+    inside: Array
+    outside: Array
     step: int
     poses: Array
     intrinsics: Array
 
 
-def log_odds_maps(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequence[Array],
-                intrinsics: Sequence[Array]) -> LogOddsMaps:
-    """Log odds of foreground probabilities (h, w) of each camera (`foreground_map`); 0 where these are NaN, not
-    known."""
+def log_odds_maps(maps: Sequence[NDArray[np.float32]], step: int, poses: Sequence[Array], intrinsics: Sequence[Array],
+                  rate: float | None = None) -> LogOddsMaps:
+    """From foreground probabilities (h, w) of each camera (`foreground_map`); 0 where these are NaN, not known.
+    `rate`: probability that a pixel anywhere is foreground; by default that of the whole image."""
     height, width = max(one.shape[0] for one in maps), max(one.shape[1] for one in maps)
-    odds = np.zeros((len(maps), height, width))
+    inside, outside = np.zeros((2, len(maps), height, width))
     for camera, one in enumerate(maps):
-        sure = MISLABELLED + (1.0 - 2.0 * MISLABELLED) * np.asarray(one, dtype=np.float64)
-        odds[camera, :one.shape[0], :one.shape[1]] = np.nan_to_num(np.log(sure / (1.0 - sure)))
-    return LogOddsMaps(odds, step, np.array(poses), np.array(intrinsics))
+        own = np.s_[camera, :one.shape[0], :one.shape[1]]
+        foreground = MISLABELLED + (1.0 - 2.0 * MISLABELLED) * np.asarray(one, dtype=np.float64)
+        part = rate if rate is not None else float(np.nanmean(one)) if np.isfinite(one).any() else 0.5
+        unknown = part * foreground + (1.0 - part) * (1.0 - foreground)
+        inside[own] = np.nan_to_num(np.log(foreground / unknown))
+        outside[own] = np.nan_to_num(np.log((1.0 - foreground) / unknown))
+    return LogOddsMaps(inside, outside, step, np.array(poses), np.array(intrinsics))
 
 
 @njit(cache=True)
@@ -129,7 +135,7 @@ def _covers(circles, column, row):
 
 
 @njit(cache=True)
-def _arm(world, wrist, thick, bend, odds, step, pose, intrinsics, mask, a, b, slope):
+def _arm(world, wrist, thick, bend, inside, step, pose, intrinsics, mask, a, b, slope):
     """Sum of the log odds on the forearm, where the hand does not hide it; `bend` (2,) rad: the wrist's flexion and
     deviation."""
     along, p = np.empty(3), np.empty(3)
@@ -154,13 +160,13 @@ def _arm(world, wrist, thick, bend, odds, step, pose, intrinsics, mask, a, b, sl
                 across = 0.4 * j * wide / max(length, 1e-9)
                 row, column = int(np.floor(v + across * du + 0.5)), int(np.floor(u - across * dv + 0.5))
                 if 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1] and mask[row, column] != 1:
-                    total += 0.4 * wide * length * odds[row, column]
+                    total += 0.4 * wide * length * inside[row, column]
         b[0], b[1], begun = u, v, True
     return total
 
 
 @njit(cache=True)
-def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, parts):
+def _score(surface, world, angles, size, inside, outside, step, poses, intrinsics, mask, parts):
     """Log odds of a pose. Fill `parts` (C, 3): for each camera the sum of log odds on the hand, the number of its
     pixels with known foreground, and the sum of log odds in the ring. `mask` (h, w) must be 0 and is 0 again
     afterwards."""
@@ -175,7 +181,7 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
         if surface.group[k] == FOREARM:
             thick = max(thick, radii[k, 0])
     circles, cone, box = np.empty(9), np.empty(9), np.empty(4, np.int64)
-    for camera in range(odds.shape[0]):
+    for camera in range(inside.shape[0]):
         pose, lens = poses[camera], intrinsics[camera]
         box[0], box[1], box[2], box[3] = mask.shape[0], -1, mask.shape[1], -1
         for k in range(count):
@@ -194,19 +200,19 @@ def _score(surface, world, angles, size, odds, step, poses, intrinsics, mask, pa
         arm = _project_capsule(wrist, wrist + end * (elbow - wrist), thick, thick + end * ARM_M * ARM_SPREAD, pose,
                                lens, step, a, b, slope, cone)
         for n in range(BENDS.shape[0]):
-            arms[n] += _arm(world, wrist, thick, BENDS[n], odds[camera], step, pose, lens, mask, a, b, slope)
+            arms[n] += _arm(world, wrist, thick, BENDS[n], inside[camera], step, pose, lens, mask, a, b, slope)
         own = ring = area = 0.0
         for row in range(box[0], box[1] + 1):
             for column in range(box[2], box[3] + 1):
-                value, o = mask[row, column], odds[camera, row, column]
+                value = mask[row, column]
                 mask[row, column] = 0
-                if value == 1 and o != 0.0:  # 0: not known
-                    own += o
+                if value == 1 and inside[camera, row, column] != 0.0:  # 0: not known
+                    own += inside[camera, row, column]
                     area += 1.0
                 elif value == 2 and not (arm and _covers(cone, column, row)):
-                    ring += o
+                    ring += outside[camera, row, column]
         parts[camera, 0], parts[camera, 1], parts[camera, 2] = own, area, ring
-        total += own - ring
+        total += own + ring
     return total + max(arms.max(), 0.0)  # a sleeved forearm is background and costs nothing
 
 
@@ -228,29 +234,29 @@ def score(surface: Surface, world: Array, angles: Array, size: Array, odds: LogO
     The three are the sum of log odds on the hand, the number of its pixels with known foreground, and the sum of log
     odds in the ring.
     """
-    parts = np.zeros((len(odds.values), 3))
-    mask = np.zeros(odds.values.shape[1:], np.uint8)
-    return float(_score(surface, world, angles, size, odds.values, odds.step, odds.poses, odds.intrinsics, mask,
-                        parts)), parts
+    parts = np.zeros((len(odds.inside), 3))
+    mask = np.zeros(odds.inside.shape[1:], np.uint8)
+    return float(_score(surface, world, angles, size, odds.inside, odds.outside, odds.step, odds.poses,
+                        odds.intrinsics, mask, parts)), parts
 
 
 @njit(cache=True, nogil=True)  # it takes long, and a thread must receive frames meanwhile
-def _score_many(surface, world, angles, steps, limits, size, odds, step, poses, intrinsics, scores):
-    mask, parts = np.zeros(odds.shape[1:], np.uint8), np.zeros((odds.shape[0], 3))
+def _score_many(surface, world, angles, steps, limits, size, inside, outside, step, poses, intrinsics, scores):
+    mask, parts = np.zeros(inside.shape[1:], np.uint8), np.zeros((inside.shape[0], 3))
     moved, turned = np.empty((4, 4)), np.empty(21)
     for n in range(steps.shape[0]):
         move(world, angles, steps[n], moved, turned)
         for i in range(21):
             turned[i] = min(max(turned[i], limits[i, 0]), limits[i, 1])
-        scores[n] = _score(surface, moved, turned, size, odds, step, poses, intrinsics, mask, parts)
+        scores[n] = _score(surface, moved, turned, size, inside, outside, step, poses, intrinsics, mask, parts)
 
 
 def score_steps(surface: Surface, world: Array, angles: Array, steps: Array, limits: Array, size: Array,
                 odds: LogOddsMaps) -> Array:
     """(N,) scores of the hand moved by `steps` (N, 27) of twist and angles; angles stay within `limits` (21, 2)."""
     scores = np.empty(len(steps))
-    _score_many(surface, world, angles, np.ascontiguousarray(steps), limits, size, odds.values, odds.step,
-                odds.poses, odds.intrinsics, scores)
+    _score_many(surface, world, angles, np.ascontiguousarray(steps), limits, size, odds.inside, odds.outside,
+                odds.step, odds.poses, odds.intrinsics, scores)
     return scores
 
 

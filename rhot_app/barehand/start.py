@@ -8,7 +8,6 @@ each of the best selects those for a long one.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import cv2
@@ -16,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rhot_app.barehand.silhouette import LogOddsMaps, log_odds_maps, score_steps, search
+from rhot_app.barehand.silhouette import CORRELATED, LogOddsMaps, log_odds_maps, score, score_steps, search
 from rhot_app.barehand.surface import Surface
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS, HandPose
-from rhot_node.detect.foreground import Foreground, foreground_map
 
 Array = NDArray[np.float64]
+_Candidate = tuple[float, Array, Array]  # a score, world_from_palm and angles
 
 STEP = 8
 """px: spacing of the pixels of the foreground map."""
@@ -56,43 +55,31 @@ _SPREAD = 0.03, 0.35, 0.35  # m, rad, rad: prior standard deviations about a sco
 _PALM_RADIUS = 0.36, 1.7  # bounds, relative to half the palm's breadth; from the side, it is half as thick
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
-    """A candidate pose and its score (`silhouette.search`); more is better."""
+def find_hand(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequence[CameraModel], model: HandModel,
+              surface: Surface, size: Array, rng: np.random.Generator, plane: PalmOnPlane | None = None
+              ) -> HandPose | None:
+    """The most probable pose in foreground probabilities (h, w) of every STEP-th pixel of some cameras, None of one
+    without an image. `plane`: on which the palm lies.
 
-    pose: HandPose
-    score: float
-
-
-def find_hand(images: Sequence[NDArray[np.uint8] | None], cameras: Sequence[CameraModel],
-              foreground: Sequence[Foreground], model: HandModel, surface: Surface, size: Array,
-              rng: np.random.Generator, most: int = 3, plane: PalmOnPlane | None = None) -> list[Found]:
-    """The most probable poses in images (H, W, 3) RGB of some cameras, best first, at most `most`; none without
-    foreground as thick as a palm. `plane`: on which the palm lies."""
-    maps = [None if image is None else foreground_map(image, learnt, STEP)
-            for image, learnt in zip(images, foreground, strict=True)]
-    return find_in_maps(maps, cameras, model, surface, size, rng, most, plane)
-
-
-def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequence[CameraModel], model: HandModel,
-                 surface: Surface, size: Array, rng: np.random.Generator, most: int = 3,
-                 plane: PalmOnPlane | None = None) -> list[Found]:
-    """The same from foreground probabilities (h, w) of every STEP-th pixel, None of a camera without an image."""
+    None without foreground as thick as a palm, or when no pose is a hand. A fist in a face explains much foreground,
+    and its forearm more. So the pixels of a hand and of the ring about it, without its arm, must be more probable than
+    if half of all pixels were foreground.
+    """
     used = [c for c, one in enumerate(foreground) if one is not None]
     maps = [one for one in foreground if one is not None]
-    odds = log_odds_maps(maps, STEP, [cameras[c].camera_from_world[:3] for c in used],
-                         [cameras[c].intrinsics for c in used])
+    lenses = [cameras[c].camera_from_world[:3] for c in used], [cameras[c].intrinsics for c in used]
+    odds, by_chance = log_odds_maps(maps, STEP, *lenses), log_odds_maps(maps, STEP, *lenses, rate=0.5)
     breadth = 0.5 * float(np.exp(size[0])) * float(model.base[1, 1] - model.base[4, 1] + model.radii[1, 0]
                                                    + model.radii[4, 0])
     centres = _palm_centres(maps, [cameras[c] for c in used], breadth)
-    found: list[Found] = []
+    found: list[_Candidate] = []
     postures = _postures(model)
     if plane is None:
         turns = Rotation.random(ROTATIONS, random_state=int(rng.integers(2**31))).as_matrix()
     else:
         met = [plane.met_by(cameras[used[0]].centre, centre) for centre in centres]
         centres, turns = [centre for centre in met if centre is not None], plane.turns(TURNS)
-    tried: list[tuple[float, Array, Array]] = []
+    tried: list[_Candidate] = []
     middle = np.array([0.6 * model.base[2, 0] * np.exp(size[0]), 0.0, 0.0])
 
     def try_pose(world: Array, angles: Array) -> None:
@@ -110,49 +97,62 @@ def find_in_maps(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequ
     if plane is not None:
         covariance = plane.narrowed(covariance)
     for _, world, angles in _distinct(tried, KEPT):
-        moved, bent, value = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
-        found.append(Found(HandPose(moved, bent), value))
-    found = [_refined(one, covariance, model, surface, size, odds, rng) for one in _best(found, REFINED)]
-    return _best(found, most)
+        moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
+        bent = choose_postures(surface, moved, bent, model, size, odds)
+        found.append((log_odds(surface, moved, bent, model, size, odds), moved, bent))
+    found.sort(key=lambda one: -one[0])
+    refined = []
+    for _, world, angles in found[:REFINED]:
+        moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, odds, rng, LAST_ROUNDS)
+        moved, bent = settle(surface, moved, bent, covariance, model, size, odds, rng)
+        if score(surface, moved, bent, size, by_chance)[1][:, [0, 2]].sum() > 0.0:
+            refined.append((log_odds(surface, moved, bent, model, size, odds), moved, bent))
+    if not refined:
+        return None
+    _, world, angles = max(refined, key=lambda one: one[0])
+    return HandPose(world, angles)
 
 
-def _best(found: list[Found], most: int) -> list[Found]:
-    return sorted(found, key=lambda one: -one.score)[:most]
-
-
-def _refined(found: Found, covariance: Array, model: HandModel, surface: Surface, size: Array, odds: LogOddsMaps,
-             rng: np.random.Generator) -> Found:
-    world, angles = found.pose.world_from_palm, found.pose.angles
-    angles = choose_postures(surface, world, angles, model, size, odds)
-    world, angles, value = search(surface, world, angles, covariance, model.limits, size, odds, rng, LAST_ROUNDS)
-    return Found(HandPose(world, angles), value)
+def log_odds(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array, odds: LogOddsMaps) -> float:
+    """Log odds of a pose by the foreground (`silhouette.score`) and the pose prior, up to a constant."""
+    bent = angles - model.pose_prior.mean
+    return score(surface, world, angles, size, odds)[0] / CORRELATED - 0.5 * float(bent @ model.pose_prior.information
+                                                                                  @ bent)
 
 
 def settle(surface: Surface, world: Array, angles: Array, covariance: Array, model: HandModel, size: Array,
-           odds: LogOddsMaps, rng: np.random.Generator, plane: PalmOnPlane | None = None
-           ) -> tuple[Array, Array, float]:
-    """The most probable pose by the foreground about `world`, `angles` with prior covariance (27, 27), and its score
-    (`silhouette.search`). Each finger is tried in each posture in between (`choose_postures`)."""
+           odds: LogOddsMaps, rng: np.random.Generator, plane: PalmOnPlane | None = None) -> tuple[Array, Array]:
+    """The most probable pose by the foreground about `world`, `angles` with prior covariance (27, 27)
+    (`silhouette.search`). Each finger is tried in each posture before the search and in between (`choose_postures`)."""
     if plane is not None:
         covariance = plane.narrowed(covariance)
+    angles = choose_postures(surface, world, angles, model, size, odds)
     moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
     bent = choose_postures(surface, moved, bent, model, size, odds)
-    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
+    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, odds, rng, FIRST_ROUNDS)[:2]
 
 
 def choose_postures(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array,
                  odds: LogOddsMaps) -> Array:
     """The angles (21,) with the posture of each digit that the foreground makes most probable: a finger unchanged,
-    open, relaxed or closed; the thumb unchanged, relaxed or to either side. Coordinate descent, twice over all digits.
-    Locked angles (`HandModel.locked`) stay."""
+    open, relaxed or closed; the thumb unchanged, relaxed or to either side. Then two neighbouring fingers at once, side
+    by side, for one may lie in the other's place. Coordinate descent, twice over all digits. Locked angles
+    (`HandModel.locked`) stay."""
     angles, held = angles.copy(), set(model.locked)
     turns = [k for k in (0, 1) if k not in held]  # the thumb's angles at its root
     thumbs = [model.pose_prior.mean[ANGLE_SLICES[0]] + aside * np.eye(5)[which]
               for which, aside in ((0, 0.0), *product(turns, (-_THUMB_STEP, _THUMB_STEP)))]
-    choices: list[tuple[slice | list[int], list[Array] | Array]] = []
+    choices: list[tuple[slice | list[int] | NDArray[np.int64], list[Array] | Array]] = []
     if turns:
         choices.append((ANGLE_SLICES[0], thumbs))
     choices += [(list(flexions), np.radians(_CURLS_DEG)) for flexions in FLEXIONS[1:] if not held & set(flexions)]
+    curls = np.radians(_CURLS_DEG)
+    for finger in (1, 2, 3):
+        both = np.r_[ANGLE_SLICES[finger], ANGLE_SLICES[finger + 1]]
+        if not held & set(both):
+            spread = model.pose_prior.mean[both[[0, 4]]]
+            choices.append((both, [np.concatenate([spread[:1], one, spread[1:], other])
+                                   for one, other in product(curls, curls)]))
     for where, options in [*choices, *choices]:
         steps = np.zeros((1 + len(options), 27))
         for k, option in enumerate(options):
@@ -162,7 +162,7 @@ def choose_postures(surface: Surface, world: Array, angles: Array, model: HandMo
     return angles
 
 
-def _distinct(tried: list[tuple[float, Array, Array]], most: int) -> list[tuple[float, Array, Array]]:
+def _distinct(tried: list[_Candidate], most: int) -> list[_Candidate]:
     """The best poses of which no two are nearer than half a radian and `_SPREAD[0]`, m."""
     kept: list[tuple[float, Array, Array]] = []
     for one in tried:

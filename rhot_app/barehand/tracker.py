@@ -28,7 +28,7 @@ from rhot_app.barehand.contours import STEP_M, contour_points
 from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
 from rhot_app.barehand.relocalisation import ODDS_DROP, Relocaliser, pose_of
-from rhot_app.barehand.start import STEP, Found, find_hand
+from rhot_app.barehand.start import STEP
 from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, PALM, SHAPE, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
@@ -184,27 +184,14 @@ class BareHandTracker:
         self.frames = [None] * len(self.cameras)
 
     def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
-        """Search the whole images for a hand and start a track at the most probable pose. False without any.
-
-        The best poses by the foreground are fitted to the same images. The one with the largest product of score and
-        part of the contour found is taken. A negative score is less probable than no hand, and left out.
-        """
-        size = np.zeros(SHAPE)
-        best: tuple[float, Found] | None = None
-        for found in find_hand(images, self.cameras, self.foreground, self.model, self.surface, size,
-                               self.relocaliser.rng, plane=self.plane):
-            if found.score <= 0.0:
-                continue
-            self.start(found.pose, t_ns)
-            self.update({c: image for c, image in enumerate(images) if image is not None}, t_ns)
-            counts = self.fit.slice_counts.sum(axis=(0, 1))
-            quality = found.score * counts[0] / max(counts[1], 1.0)
-            if best is None or quality > best[0]:
-                best = quality, found
-        if best is None:
+        """Search the whole images for a hand and start a track at the most probable pose. False without any."""
+        maps = [None if image is None else foreground_map(image, learnt, STEP)
+                for image, learnt in zip(images, self.foreground, strict=True)]
+        pose = self.relocaliser.search_globally(maps, np.zeros(SHAPE), self.relocaliser.rng)
+        if pose is None:
             self.tracking = False
             return False
-        self.start(best[1].pose, t_ns)
+        self.start(pose, t_ns)
         return True
 
     def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
@@ -232,9 +219,11 @@ class BareHandTracker:
         odds = None if maps is None else relocaliser.odds_of(maps)
         if maps and odds and (self._first_update or relocaliser.search_due(odds, prediction[0], t_s)):
             everywhere = relocaliser.global_search_due(maps, t_s)
-            start, same = relocaliser.relocalise(maps, prediction, self.process.stationary, since_s, everywhere)
+            start, anew, same = relocaliser.relocalise(maps, prediction, self.process.stationary, since_s, everywhere)
             relocaliser.last_search_s = t_s
             relocaliser.schedule_global_search(t_s, relocalised=start is not None, same=same)
+            if start is not None and anew:
+                prediction = self.restart(t_s, start, anew=True)
         initial = prediction[0] if start is None else start
         passes = START_PASSES if self._first_update or start is not None else PASSES
         knot = self._fit(images, late, t_s, prediction, initial, extra, passes)
@@ -261,13 +250,14 @@ class BareHandTracker:
         share = min(max(t_s - last_s, 0.0) / SAME_POSE_S, 1.0) if cameras else 0.0
         self.filter.partial = Partial(PHALANGES, share)
 
-    def restart(self, t_s: float, start: Array) -> tuple[Array, Array]:
+    def restart(self, t_s: float, start: Array, *, anew: bool = False) -> tuple[Array, Array]:
         """Restart the filter at rest in the pose of the state `start`, with its shape and the shape's present
-        covariance. Returns state and covariance."""
+        covariance; `anew`: with the file's shape. Returns state and covariance."""
         pose = pose_of(start)
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
-        state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
-        covariance[own, own] = self.filter.newest.covariance[own, own]
+        if not anew:
+            state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
+            covariance[own, own] = self.filter.newest.covariance[own, own]
         self.filter.start(t_s, state, covariance)
         return state, covariance
 

@@ -58,6 +58,7 @@ START_SD: Final = (0.015, 0.2, 0.2)
 """Standard deviations of a random start: place m, rotation rad, angles rad; a thumb's breadth and half a finger's."""
 
 _OLD_NS = 1_000_000  # a state that is older than its newest picture by more says nothing of it
+_OLD_LIVE_NS = round(2e9 / RATE_HZ)  # live, edges of all cameras make one state, of the time of the last
 
 
 class EvaluatedTracker(Protocol):
@@ -73,8 +74,8 @@ class EvaluatedTracker(Protocol):
 class Case:
     """One way to film a hand and to begin. `start`: "pose": the tracker is given the true pose at first, "random":
     that pose with `START_SD`, "nothing". `lost`: cameras without pictures during `LOSS_S`; the case is then judged from
-    there on. `cameras`: how many the rig has. `known_size`: the hand was measured. Every case shows the background
-    alone at first."""
+    there on. `cameras`: how many the rig has. `known_size`: the hand was measured. `live`: nodes search the pictures
+    for the live tracker, which is given nothing. Every case shows the background alone at first."""
 
     name: str
     options: BareHandOptions
@@ -82,6 +83,7 @@ class Case:
     lost: tuple[int, ...] = ()
     cameras: int = 2
     known_size: bool = True
+    live: bool = False
 
 
 MakeTracker = Callable[[Rig, Case], EvaluatedTracker]
@@ -100,6 +102,8 @@ CASES: Final = (
     Case("both cameras lost 0.5 s", _MATCHED, lost=(0, 1)),
     Case("random start", _MATCHED, "random"),
     Case("one camera alone", _MATCHED, cameras=1),
+    Case("live, matched", _MATCHED, "nothing", live=True),
+    Case("live, mismatched", _MISMATCH, "nothing", known_size=False, live=True),
 )
 
 
@@ -160,7 +164,7 @@ def run_sequence(case: Case, sequence: BareHandSequence, make: MakeTracker) -> E
             started = True
         images, t_ns = frame.images[:case.cameras], frame.t_ns[:case.cameras]
         begun = time.perf_counter()
-        state = _stepped(tracker, images, t_ns)
+        state = _stepped(tracker, images, t_ns, _OLD_LIVE_NS if case.live else _OLD_NS)
         step_s.append(time.perf_counter() - begun)
         states.append(state)
         frames.append(replace(frame, images=()))
@@ -171,13 +175,14 @@ class _Startable(Protocol):
     def start(self, pose: HandPose, t_ns: int) -> None: ...
 
 
-def _stepped(tracker: EvaluatedTracker, images: Sequence[Picture | None], t_ns: Sequence[int]) -> HandState | None:
-    """The state of the newest picture; None while there is no hand, or nothing new of it."""
+def _stepped(tracker: EvaluatedTracker, images: Sequence[Picture | None], t_ns: Sequence[int], old_ns: int
+             ) -> HandState | None:
+    """The state, if it is not older than the newest picture by `old_ns`; None while there is no hand."""
     try:
         state = tracker.step(images, t_ns)
     except TrackingError:
         return None
-    return state if state.tracked and state.t_master_ns >= max(t_ns) - _OLD_NS else None
+    return state if state.tracked and state.t_master_ns >= max(t_ns) - old_ns else None
 
 
 def _start(case: Case, seed: int, frame: BareHandFrame) -> HandPose:

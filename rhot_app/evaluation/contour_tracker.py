@@ -1,18 +1,23 @@
-"""The contour tracker as a user runs it: it learns the background of the first pictures, then looks for a hand."""
+"""The contour trackers as a user runs them, offline and live: they learn the background of the first pictures, then
+look for a hand."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.follower import HandFollower
 from rhot_app.errors import TrackingError
+from rhot_app.evaluation.searched_nodes import FIRST_NS, SearchedNodes
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.project import Rig
+from rhot_app.project import Rig, TrackerSettings
 from rhot_app.state import HandState
+from rhot_app.tracking.trackers import make_tracker
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 
 Picture = NDArray[np.uint8]
@@ -28,8 +33,8 @@ class ContourTracker:
     def __init__(self, rig: Rig, *, known_size: bool, finds: bool) -> None:
         self._follower = HandFollower(rig, None, known_size=known_size)
         self._finds = finds
-        self._empty: list[list[Picture]] = [[] for _ in rig.nodes]
-        self._foreground: list[Foreground] = []
+        self._background = _Background(len(rig.nodes))
+        self._learnt = False
 
     def start(self, pose: HandPose, t_ns: int) -> None:
         """Begin at a pose."""
@@ -38,20 +43,57 @@ class ContourTracker:
 
     def step(self, images: Sequence[Picture | None], t_ns: Sequence[int]) -> HandState:
         """The hand after one picture of each camera. Raises TrackingError while there is none."""
-        if not self._foreground:
-            self._learn(images)
-            raise TrackingError("the background is being learnt.")
+        if not self._learnt:
+            self._follower.set_foreground(self._background.learnt_from(images))
+            self._learnt = True
+            raise TrackingError("the background has been learnt.")
         if not self._finds:
             raise TrackingError("there is no hand in the pictures yet.")
-        state = self._follower.step(images, t_ns)
-        if not state.tracked:
-            raise TrackingError("there is no hand in the pictures.")
-        return state
+        return _tracked(self._follower.step(images, t_ns))
 
-    def _learn(self, images: Sequence[Picture | None]) -> None:
+
+class LiveContourTracker:
+    """A live `ContourEstimator` with nodes that search the pictures for it. It looks for a hand from the beginning. Its
+    searches take no time: they are waited for, so that a run can be repeated."""
+
+    def __init__(self, rig: Rig, *, known_size: bool) -> None:
+        """Raises RigError."""
+        settings = TrackerSettings("estimator", observe="contours", float_scale=not known_size)
+        self._rig = msgspec.structs.replace(rig, tracker=settings)
+        self._background = _Background(len(rig.nodes))
+        self._nodes: SearchedNodes | None = None
+
+    def step(self, images: Sequence[Picture | None], t_ns: Sequence[int]) -> HandState:
+        """The newest state after one picture of each camera. Raises TrackingError while there is none."""
+        if self._nodes is None:
+            foreground = self._background.learnt_from(images)
+            self._nodes = SearchedNodes(make_tracker(self._rig), foreground, len(self._rig.markers.ids))
+            raise TrackingError("the background has been learnt.")
+        self._nodes.step(0, images, times_ns=[FIRST_NS + one for one in t_ns])
+        if not self._nodes.states:
+            raise TrackingError("there is no state yet.")
+        state = _tracked(self._nodes.states[-1])
+        return replace(state, t_master_ns=state.t_master_ns - FIRST_NS)
+
+
+class _Background:
+    """Learns each camera's background of its first pictures."""
+
+    def __init__(self, cameras: int) -> None:
+        self._empty: list[list[Picture]] = [[] for _ in range(cameras)]
+
+    def learnt_from(self, images: Sequence[Picture | None]) -> list[Foreground]:
+        """Of each camera, with one picture more. Raises TrackingError while one has fewer than
+        BACKGROUND_PICTURES."""
         for kept, image in zip(self._empty, images, strict=True):
             if image is not None:
                 kept.append(image)
-        if min(len(kept) for kept in self._empty) >= BACKGROUND_PICTURES:
-            self._foreground = [learn_background(skin_foreground(), kept) for kept in self._empty]
-            self._follower.set_foreground(self._foreground)
+        if min(len(kept) for kept in self._empty) < BACKGROUND_PICTURES:
+            raise TrackingError("the background is being learnt.")
+        return [learn_background(skin_foreground(), kept) for kept in self._empty]
+
+
+def _tracked(state: HandState) -> HandState:
+    if not state.tracked:
+        raise TrackingError("there is no hand in the pictures.")
+    return state

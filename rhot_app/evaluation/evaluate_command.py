@@ -48,8 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                        help="where logs are kept and found again (default ~/.cache/rhot/takes)")
     bare = parser.add_argument_group("a tracker without markers on a bare hand, without real time (docs/twin.md)")
     bare.add_argument("--bare-hand", action="store_true",
-                      help="matched and mismatched hands, lost cameras, random starts; takes --seeds (default 10), "
-                           "--seconds (from 2.5, default 3), --seed, --logs and --json")
+                      help="matched and mismatched hands, lost cameras, random starts, live; takes --seeds (default "
+                           "10), --seconds (from 2.5, default 3), --seed, --logs and --json")
     bare.add_argument("--cases", metavar="TEXT", default=None, help="only the cases whose names begin with TEXT")
 
 
@@ -96,14 +96,16 @@ def _evaluate(args: argparse.Namespace) -> int:
 
 def _bare_hand(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
-    from rhot_app.evaluation.bare_hand import CASES, LOSS_S, SETTLE_S, Case, evaluate_bare_hand
+    from rhot_app.evaluation.bare_hand import CASES, LOSS_S, SETTLE_S, Case, EvaluatedTracker, evaluate_bare_hand
     from rhot_app.evaluation.bare_hand_table import bare_hand_fields, bare_hand_table
-    from rhot_app.evaluation.contour_tracker import ContourTracker
+    from rhot_app.evaluation.contour_tracker import ContourTracker, LiveContourTracker
     from rhot_app.evaluation.data_sets import data_sets_folder
     from rhot_app.progress import ProgressLine
     from rhot_app.project import Rig
 
-    def tracker(rig: Rig, case: Case) -> ContourTracker:
+    def tracker(rig: Rig, case: Case) -> EvaluatedTracker:
+        if case.live:
+            return LiveContourTracker(rig, known_size=case.known_size)
         return ContourTracker(rig, known_size=case.known_size, finds=case.start == "nothing")
 
     cases = [case for case in CASES if args.cases is None or case.name.startswith(args.cases)]

@@ -7,11 +7,13 @@ import pytest
 from bare_scenes import model_and_surface, poses, rig_of, right_hand, scene, state_of
 
 from rhot_app.barehand.overlay import overlay
+from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.residual import Rows
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.motion.hand_process import BIAS, MOTION
+from rhot_app.hand.skeleton import HandPose
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground
 
 FPS = 60.0
@@ -79,6 +81,23 @@ def test_a_hand_is_found_without_a_given_start(film) -> None:
     assert tracker.find(images, 0)
     tracker.step(images, [0, 0])
     assert np.median(errors_mm(tracker, poses("grasp", TIMES)[0])) < 10.0
+
+
+def test_a_track_far_from_the_hand_begins_anew_at_the_hand(film) -> None:
+    """A hand is mistaken for its forearm, say; what is then learnt of its shape is wrong."""
+    cameras, images, walls = film[0]
+    pose = poses("grasp", TIMES)[0]
+    tracker = BareHandTracker(rig_of(cameras, right_hand()), known_size=False,
+                              foreground=[learn_background(skin_foreground(), [empty]) for empty in walls])
+    wrong = pose.world_from_palm.copy()
+    wrong[:3, 3] -= 0.15 * wrong[:3, 0]
+    large = np.zeros(SHAPE)
+    large[:2] = 0.3
+    tracker.start(HandPose(wrong, pose.angles), 0, size=large)
+    for k in range(40):
+        tracker.step(images, [round(1e9 * k / FPS)] * 2)
+    assert np.median(errors_mm(tracker, pose)) < 3.0
+    assert np.abs(tracker.filter.newest.state[BIAS:BIAS + 2]).max() < 0.1
 
 
 def test_no_hand_is_found_in_an_empty_scene(film) -> None:

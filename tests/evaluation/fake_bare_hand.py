@@ -17,11 +17,12 @@ Array = NDArray[np.float64]
 
 class FakeBareHand:
     """The true hand with Gaussian noise of `joint_sd` m on every coordinate and `angle_sd` rad; finds a hand by itself
-    `finds_after` pictures on, or never."""
+    `finds_after` pictures on, or never. Its states are `age_s` old."""
 
     def __init__(self, truth_at: Callable[[int], BareHandTruth], joint_sd: float = 2e-3, angle_sd: float = 0.05,
-                 finds_after: int | None = None) -> None:
+                 finds_after: int | None = None, age_s: float = 0.0) -> None:
         self.truth_at, self.sd, self.angle_sd, self.finds_after = truth_at, joint_sd, angle_sd, finds_after
+        self.age_ns = round(1e9 * age_s)
         self.rng, self.steps, self.newest = np.random.default_rng(1), 0, 0
         self.given: tuple[HandPose, int] | None = None
         self.seen: list[Sequence[NDArray[np.uint8] | None]] = []
@@ -37,7 +38,7 @@ class FakeBareHand:
         if self.given is None and (self.finds_after is None or self.steps <= self.finds_after):
             raise TrackingError("there is no hand yet")
         if any(image is not None for image in images):
-            self.newest = max(t_ns)
+            self.newest = max(t_ns) - self.age_ns
         truth = self.truth_at(self.newest)
         joints = truth.joints + self.rng.normal(0.0, self.sd, (21, 3))
         return hand_state(self.newest, joints, truth.angles + self.rng.normal(0.0, self.angle_sd, 21),

@@ -62,6 +62,14 @@ def test_one_that_is_twenty_millimetres_off_has_lost_the_hand() -> None:
     assert figures["lost_part"] == 1.0 and figures["started"] == 0.0
 
 
+@pytest.mark.parametrize(("age_s", "lost"), [(0.06, 0.0), (0.12, 1.0)])
+def test_live_a_state_may_be_two_pictures_old(age_s: float, lost: float) -> None:
+    """It is judged by the truth at its own time."""
+    case = next(case for case in CASES if case.live)
+    assert case.start == "nothing"
+    assert figures_of([run(case, finds_after=20, age_s=age_s)[0]])["lost_part"] == lost
+
+
 def test_start_from_nothing_is_timed_from_the_whole_hand_in_view() -> None:
     case = next(case for case in CASES if case.start == "nothing")
     result, tracker = run(case, finds_after=60)

@@ -12,8 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import ForegroundFrame
-from rhot_app.barehand.relocalisation import LOCAL_SEARCH_S, ODDS_DROP, RELOCALISATION_LOG_ODDS, SAME_POSE_M
-from rhot_app.barehand.silhouette import CORRELATED, search
+from rhot_app.barehand.relocalisation import (
+    LOCAL_SEARCH_S,
+    ODDS_DROP,
+    RELOCALISATION_LOG_ODDS,
+    SAME_POSE_M,
+    Relocalisation,
+)
+from rhot_app.barehand.silhouette import search
 from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.motion.hand_process import FASTEST, POSE
@@ -27,9 +33,6 @@ log = logging.getLogger(__name__)
 
 MOVED_M, TURNED = 0.05, 0.4
 """m and rad: standard deviations of the motion of a hand during a search: it is held nearly still."""
-
-LEAST_GAIN = RELOCALISATION_LOG_ODDS * CORRELATED
-"""Log odds of pixels by which another pose must be better (`barehand.relocalisation`)."""
 
 SAME_MAPS_NS = 100_000_000
 """ns: observations nearer in time count as of one position of a hand that is searched for."""
@@ -82,7 +85,7 @@ class Finder:
         self._thread: threading.Thread | None = None
         self._newest: Maps | None = None
         self._found: tuple[int, HandPose, int] | None = None  # of which run
-        self._change: tuple[int, Array | None, bool] | None = None
+        self._change: tuple[int, Relocalisation] | None = None
         self._run = 0
         self._searched_s = -np.inf
 
@@ -112,7 +115,7 @@ class Finder:
         """
         hand, relocaliser = self._hand, self._hand.relocaliser
         state, covariance = hand.filter.predict(t_s)
-        odds, (change, same) = relocaliser.odds_of(maps.probabilities), self.change()
+        odds, (change, anew, same) = relocaliser.odds_of(maps.probabilities), self.change()
         relocaliser.schedule_global_search(t_s, relocalised=False, same=same)
         per_pixel = relocaliser.log_odds_per_pixel(odds, state)
         worse = per_pixel < relocaliser.average_odds - ODDS_DROP
@@ -121,9 +124,11 @@ class Finder:
             way = joints_of(hand, moved) - joints_of(hand, state)
             confused = np.linalg.norm(way - way.mean(axis=0), axis=1).max() > SAME_POSE_M
             gain = relocaliser.log_odds(odds, moved) - relocaliser.log_odds(odds, state)
-            gain += CORRELATED * (relocaliser.log_prior(moved) - relocaliser.log_prior(state))
-            if (worse or confused) and gain > LEAST_GAIN:
-                hand.filter.start(t_s, moved, _inflated(covariance, change))
+            if (worse or confused) and gain > RELOCALISATION_LOG_ODDS:
+                if anew:
+                    hand.restart(t_s, moved, anew=True)
+                else:
+                    hand.filter.start(t_s, moved, _inflated(covariance, change))
                 relocaliser.schedule_global_search(t_s, relocalised=True, same=False)
                 return True
         if worse or t_s - self._searched_s > LOCAL_SEARCH_S:
@@ -138,11 +143,10 @@ class Finder:
         found, self._found = self._found, None
         return None if found is None or found[0] != self._run else found[1:]
 
-    def change(self) -> tuple[Array | None, bool]:
-        """The step in the tangent space to the better pose of the last relocalisation, None without a new one, and
-        whether the whole image has the same hand."""
+    def change(self) -> Relocalisation:
+        """The last relocalisation, with the step in the tangent space to the better state in place of that state."""
         found, self._change = self._change, None
-        return (None, False) if found is None or found[0] != self._run else found[1:]
+        return Relocalisation(None, False, False) if found is None or found[0] != self._run else found[1]
 
     def wait(self) -> None:
         """Wait for the running search."""
@@ -169,10 +173,10 @@ class Finder:
 
     def _relocalise(self, maps: Maps, state: Array, covariance: Array, dt_s: float, everywhere: bool, run: int) -> None:
         process = self._hand.process
-        moved, same = self._hand.relocaliser.relocalise(maps.probabilities, (state, covariance), process.stationary,
-                                                        dt_s, everywhere)
-        if moved is not None or same:
-            self._change = run, None if moved is None else process.difference(moved, state), same
+        found = self._hand.relocaliser.relocalise(maps.probabilities, (state, covariance), process.stationary, dt_s,
+                                                  everywhere)
+        step = None if found.state is None else process.difference(found.state, state)
+        self._change = run, found._replace(state=step)
 
     def _refined(self, pose: HandPose, maps: Maps) -> HandPose:
         """The pose refined in later maps."""

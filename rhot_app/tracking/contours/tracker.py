@@ -19,14 +19,13 @@ from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
-from rhot_app.barehand.relocalisation import SAME_POSE_M
+from rhot_app.barehand.relocalisation import RELOCALISATION_LOG_ODDS, SAME_POSE_M
 from rhot_app.barehand.tracker import START_SD, BareHandTracker
-from rhot_app.hand.motion.hand_process import BIAS
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
 from rhot_app.tracking.contours.evidence import Evidence, joints_of, same_hand, seen_contour
-from rhot_app.tracking.contours.finder import LEAST_GAIN, SAME_MAPS_NS, Finder, Maps, NewestMaps
+from rhot_app.tracking.contours.finder import SAME_MAPS_NS, Finder, Maps, NewestMaps
 from rhot_app.tracking.contours.markers import MarkersOfHand, update_hand
 from rhot_app.tracking.contours.occlusion import Capsules
 from rhot_app.tracking.contours.requests import JUMP_NS, NEVER, Requests, requested_contour
@@ -281,19 +280,19 @@ class ContourEstimator:
             return
         self._maps_ns = maps.t_ns
         oldest_ns = max(self._epoch_ns, maps.t_ns - max(SAME_MAPS_NS, self._maps.simultaneous_ns))
-        if not self._evidence.confirmed and self._evidence.observed_ns > oldest_ns:
-            self._confirm(maps)
+        if not self._evidence.confirmed:
+            self._confirm(maps, observed=self._evidence.observed_ns > oldest_ns)
         if any(self.overlaps):  # with the other hand in an image: whose foreground it is, is ambiguous
             return
         if self._finder.verify(maps, self._seconds(maps.t_ns), 1e-9 * min(one.period_ns for one in self._cameras)):
             self._requests.restart()
 
-    def _confirm(self, maps: Maps) -> None:
-        """Confirm the track if a second search finds the same hand, or if its markers show the same one.
+    def _confirm(self, maps: Maps, *, observed: bool) -> None:
+        """Confirm an `observed` track if a second search finds the same hand, or if its markers show the same one.
 
         Searches are random: two agree on a wrong pose less probably than one is wrong.
         """
-        if maps.t_ns - self._agreed_ns < SAME_MAPS_NS:
+        if observed and maps.t_ns - self._agreed_ns < SAME_MAPS_NS:
             self._evidence.confirmed = self._was_confirmed = True
             return
         found = self._finder.found()
@@ -303,14 +302,14 @@ class ContourEstimator:
         pose, t_ns = found
         state, _ = self._predict(t_ns)
         other, _ = self._hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
-        other[BIAS:], relocaliser = state[BIAS:], self._hand.relocaliser
+        relocaliser = self._hand.relocaliser
         odds = relocaliser.odds_of(maps.probabilities)
         gain = relocaliser.log_odds(odds, other) - relocaliser.log_odds(odds, state)
         apart_m = float(np.linalg.norm(joints_of(self._hand, other) - joints_of(self._hand, state), axis=1).mean())
         same = same_hand(self._hand, state, pose)
-        if gain > (LEAST_GAIN if same else 0.0) and apart_m > SAME_POSE_M:
+        if gain > (RELOCALISATION_LOG_ODDS if same else 0.0) and apart_m > SAME_POSE_M:
             self.start(pose, t_ns)  # the hand has entered the image since, or is another one
-        elif same:
+        elif same and observed:
             self._evidence.confirmed = self._was_confirmed = True
         else:
             self._finder.search_everywhere(maps)

@@ -29,7 +29,7 @@ from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import Rig
 from rhot_app.state import HandState, SeenContour
 from rhot_app.tracking.contours.evidence import joints_of
-from rhot_app.tracking.contours.finder import LEAST_GAIN, Finder, Maps
+from rhot_app.tracking.contours.finder import Finder, Maps
 from rhot_app.tracking.contours.occlusion import Capsules, capsules_in, occluded_pixels, visible
 from rhot_app.tracking.contours.requests import JUMP_NS, NEVER
 from rhot_app.tracking.contours.tracker import ContourEstimator
@@ -161,12 +161,13 @@ class TwoBareHands(TwoHands):
         if _palm_distance_m(*places) > self._thick_m:
             return
         maps = self._newest_maps(t_ns)
-        odds = [_log_odds(one.hand, state, maps) + RELOCALISATION_LOG_ODDS * one.confirmed
+        foreground = self._both[0].hand.relocaliser.odds_of(maps.probabilities)
+        odds = [one.hand.relocaliser.log_odds(foreground, state) + RELOCALISATION_LOG_ODDS * one.confirmed
                 for one, state in zip(self._both, states, strict=True)]
         worse = int(odds[0] >= odds[1])
         one, better = self._both[worse], self._both[1 - worse]
         rest = self._newest_maps(t_ns, capsules_in(better.hand, states[1 - worse]))
-        if _own_log_odds(one.hand, states[worse], rest) < LEAST_GAIN:
+        if _own_log_odds(one.hand, states[worse], rest) < CORRELATED * RELOCALISATION_LOG_ODDS:
             one.drop_track()
 
     def _check_swap(self, number: int, t_ns: int) -> None:
@@ -191,7 +192,8 @@ class TwoBareHands(TwoHands):
             return
         maps = self._newest_maps(t_ns)
         instead, _ = other.hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
-        gain = _log_odds(other.hand, instead, maps) - _log_odds(hand.hand, state, maps)
+        odds = hand.hand.relocaliser.odds_of(maps.probabilities)
+        gain = other.hand.relocaliser.log_odds(odds, instead) - hand.hand.relocaliser.log_odds(odds, state)
         self._gains[number] = gain
         others = self._gains[1 - number] if other.confirmed else 0.0
         if others is not None and gain + others > RELOCALISATION_LOG_ODDS:
@@ -279,13 +281,6 @@ _CONTOUR_FIELDS = "contour", "outline", "slices", "edges", "of_hand"
 def _palm_distance_m(ours: Array, theirs: Array) -> float:
     """Distance of the palms of two hands with joints (21, 3) m."""
     return float(np.linalg.norm((ours - theirs)[_PALM_JOINTS].mean(axis=0)))
-
-
-def _log_odds(hand: BareHandTracker, state: Array, maps: Maps) -> float:
-    """Log odds of a hand in `state` by the foreground and the pose prior."""
-    relocaliser = hand.relocaliser
-    odds = relocaliser.odds_of(maps.probabilities)
-    return relocaliser.log_odds(odds, state) / CORRELATED + relocaliser.log_prior(state)
 
 
 def _own_log_odds(hand: BareHandTracker, state: Array, maps: Maps) -> float:
