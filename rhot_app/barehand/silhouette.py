@@ -2,8 +2,9 @@
 
 The score is the logarithm of a likelihood ratio: pixels on the hand are foreground and pixels in a ring about it are
 background, against images in which every pixel is foreground with the same probability. Where the forearm may be there
-is no ring, because the wrist bends. Other foreground does not count. The search samples poses from a Gaussian and
-adapts it to the better ones (CMA-ES, Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772).
+is no ring, because the wrist bends. A bare forearm is scored as the hand is, a sleeved one not at all. Other foreground
+does not count. The search samples poses from a Gaussian and adapts it to the better ones (CMA-ES, Hansen, "The CMA
+Evolution Strategy: A Tutorial", arXiv:1604.00772).
 """
 
 from __future__ import annotations

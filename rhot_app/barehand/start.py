@@ -2,7 +2,7 @@
 
 Candidates are positions where the foreground is as thick as a palm. At each, many rotations of a relaxed hand are
 scored by the foreground (`silhouette`), and the best of them with other postures of the fingers. A short search about
-each of the best selects those for a long one.
+each of the best selects those for a long one, by their log odds.
 """
 
 from __future__ import annotations
@@ -115,9 +115,9 @@ def find_hand(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequenc
 
 def log_odds(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array, odds: LogOddsMaps) -> float:
     """Log odds of a pose by the foreground (`silhouette.score`) and the pose prior, up to a constant."""
-    bent = angles - model.pose_prior.mean
-    return score(surface, world, angles, size, odds)[0] / CORRELATED - 0.5 * float(bent @ model.pose_prior.information
-                                                                                  @ bent)
+    prior, shown = model.pose_prior, score(surface, world, angles, size, odds)[0]
+    bent = angles - prior.mean
+    return shown / CORRELATED - 0.5 * float(bent @ prior.information @ bent)
 
 
 def settle(surface: Surface, world: Array, angles: Array, covariance: Array, model: HandModel, size: Array,
