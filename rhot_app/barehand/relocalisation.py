@@ -29,8 +29,8 @@ ForegroundMaps = Sequence[NDArray[np.float32] | None]
 
 RELOCALISATION_LOG_ODDS = 7.0
 """Log odds by which another pose must be better than the predicted one: what the surface's own error changes them by.
-By estimate, that is 0.5 mm along each side of a finger and 1 mm along the palm (`contour_residual.COMMON`), before two
-cameras. A wrongly bent finger changes them by 12 at 0.5 m."""
+By estimate, that is 0.5 mm along each side of a finger and 1 mm along the palm (`contour_residual.COMMON`), at 0.5 m
+before two cameras with a twelfth of the image foreground."""
 
 LOCAL_SEARCH_S = 0.2
 """s: interval of the searches about the prediction, and so the longest time of a wrong pose that they correct. Chosen:
@@ -49,7 +49,7 @@ SAME_HAND_M = 0.1
 
 ODDS_DROP = 0.25
 """Log odds per pixel below their average at which a search is due at once: a twentieth of the hand, half a finger, off
-the foreground (`silhouette.MISLABELLED`: 5 for each of its pixels)."""
+the foreground (`silhouette.MISLABELLED`: about 5 for each of its pixels, if a twelfth of the image is foreground)."""
 
 ODDS_SMOOTHING = 0.1
 """Weight of a new image in that average. Chosen: ten images, a third of a second at 30 a second."""
@@ -136,28 +136,29 @@ class Relocaliser:
 
     # -- where ---------------------------------------------------------------------------------------------------------
 
-    def search_globally(self, maps: ForegroundMaps, size: Array, rng: np.random.Generator) -> HandPose | None:
-        """The most probable hand of `size` (SHAPE,) anywhere in foreground maps; None without any."""
-        return find_hand(maps, self.cameras, self.model, self.surface, size, rng, self.plane)
+    def search_globally(self, maps: ForegroundMaps, rng: np.random.Generator) -> HandPose | None:
+        """The most probable hand of the file's shape anywhere in foreground maps; None without any."""
+        return find_hand(maps, self.cameras, self.model, self.surface, rng, self.plane)
 
     def relocalise(self, maps: ForegroundMaps, prediction: tuple[Array, Array], stationary: Array, dt_s: float,
                    everywhere: bool = False) -> Relocalisation:
         """Search for a pose that is better than the predicted one by RELOCALISATION_LOG_ODDS.
 
         `prediction`: state and covariance (n, n). The search reaches as far as hands move in `dt_s`, s, by the motion's
-        `stationary` covariance (n, n). `everywhere`: the whole image too. The shape of a hand that was tracked in a
-        wrong pose is wrong, so what is found there begins anew. Only `rng` changes, so it may run in a thread.
+        `stationary` covariance (n, n). `everywhere`: the whole image too. A pose found there may be another hand, or
+        the tracked one, whose shape was learnt in a wrong pose. So it begins a track anew, if it is also better than
+        the best pose near the prediction. Only `rng` changes, so it may run in a thread.
         """
         (state, covariance), odds, old = prediction, self.odds_of(maps), pose_of(prediction[0])
         size, pace = state[BIAS:BIAS + SHAPE].copy(), FASTEST / np.sqrt(3.0) * dt_s
         spread = covariance[:POSE, :POSE] + pace**2 * stationary[:POSE, :POSE]
-        world, angles = settle(self.surface, old.world_from_palm, old.angles, spread, self.model, size, odds,
-                                  self.rng, self.plane)
+        world, angles = settle(self.surface, old.world_from_palm, old.angles, spread, self.model, size, odds, self.rng,
+                               self.plane)
         best, least = None, self.log_odds(odds, state) + RELOCALISATION_LOG_ODDS
         moved = _with_pose(state, HandPose(world, angles))
         if (value := self.log_odds(odds, moved)) > least:
             best, least = moved, value
-        pose = self.search_globally(maps, np.zeros(SHAPE), self.rng) if everywhere else None
+        pose = self.search_globally(maps, self.rng) if everywhere else None
         if pose is None:
             return Relocalisation(best, False, False)
         joints = [forward(self.model, one).joints for one in (pose, old, HandPose(world, angles))]

@@ -2,9 +2,9 @@
 
 The score is the logarithm of a likelihood ratio: pixels on the hand are foreground and pixels in a ring about it are
 background, against images in which every pixel is foreground with the same probability. Where the forearm may be there
-is no ring, because the wrist bends. A bare forearm is scored as the hand is, a sleeved one not at all. Other foreground
-does not count. The search samples poses from a Gaussian and adapts it to the better ones (CMA-ES, Hansen, "The CMA
-Evolution Strategy: A Tutorial", arXiv:1604.00772).
+is no ring, because the wrist bends. A bare forearm is scored as the hand is; one that scores below 0 is taken to be
+sleeved and left out. Other foreground does not count. The search samples poses from a Gaussian and adapts it to the
+better ones (CMA-ES, Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772).
 """
 
 from __future__ import annotations
@@ -262,9 +262,9 @@ def score_steps(surface: Surface, world: Array, angles: Array, steps: Array, lim
 
 
 def search(surface: Surface, world: Array, angles: Array, covariance: Array, limits: Array, size: Array,
-           odds: LogOddsMaps, rng: np.random.Generator, rounds: int) -> tuple[Array, Array, float]:
-    """The most probable pose about `world` (4, 4), `angles` (21,) with prior covariance (27, 27), and its score, after
-    `rounds` of DRAWS poses.
+           odds: LogOddsMaps, rng: np.random.Generator, rounds: int) -> tuple[Array, Array]:
+    """The most probable pose about `world` (4, 4), `angles` (21,) with prior covariance (27, 27), after `rounds` of
+    DRAWS poses.
 
     The score is the log odds by the foreground over CORRELATED, less half of the squared Mahalanobis distance.
     """
@@ -273,15 +273,15 @@ def search(surface: Surface, world: Array, angles: Array, covariance: Array, lim
     def scores(white: Array) -> Array:
         values = score_steps(surface, world, angles, white @ root.T, limits, size, odds)
         return np.asarray(values / CORRELATED - 0.5 * np.sum(white * white, axis=1))
-    best, value = _cma_es(scores, len(root), rng, rounds)
+    best = _cma_es(scores, len(root), rng, rounds)
     moved, turned = np.empty((4, 4)), np.empty(21)
     move(world, angles, root @ best, moved, turned)
-    return moved, np.clip(turned, limits[:, 0], limits[:, 1]), value
+    return moved, np.clip(turned, limits[:, 0], limits[:, 1])
 
 
-def _cma_es(value: Callable[[Array], Array], n: int, rng: np.random.Generator, rounds: int) -> tuple[Array, float]:
-    """Maximise a function of (DRAWS, n), from 0 with START_STEP; returns the best (n,) and its value. CMA-ES with the
-    default parameters of Hansen's tutorial, positive weights only. The first sample is the start itself."""
+def _cma_es(value: Callable[[Array], Array], n: int, rng: np.random.Generator, rounds: int) -> Array:
+    """Maximise a function of (DRAWS, n), from 0 with START_STEP; returns the best (n,). CMA-ES with the default
+    parameters of Hansen's tutorial, positive weights only. The first sample is the start itself."""
     mu = DRAWS // 2
     weights = np.log(mu + 0.5) - np.log(np.arange(1, mu + 1))
     weights /= weights.sum()
@@ -315,4 +315,4 @@ def _cma_es(value: Callable[[Array], Array], n: int, rng: np.random.Generator, r
         covariance = ((1.0 - c_1 - c_mu) * covariance + c_1 * np.outer(path, path)
                       + c_mu * (drawn[order].T * weights) @ drawn[order])
         step *= float(np.exp(c_s / damping * (length - 1.0)))
-    return best, best_value
+    return best

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rhot_app.barehand.silhouette import CORRELATED, LogOddsMaps, log_odds_maps, score, score_steps, search
-from rhot_app.barehand.surface import Surface
+from rhot_app.barehand.surface import SHAPE, Surface
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.model import HandModel
@@ -42,8 +42,7 @@ KEPT, FIRST_ROUNDS = 20, 15
 """Best poses about which a short search is made, and its rounds (`silhouette.search`). Chosen: enough to rank them."""
 
 REFINED, LAST_ROUNDS = 4, 120
-"""Best poses of the short searches about which a long one is made, and its rounds. Chosen: more of either improve the
-starts little for their time (drawn hands: a median error of 16 mm, with 5 and 200 of 15 mm)."""
+"""Best poses of the short searches about which a long one is made, and its rounds. Chosen, not tuned."""
 
 PALMS, PEAKS = 6, 24
 """Most candidate positions of a palm, of all cameras together, and most thick parts of each camera's foreground that
@@ -56,21 +55,20 @@ _PALM_RADIUS = 0.36, 1.7  # bounds, relative to half the palm's breadth; from th
 
 
 def find_hand(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequence[CameraModel], model: HandModel,
-              surface: Surface, size: Array, rng: np.random.Generator, plane: PalmOnPlane | None = None
-              ) -> HandPose | None:
-    """The most probable pose in foreground probabilities (h, w) of every STEP-th pixel of some cameras, None of one
-    without an image. `plane`: on which the palm lies.
+              surface: Surface, rng: np.random.Generator, plane: PalmOnPlane | None = None) -> HandPose | None:
+    """The most probable pose, of the file's shape, in foreground probabilities (h, w) of every STEP-th pixel of each
+    camera, None of a camera without an image. `plane`: on which the palm lies.
 
-    None without foreground as thick as a palm, or when no pose is a hand. A fist in a face explains much foreground,
-    and its forearm more. So the pixels of a hand and of the ring about it, without its arm, must be more probable than
-    if half of all pixels were foreground.
+    Returns None without foreground as thick as a palm, or if every candidate fails this test: the hand and its ring,
+    without the forearm, must be more probable than if each pixel were foreground with probability 0.5. Otherwise a
+    large foreground, such as a face, is accepted for the few pixels that a fist covers.
     """
+    size = np.zeros(SHAPE)
     used = [c for c, one in enumerate(foreground) if one is not None]
     maps = [one for one in foreground if one is not None]
     lenses = [cameras[c].camera_from_world[:3] for c in used], [cameras[c].intrinsics for c in used]
-    odds, by_chance = log_odds_maps(maps, STEP, *lenses), log_odds_maps(maps, STEP, *lenses, rate=0.5)
-    breadth = 0.5 * float(np.exp(size[0])) * float(model.base[1, 1] - model.base[4, 1] + model.radii[1, 0]
-                                                   + model.radii[4, 0])
+    odds, even = log_odds_maps(maps, STEP, *lenses), log_odds_maps(maps, STEP, *lenses, rate=0.5)
+    breadth = 0.5 * float(model.base[1, 1] - model.base[4, 1] + model.radii[1, 0] + model.radii[4, 0])
     centres = _palm_centres(maps, [cameras[c] for c in used], breadth)
     found: list[_Candidate] = []
     postures = _postures(model)
@@ -80,7 +78,7 @@ def find_hand(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequenc
         met = [plane.met_by(cameras[used[0]].centre, centre) for centre in centres]
         centres, turns = [centre for centre in met if centre is not None], plane.turns(TURNS)
     tried: list[_Candidate] = []
-    middle = np.array([0.6 * model.base[2, 0] * np.exp(size[0]), 0.0, 0.0])
+    middle = np.array([0.6 * model.base[2, 0], 0.0, 0.0])
 
     def try_pose(world: Array, angles: Array) -> None:
         value = float(score_steps(surface, world, angles, np.zeros((1, 27)), model.limits, size, odds)[0])
@@ -97,15 +95,15 @@ def find_hand(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequenc
     if plane is not None:
         covariance = plane.narrowed(covariance)
     for _, world, angles in _distinct(tried, KEPT):
-        moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
+        moved, bent = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
         bent = choose_postures(surface, moved, bent, model, size, odds)
         found.append((log_odds(surface, moved, bent, model, size, odds), moved, bent))
     found.sort(key=lambda one: -one[0])
     refined = []
     for _, world, angles in found[:REFINED]:
-        moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, odds, rng, LAST_ROUNDS)
+        moved, bent = search(surface, world, angles, covariance, model.limits, size, odds, rng, LAST_ROUNDS)
         moved, bent = settle(surface, moved, bent, covariance, model, size, odds, rng)
-        if score(surface, moved, bent, size, by_chance)[1][:, [0, 2]].sum() > 0.0:
+        if score(surface, moved, bent, size, even)[1][:, [0, 2]].sum() > 0.0:
             refined.append((log_odds(surface, moved, bent, model, size, odds), moved, bent))
     if not refined:
         return None
@@ -127,17 +125,17 @@ def settle(surface: Surface, world: Array, angles: Array, covariance: Array, mod
     if plane is not None:
         covariance = plane.narrowed(covariance)
     angles = choose_postures(surface, world, angles, model, size, odds)
-    moved, bent, _ = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
+    moved, bent = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
     bent = choose_postures(surface, moved, bent, model, size, odds)
-    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, odds, rng, FIRST_ROUNDS)[:2]
+    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
 
 
 def choose_postures(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array,
-                 odds: LogOddsMaps) -> Array:
+                    odds: LogOddsMaps) -> Array:
     """The angles (21,) with the posture of each digit that the foreground makes most probable: a finger unchanged,
-    open, relaxed or closed; the thumb unchanged, relaxed or to either side. Then two neighbouring fingers at once, side
-    by side, for one may lie in the other's place. Coordinate descent, twice over all digits. Locked angles
-    (`HandModel.locked`) stay."""
+    open, relaxed or closed; the thumb unchanged, relaxed or to either side. Then each pair of neighbouring fingers,
+    with the prior's abduction, in all nine combinations: one may lie in the other's place. Coordinate descent, twice
+    over all digits. Locked angles (`HandModel.locked`) stay."""
     angles, held = angles.copy(), set(model.locked)
     turns = [k for k in (0, 1) if k not in held]  # the thumb's angles at its root
     thumbs = [model.pose_prior.mean[ANGLE_SLICES[0]] + aside * np.eye(5)[which]
@@ -164,7 +162,7 @@ def choose_postures(surface: Surface, world: Array, angles: Array, model: HandMo
 
 def _distinct(tried: list[_Candidate], most: int) -> list[_Candidate]:
     """The best poses of which no two are nearer than half a radian and `_SPREAD[0]`, m."""
-    kept: list[tuple[float, Array, Array]] = []
+    kept: list[_Candidate] = []
     for one in tried:
         if all(np.trace(one[1][:3, :3].T @ other[1][:3, :3]) < 1.0 + 2.0 * np.cos(0.5)
                or np.linalg.norm(one[1][:3, 3] - other[1][:3, 3]) > _SPREAD[0] for other in kept):

@@ -163,7 +163,7 @@ class BareHandTracker:
         self.tracking = False
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
-        self._sequence, self._epoch_ns, self._first_update = 0, 0, False
+        self._sequence, self._epoch_ns, self._first_update, self.begun_anew = 0, 0, False, 0
         self.relocaliser = Relocaliser(self.model, self.surface, self.cameras, self.plane)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
@@ -187,7 +187,7 @@ class BareHandTracker:
         """Search the whole images for a hand and start a track at the most probable pose. False without any."""
         maps = [None if image is None else foreground_map(image, learnt, STEP)
                 for image, learnt in zip(images, self.foreground, strict=True)]
-        pose = self.relocaliser.search_globally(maps, np.zeros(SHAPE), self.relocaliser.rng)
+        pose = self.relocaliser.search_globally(maps, self.relocaliser.rng)
         if pose is None:
             self.tracking = False
             return False
@@ -215,7 +215,7 @@ class BareHandTracker:
         prediction, since_s = self.filter.predict(t_s), t_s - self.filter.newest.t_s
         self.prepare_update(images, t_s)
         self.frames = [frame if c in images else None for c, frame in enumerate(self.frames)]
-        maps, relocaliser, start = self._maps(images), self.relocaliser, None
+        maps, relocaliser, start, anew = self._maps(images), self.relocaliser, None, False
         odds = None if maps is None else relocaliser.odds_of(maps)
         if maps and odds and (self._first_update or relocaliser.search_due(odds, prediction[0], t_s)):
             everywhere = relocaliser.global_search_due(maps, t_s)
@@ -231,9 +231,10 @@ class BareHandTracker:
             per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
             if start is not None and per_pixel < relocaliser.log_odds_per_pixel(odds, start) - ODDS_DROP:
                 # Edges have drawn the pose away from the foreground: restart there, without the prediction.
-                knot = self._fit(images, late, t_s, self.restart(t_s, start), start, extra, START_PASSES)
+                knot = self._fit(images, late, t_s, self.restart(t_s, start, anew=anew), start, extra,
+                                 START_PASSES)
                 per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
-            relocaliser.average(per_pixel, first=self._first_update)
+            relocaliser.average(per_pixel, first=self._first_update or anew)
         self._first_update = False
         return knot
 
@@ -251,11 +252,14 @@ class BareHandTracker:
         self.filter.partial = Partial(PHALANGES, share)
 
     def restart(self, t_s: float, start: Array, *, anew: bool = False) -> tuple[Array, Array]:
-        """Restart the filter at rest in the pose of the state `start`, with its shape and the shape's present
-        covariance; `anew`: with the file's shape. Returns state and covariance."""
+        """Restart the filter at rest in the pose of the state `start`. The shape is that of `start`, with the newest
+        covariance of the shape; `anew`: the file's with its prior, and the track is another one. Returns state (n,) and
+        covariance (n, n)."""
         pose = pose_of(start)
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
-        if not anew:
+        if anew:
+            self.begun_anew += 1
+        else:
             state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
             covariance[own, own] = self.filter.newest.covariance[own, own]
         self.filter.start(t_s, state, covariance)

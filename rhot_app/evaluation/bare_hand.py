@@ -58,7 +58,7 @@ START_SD: Final = (0.015, 0.2, 0.2)
 """Standard deviations of a random start: place m, rotation rad, angles rad; a thumb's breadth and half a finger's."""
 
 _OLD_NS = 1_000_000  # a state that is older than its newest picture by more says nothing of it
-_OLD_LIVE_NS = round(2e9 / RATE_HZ)  # live, edges of all cameras make one state, of the time of the last
+_OLD_LIVE_NS = round(2e9 / RATE_HZ)  # live, a state waits for the edges of all cameras, up to a period
 
 
 class EvaluatedTracker(Protocol):

@@ -83,8 +83,8 @@ class _Background:
         self._empty: list[list[Picture]] = [[] for _ in range(cameras)]
 
     def learnt_from(self, images: Sequence[Picture | None]) -> list[Foreground]:
-        """Of each camera, with one picture more. Raises TrackingError while one has fewer than
-        BACKGROUND_PICTURES."""
+        """Take one more picture of each camera, and return their foreground models. Raises TrackingError while a camera
+        has fewer than BACKGROUND_PICTURES."""
         for kept, image in zip(self._empty, images, strict=True):
             if image is not None:
                 kept.append(image)

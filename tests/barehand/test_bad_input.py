@@ -15,7 +15,7 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.state import HandState
 from rhot_node.detect.foreground import learn_background, skin_foreground
 
-IMAGES = 2  # two searches that agree are a hand
+IMAGES = 3  # two searches that agree are a hand
 FPS = 30.0
 WRONG_M = 0.02  # neighbouring knuckles are so far apart
 Draw = Callable[..., np.ndarray]
@@ -51,7 +51,9 @@ def wrong(found: list[HandState], distance_m: float = DISTANCE_M) -> list[int]:
         state.joint_positions - forward(model, pose_of(number, distance_m)).joints, axis=1).mean() > WRONG_M]
 
 
-@pytest.mark.parametrize(("distance_m", "known"), [(0.5, False), (0.7, True)])
+@pytest.mark.parametrize(("distance_m", "known"), [
+    (0.5, False), (0.7, True),
+    pytest.param(0.5, True, marks=pytest.mark.xfail(strict=True, reason="as docs/bare_hand.md says"))])
 def test_no_hand_is_found_in_a_face(distance_m: float, known: bool) -> None:
     place = np.array([0.0, -0.02, distance_m])
     found = states(lambda camera, empty, k: taken(person(camera, empty, place), k), known)

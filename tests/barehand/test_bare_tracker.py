@@ -84,7 +84,7 @@ def test_a_hand_is_found_without_a_given_start(film) -> None:
 
 
 def test_a_track_far_from_the_hand_begins_anew_at_the_hand(film) -> None:
-    """A hand is mistaken for its forearm, say; what is then learnt of its shape is wrong."""
+    """It may have been mistaken for its forearm. What was learnt there of its shape is wrong."""
     cameras, images, walls = film[0]
     pose = poses("grasp", TIMES)[0]
     tracker = BareHandTracker(rig_of(cameras, right_hand()), known_size=False,

@@ -159,12 +159,14 @@ def test_a_confused_finger_is_relocalised(film, monkeypatch) -> None:
     assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.01
 
 
-def test_a_hand_with_a_wrong_start_is_relocalised(film, monkeypatch) -> None:
-    """It is tracked 3 cm off and rotated, so that fingers are confused, and two patched searches confirm it."""
+@pytest.mark.parametrize(("off_m", "turn_deg"), [(0.03, 14.0), (0.12, 0.0)])
+def test_a_hand_with_a_wrong_start_is_relocalised(film, monkeypatch, off_m, turn_deg) -> None:
+    """It is tracked a little off and rotated, so that fingers are confused, or far off. Two patched searches confirm
+    it."""
     pose = poses("grasp", TIMES)[0]
     wrong = pose.world_from_palm.copy()
-    wrong[:3, :3] = wrong[:3, :3] @ Rotation.from_euler("z", 14.0, degrees=True).as_matrix()
-    wrong[:3, 3] -= 0.03 * wrong[:3, 0]
+    wrong[:3, :3] = wrong[:3, :3] @ Rotation.from_euler("z", turn_deg, degrees=True).as_matrix()
+    wrong[:3, 3] -= off_m * wrong[:3, 0]
     rig, number = bare_rig(film[0][0]), 0
     nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
     with monkeypatch.context() as patched:

@@ -10,6 +10,7 @@ from pictures import picture, two_cameras
 from rhot_app.barehand.contour_residual import ContourFrame, Contours, slices_of
 from rhot_app.barehand.contours import COLUMNS, INNER, SILHOUETTE, contour_points
 from rhot_app.barehand.features import feature_points
+from rhot_app.barehand.silhouette import log_odds_maps
 from rhot_app.barehand.surface import FOREARM_TURN, SHAPE, Surface
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.motion.hand_process import BIAS, FASTEST, MOTION, PALM_SPREAD, POSE, HandProcess
@@ -47,6 +48,21 @@ def test_silhouette_points_lie_between_hand_and_background(side: str, motion: st
         for side_px, expected, most in ((-2.0, True, 0.97), (2.0, False, 0.9)):  # gaps between fingers are narrow
             at = np.rint(points.pixel[silhouette] + side_px * points.normal[silhouette]).astype(int)
             assert np.mean(mask[at[:, 1], at[:, 0]] == expected) > most
+
+
+def test_background_in_an_empty_image_says_nothing_and_unknown_pixels_neither() -> None:
+    """Of a hand in it, both do: its own pixels and the background about it."""
+    camera = two_cameras()[0]
+    lens = [camera.camera_from_world[:3]], [camera.intrinsics]
+    empty, hand = np.zeros((60, 80), np.float32), np.zeros((60, 80), np.float32)
+    empty[0, 0] = np.nan
+    hand[20:40, 30:50] = 1.0
+    odds = log_odds_maps([empty], 8, *lens)
+    assert odds.inside[0, 0, 0] == odds.outside[0, 0, 0] == 0.0
+    assert abs(odds.outside[0, 30, 40]) < 1e-9 and odds.inside[0, 30, 40] < -2.0
+    odds = log_odds_maps([hand], 8, *lens)
+    assert odds.inside[0, 30, 40] > 1.5 and odds.outside[0, 30, 40] < -0.5
+    assert odds.inside[0, 0, 0] < -2.0 and 0.0 < odds.outside[0, 0, 0] < 0.2
 
 
 def test_features_of_occluded_links_are_left_out() -> None:

@@ -62,7 +62,7 @@ def test_one_that_is_twenty_millimetres_off_has_lost_the_hand() -> None:
     assert figures["lost_part"] == 1.0 and figures["started"] == 0.0
 
 
-@pytest.mark.parametrize(("age_s", "lost"), [(0.06, 0.0), (0.12, 1.0)])
+@pytest.mark.parametrize(("age_s", "lost"), [(0.06, 0.0), (0.08, 1.0)])
 def test_live_a_state_may_be_two_pictures_old(age_s: float, lost: float) -> None:
     """It is judged by the truth at its own time."""
     case = next(case for case in CASES if case.live)

@@ -111,7 +111,8 @@ class Finder:
 
         A search starts every LOCAL_SEARCH_S, and when the pose's log odds per pixel drop below their average. Its
         result is compared in the newest maps, into which the hand has moved since. Edges locate a hand more accurately,
-        so small changes are left to them, unless a finger was mistaken for another one.
+        so small changes are left to them, unless a finger was mistaken for another one, or the hand was found
+        elsewhere.
         """
         hand, relocaliser = self._hand, self._hand.relocaliser
         state, covariance = hand.filter.predict(t_s)
@@ -124,9 +125,10 @@ class Finder:
             way = joints_of(hand, moved) - joints_of(hand, state)
             confused = np.linalg.norm(way - way.mean(axis=0), axis=1).max() > SAME_POSE_M
             gain = relocaliser.log_odds(odds, moved) - relocaliser.log_odds(odds, state)
-            if (worse or confused) and gain > RELOCALISATION_LOG_ODDS:
+            if (anew or worse or confused) and gain > RELOCALISATION_LOG_ODDS:
                 if anew:
                     hand.restart(t_s, moved, anew=True)
+                    relocaliser.average_odds = 0.0
                 else:
                     hand.filter.start(t_s, moved, _inflated(covariance, change))
                 relocaliser.schedule_global_search(t_s, relocalised=True, same=False)
@@ -163,7 +165,7 @@ class Finder:
             self._thread.start()
 
     def _search(self, maps: Maps, run: int) -> None:
-        pose = self._hand.relocaliser.search_globally(maps.probabilities, np.zeros(SHAPE), self._rng)
+        pose = self._hand.relocaliser.search_globally(maps.probabilities, self._rng)
         newest = self._newest
         if pose is None or run != self._run:
             return
@@ -186,7 +188,7 @@ class Finder:
         covariance[6:, 6:] = np.linalg.inv(hand.model.pose_prior.information + np.eye(21) / TURNED**2)
         if hand.plane is not None:
             covariance = hand.plane.narrowed(covariance)
-        world, angles, _ = search(hand.surface, pose.world_from_palm, pose.angles, covariance, hand.model.limits,
+        world, angles = search(hand.surface, pose.world_from_palm, pose.angles, covariance, hand.model.limits,
                                   np.zeros(SHAPE), odds, self._rng, _ROUNDS)
         return HandPose(world, angles)
 

@@ -288,9 +288,11 @@ class ContourEstimator:
             self._requests.restart()
 
     def _confirm(self, maps: Maps, *, observed: bool) -> None:
-        """Confirm an `observed` track if a second search finds the same hand, or if its markers show the same one.
+        """Confirm the track if a second search finds the same hand, or if its markers show it. Start anew at the pose
+        of the search where that is more probable; else search again.
 
-        Searches are random: two agree on a wrong pose less probably than one is wrong.
+        `observed`: the hand's edges or markers were seen since these maps; otherwise nothing is confirmed. Searches are
+        random: two agree on a wrong pose less probably than one is wrong.
         """
         if observed and maps.t_ns - self._agreed_ns < SAME_MAPS_NS:
             self._evidence.confirmed = self._was_confirmed = True
