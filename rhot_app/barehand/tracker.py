@@ -231,8 +231,7 @@ class BareHandTracker:
             per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
             if start is not None and per_pixel < relocaliser.log_odds_per_pixel(odds, start) - ODDS_DROP:
                 # Edges have drawn the pose away from the foreground: restart there, without the prediction.
-                knot = self._fit(images, late, t_s, self.restart(t_s, start, anew=anew), start, extra,
-                                 START_PASSES)
+                knot = self._fit(images, late, t_s, self.restart(t_s, start, anew=anew), start, extra, START_PASSES)
                 per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
             relocaliser.average(per_pixel, first=self._first_update or anew)
         self._first_update = False
