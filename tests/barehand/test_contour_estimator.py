@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable
 
 import msgspec
@@ -22,6 +24,7 @@ from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import FLEXIONS, JOINTS, HandPose
 from rhot_app.project import Rig, TrackerSettings, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
+from rhot_app.tracking.contours.evidence import joints_of
 from rhot_app.tracking.contours.finder import Finder
 from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.tracker import CameraFrame, ShowsContours
@@ -157,6 +160,61 @@ def test_a_confused_finger_is_relocalised(film, monkeypatch) -> None:
     tip = forward(model_and_surface()[0], pose).joints[INDEX_TIP]
     assert nodes.states[-1].tracked
     assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.01
+
+
+class SlowSearches(SearchedNodes):
+    """Of the searches of the whole image, the first one has a given result, and the second one ends when `ended` is
+    set. Until then, searches are not waited for once there is a track."""
+
+    def __init__(self, rig: Rig, film: list[tuple[list, list, list]], first: HandPose) -> None:
+        super().__init__(make_tracker(rig), known(film), len(rig.markers.ids))
+        self.ended, self.searches, wait = threading.Event(), 0, self.tracker.wait
+        relocaliser = self.tracker.hand.relocaliser
+        find = relocaliser.search_globally
+
+        def search(maps, rng):
+            self.searches += 1
+            if self.searches == 2:
+                self.ended.wait(60.0)
+            return first if self.searches == 1 else find(maps, rng)
+        relocaliser.search_globally = search
+        self.tracker.wait = lambda: None if (self.tracker.tracking or self.searches > 1) and not self.ended.is_set(
+            ) else wait()
+
+    def until(self, done: Callable[[], bool], first: int, images: list) -> int:
+        """Steps from frame `first` on with the same images, in a second and a half. Returns the next number."""
+        for number in range(first, first + 45):
+            self.step(number, images)
+            if done():
+                return number + 1
+            time.sleep(0.02)
+        raise AssertionError("not within 45 frames")
+
+
+def test_a_wrong_start_is_corrected_before_a_slow_second_search_ends(film) -> None:
+    pose = poses("grasp", TIMES)[0]
+    curled = pose.angles.copy()
+    curled[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
+    nodes = SlowSearches(bare_rig(film[0][0]), film, HandPose(pose.world_from_palm, curled))
+    tracker, tip = nodes.tracker, forward(model_and_surface()[0], pose).joints[INDEX_TIP]
+    number = nodes.until(lambda: tracker.tracking, 0, film[0][1])
+    number = nodes.until(lambda: np.linalg.norm(joints_of(tracker.hand, tracker.hand.filter.newest.state)[INDEX_TIP]
+                                                - tip) < 0.01, number, film[0][1])
+    assert not tracker.confirmed
+    nodes.ended.set()
+    nodes.until(lambda: tracker.confirmed, number, film[0][1])
+
+
+def test_a_search_that_outlasts_its_track_finds_the_next_one(film) -> None:
+    pose = poses("grasp", TIMES)[0]
+    wrong = pose.world_from_palm.copy()
+    wrong[:3, 3] += 0.3 * film[0][0][0].world_from_camera[:3, 0]
+    nodes = SlowSearches(bare_rig(film[0][0]), film, HandPose(wrong, pose.angles))
+    number = nodes.until(lambda: nodes.tracker.tracking, 0, film[0][1])
+    number = nodes.until(lambda: not nodes.tracker.tracking, number, film[0][1])
+    threading.Timer(0.1, nodes.ended.set).start()
+    nodes.until(lambda: nodes.tracker.tracking, number, film[0][1])
+    assert nodes.searches == 2
 
 
 @pytest.mark.parametrize(("off_m", "turn_deg"), [(0.03, 14.0), (0.12, 0.0)])

@@ -170,11 +170,10 @@ class ContourEstimator:
         self._requests.start(t_ns)
 
     def drop_track(self) -> None:
-        """End the track, and search for a hand again."""
+        """End the track, and search for a hand again. The result of a search that runs is used."""
         self._tracking = False
         self._hand.tracking = False
         self._hand.frames = [None] * len(self._names)
-        self._finder.reset()
         self._requests.stop()
         self._waiting = {}
         if self._markers is not None:
@@ -279,13 +278,14 @@ class ContourEstimator:
         if maps.t_ns == self._maps_ns:
             return
         self._maps_ns = maps.t_ns
+        # Overlapping hands are not verified: whose foreground it is, is ambiguous. A new track is first relocalised
+        # near its start, which is quick, so that its evidence lasts until a second search of the whole image ends.
+        if not any(self.overlaps) and self._finder.verify(
+                maps, self._seconds(maps.t_ns), 1e-9 * min(one.period_ns for one in self._cameras)):
+            self._requests.restart()
         oldest_ns = max(self._epoch_ns, maps.t_ns - max(SAME_MAPS_NS, self._maps.simultaneous_ns))
         if not self._evidence.confirmed:
             self._confirm(maps, observed=self._evidence.observed_ns > oldest_ns)
-        if any(self.overlaps):  # with the other hand in an image: whose foreground it is, is ambiguous
-            return
-        if self._finder.verify(maps, self._seconds(maps.t_ns), 1e-9 * min(one.period_ns for one in self._cameras)):
-            self._requests.restart()
 
     def _confirm(self, maps: Maps, *, observed: bool) -> None:
         """Confirm the track if a second search finds the same hand, or if its markers show it. Start anew at the pose
