@@ -38,7 +38,8 @@ about a person's reaction time. A search in every image doubles the time of a st
 
 GLOBAL_SEARCH_S = 0.25, 4.0
 """s: from a start to the first search of the whole image, and the longest interval between two; each interval is twice
-the last one. Chosen: a wrong start lasts no longer than a person needs to see it. A search takes a second of a core."""
+the last one. Chosen: a wrong start lasts no longer than a person needs to see it. A search takes two seconds of a
+core."""
 
 SAME_POSE_M = 0.02
 """m: joints of one pose are nearer to each other, in the mean or at most; beyond, a finger is taken for another one.

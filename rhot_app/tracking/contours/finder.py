@@ -1,4 +1,4 @@
-"""Searches for a bare hand in foreground maps, in a thread: a search takes a second, and frames keep arriving."""
+"""Searches for a bare hand in foreground maps, in a thread: a search takes seconds, and frames keep arriving."""
 
 from __future__ import annotations
 
