@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 
 import msgspec
 import numpy as np
 import pytest
 from bare_scenes import DISTANCE_M, model_and_surface, poses, rig_of, right_hand, scene
+from patience import PATIENCE_S, eventually
 from pictures import look_at, picture, taken, wall
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
@@ -164,30 +164,30 @@ def test_a_confused_finger_is_relocalised(film, monkeypatch) -> None:
 
 class SlowSearches(SearchedNodes):
     """Of the searches of the whole image, the first one has a given result, and the second one ends when `ended` is
-    set. Until then, searches are not waited for once there is a track."""
+    set; only that one is not waited for."""
 
     def __init__(self, rig: Rig, film: list[tuple[list, list, list]], first: HandPose) -> None:
         super().__init__(make_tracker(rig), known(film), len(rig.markers.ids))
-        self.ended, self.searches, wait = threading.Event(), 0, self.tracker.wait
+        self.ended, self.searches = threading.Event(), 0
         relocaliser = self.tracker.hand.relocaliser
         find = relocaliser.search_globally
 
         def search(maps, rng):
             self.searches += 1
             if self.searches == 2:
-                self.ended.wait(60.0)
+                self.ended.wait(PATIENCE_S)
             return first if self.searches == 1 else find(maps, rng)
         relocaliser.search_globally = search
-        self.tracker.wait = lambda: None if (self.tracker.tracking or self.searches > 1) and not self.ended.is_set(
-            ) else wait()
+        self.tracker.wait = lambda: eventually(lambda: (self.searches == 2 and not self.ended.is_set()) or not any(
+            thread.name == "find" for thread in threading.enumerate()))
 
     def until(self, done: Callable[[], bool], first: int, images: list) -> int:
-        """Steps from frame `first` on with the same images, in a second and a half. Returns the next number."""
+        """Steps from frame `first` on with the same images, for a second and a half at most. Returns the next
+        number."""
         for number in range(first, first + 45):
             self.step(number, images)
             if done():
                 return number + 1
-            time.sleep(0.02)
         raise AssertionError("not within 45 frames")
 
 
@@ -212,7 +212,7 @@ def test_a_search_that_outlasts_its_track_finds_the_next_one(film) -> None:
     nodes = SlowSearches(bare_rig(film[0][0]), film, HandPose(wrong, pose.angles))
     number = nodes.until(lambda: nodes.tracker.tracking, 0, film[0][1])
     number = nodes.until(lambda: not nodes.tracker.tracking, number, film[0][1])
-    threading.Timer(0.1, nodes.ended.set).start()
+    nodes.ended.set()
     nodes.until(lambda: nodes.tracker.tracking, number, film[0][1])
     assert nodes.searches == 2
 
