@@ -11,6 +11,7 @@ from screen_pictures import check
 from rhot_app.articulated.bodies import hand_bodies
 from rhot_app.barehand.surface import surface_of
 from rhot_app.hand.model import build_model
+from rhot_app.ui.models.layers import LayerPictures
 
 
 @pytest.fixture
@@ -54,9 +55,11 @@ def test_each_camera_has_its_own_picture(layers):
     assert [dialog.camera_box.itemText(k) for k in range(2)] == ["left", "right"]
     dialog.over_check.setChecked(False)
     bench.until(lambda: dialog.shown is not None and (dialog.shown.image[0, 0] == 60).all())
-    left = dialog.shown
+    first = dialog.shown
     dialog.camera_box.setCurrentIndex(1)
-    bench.until(lambda: dialog._drawn[0] == "right" and dialog.shown is not left and dialog._job is None)
+    bench.until(lambda: dialog._drawn[0] == "right" and dialog.shown is not first and dialog._job is None)
+    moment = dialog._drawn[1]  # the hand moves
+    left = LayerPictures(bench.controller.rig).draw("left", moment, None)
     columns = [np.flatnonzero((one.image != 60).any(axis=(0, 2))).mean() for one in (left, dialog.shown)]
     assert columns[0] - columns[1] > 20.0, "the right camera sees the hand farther left"
 
