@@ -19,6 +19,8 @@ import rhot_app  # noqa: E402, F401 - decides where compiled code is kept, befor
 settings.register_profile("patient", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("patient")
 
+pytest_plugins = ["scheduling", "studies"]
+
 
 @pytest.fixture(scope="session", autouse=True)
 def master_keys(tmp_path_factory: pytest.TempPathFactory) -> None:

@@ -30,6 +30,9 @@ SMALLEST_M, LARGEST_M = 5e-3, 1.0
 
 SUFFIXES = (".stl", ".obj", ".glb", ".gltf")
 
+_AT_CENTRE_M = 1e-12
+"""Nearer than this to a centre or an axis, every direction leads away from it: a smaller vector's length underflows."""
+
 _SAME = 1e-6  # of the size: vertices nearer than this are one; STL files have 24 bits
 
 
@@ -85,7 +88,7 @@ class Sphere:
     def signed_distance(self, points: Array) -> tuple[Array, Array]:
         """See `Shape`."""
         far = np.linalg.norm(points, axis=1)
-        normal = np.where(far[:, None] > 0.0, points / np.maximum(far, 1e-300)[:, None], [1.0, 0.0, 0.0])
+        normal = np.where(far[:, None] > _AT_CENTRE_M, points / np.maximum(far, _AT_CENTRE_M)[:, None], [1.0, 0.0, 0.0])
         return far - self.radius_m, normal
 
 
@@ -107,7 +110,7 @@ class Cylinder:
     def signed_distance(self, points: Array) -> tuple[Array, Array]:
         """See `Shape`."""
         far = np.hypot(points[:, 0], points[:, 1])
-        radial = np.where(far[:, None] > 0.0, points[:, :2] / np.maximum(far, 1e-300)[:, None], [1.0, 0.0])
+        radial = np.where(far[:, None] > _AT_CENTRE_M, points[:, :2] / np.maximum(far, _AT_CENTRE_M)[:, None], [1.0, 0.0])
         up = np.where(points[:, 2] < 0.0, -1.0, 1.0)
         away = np.column_stack([far - self.radius_m, np.abs(points[:, 2]) - 0.5 * self.length_m])
         distance, across = _corner_distance(away)

@@ -51,6 +51,7 @@ def wrong(found: list[HandState], distance_m: float = DISTANCE_M) -> list[int]:
         state.joint_positions - forward(model, pose_of(number, distance_m)).joints, axis=1).mean() > WRONG_M]
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours", "rhot_node/detect/foreground.py")
 @pytest.mark.parametrize(("distance_m", "known"), [
     (0.5, False), (0.7, True),
     pytest.param(0.5, True, marks=pytest.mark.xfail(strict=True, reason="as docs/bare_hand.md says"))])
@@ -60,6 +61,7 @@ def test_no_hand_is_found_in_a_face(distance_m: float, known: bool) -> None:
     assert not any(state.tracked for state in found)
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours", "rhot_node/detect/foreground.py")
 def test_no_hand_is_found_in_two_people() -> None:
     def draw(camera, empty, number) -> np.ndarray:
         both = person(camera, person(camera, empty, np.array([-0.2, 0.0, 0.8])), np.array([0.22, -0.05, 0.85]))
@@ -68,12 +70,14 @@ def test_no_hand_is_found_in_two_people() -> None:
     assert not any(state.tracked for state in states(draw, True))
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours", "rhot_node/detect/foreground.py")
 def test_a_hand_before_a_person_is_found_at_the_right_pose_or_not_at_all() -> None:
     place = np.array([0.12, -0.05, 0.95])
     found = states(lambda camera, empty, k: hand(camera, person(camera, empty, place), k), True)
     assert wrong(found) == []
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours", "rhot_node/detect/foreground.py")
 @pytest.mark.parametrize("known", [True, False])
 def test_a_hand_that_fills_the_image_is_found_at_the_right_pose_or_not_at_all(known: bool) -> None:
     found = states(lambda camera, empty, k: hand(camera, empty, k, 0.16), known)

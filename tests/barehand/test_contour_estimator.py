@@ -119,6 +119,7 @@ def test_maps_that_come_before_the_last_edges_confirm_the_hand(film) -> None:
     assert error_mm(nodes.states[-1], poses("grasp", TIMES)[-1]) < 5.0
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 def test_a_hand_is_found_and_tracked_by_slow_cameras(film) -> None:
     """Of a hand that is found after the first camera's frame, the second one's edges come first."""
     rig = bare_rig(film[0][0])
@@ -129,6 +130,7 @@ def test_a_hand_is_found_and_tracked_by_slow_cameras(film) -> None:
     assert nodes.states[-1].t_master_ns == FIRST_NS + 4 * number * PERIOD_NS, "no camera's edges wait for a frame"
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 @pytest.mark.parametrize("apart_ms", [2, 10])
 def test_a_camera_with_a_wrong_pose_gives_a_resting_hand_no_velocity(film, apart_ms: int) -> None:
     """A camera that is turned by a fifth of a degree shows it 2 mm elsewhere, milliseconds later: that is no speed."""
@@ -147,6 +149,7 @@ def test_a_camera_with_a_wrong_pose_gives_a_resting_hand_no_velocity(film, apart
     assert np.median(speeds) < 0.1  # m/s
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 def test_a_confused_finger_is_relocalised(film, monkeypatch) -> None:
     pose = poses("grasp", TIMES)[0]
     curled = pose.angles.copy()
@@ -217,6 +220,7 @@ def test_a_search_that_outlasts_its_track_finds_the_next_one(film) -> None:
     assert nodes.searches == 2
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 @pytest.mark.parametrize(("off_m", "turn_deg"), [(0.03, 14.0), (0.12, 0.0)])
 def test_a_hand_with_a_wrong_start_is_relocalised(film, monkeypatch, off_m, turn_deg) -> None:
     """It is tracked a little off and rotated, so that fingers are confused, or far off. Two patched searches confirm
@@ -269,6 +273,7 @@ def test_requested_slices_cross_the_contour_of_the_next_frame(film) -> None:
         assert 0.4 < np.mean(~outer) < 0.95, "most contours are outlines, some lie within the hand"
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 @pytest.mark.parametrize("which", ["followed", "looked for"])
 def test_a_recording_that_restarts_is_a_new_session(film, which: str) -> None:
     rig = bare_rig(film[0][0])
@@ -325,6 +330,7 @@ def leaving(frames: int, out: int) -> tuple[list[CameraModel], list[HandPose], l
     return cameras, moved, images, [taken(one, 0) for one in walls]
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 def test_a_hand_outside_one_cameras_image_is_tracked_by_the_other(monkeypatch) -> None:
     frames, out = 24, 60
     cameras, moved, images, empty = leaving(frames, out)
@@ -427,6 +433,7 @@ def test_landmarks_correct_a_confused_finger(film, monkeypatch) -> None:
     assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.003
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 def test_a_fingertip_that_contradicts_the_contours_inflates_its_fingers_covariance(film) -> None:
     """An object of the index finger's colour lies 6 cm from it. The rest of the hand is bare."""
     markers = load_markers(resource_path("markers", "rhot6.json"))

@@ -88,6 +88,7 @@ def until_tracked(nodes: SearchedNodes, images: list[np.ndarray], number: int) -
     return number
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 @pytest.mark.parametrize("forget", [False, True], ids=["live", "from a log"])
 def test_both_hands_are_found_and_one_leaves_and_returns(still: list[np.ndarray], forget: bool) -> None:
     nodes, number = nodes_of(two_bare_hands(), forget=forget), 0
@@ -116,6 +117,7 @@ def test_both_hands_are_found_and_one_leaves_and_returns(still: list[np.ndarray]
     assert (np.diff(times_ns) > 0).all()
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 def test_both_hands_are_tracked_after_one_has_occluded_the_other(monkeypatch) -> None:
     """The left hand passes 6 cm before the right one, which rests, and covers all of it."""
     nodes, number = nodes_of(two_bare_hands()), 0
@@ -138,6 +140,7 @@ def test_both_hands_are_tracked_after_one_has_occluded_the_other(monkeypatch) ->
     assert nodes.states[-1].t_master_ns == FIRST_NS + (number - 1) * PERIOD_NS
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 def test_swapped_hands_are_corrected(still: list[np.ndarray], monkeypatch) -> None:
     """The first search takes each one's back for the other one's palm."""
     turned = {}

@@ -53,6 +53,7 @@ def record(bench: Bench) -> None:
     bench.save()
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours", "rhot_node/slice_search.py")
 @pytest.mark.timeout(2 * TEST_S)
 def test_a_bare_hand_is_tracked_by_what_its_nodes_find(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
     record(bench)

@@ -37,6 +37,7 @@ def test_the_simulated_hand_works_the_mouse_by_itself() -> None:
     assert "from the hand to the cursor" in done.stderr
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours", "rhot_app/mouse")
 @pytest.mark.timeout(BARE_S + 60.0)
 def test_the_simulated_bare_hand_works_the_mouse_live() -> None:
     """The same without markers, before cameras that are not synchronised and have rolling shutters, for as long as a

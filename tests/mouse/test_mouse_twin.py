@@ -45,6 +45,7 @@ def test_tracked_presses_are_those_of_the_hand(cameras: int) -> None:
         assert one["presses"] == one["right"] == 4 and one["wrong"] == 0
 
 
+@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours", "rhot_app/mouse")
 @pytest.mark.timeout(900)
 def test_a_bare_hand_before_one_camera_works_the_mouse() -> None:
     """It is found as it comes in, and followed where it has come to, without markers."""

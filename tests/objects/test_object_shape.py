@@ -6,7 +6,7 @@ import builtins
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from shapes_oracle import box_distance, box_mesh, star, triangle_distance, winding_number
 
@@ -37,6 +37,8 @@ def test_a_mesh_of_a_box_is_the_box(sides, place):
                                atol=1e-9)
 
 
+@example(radius=0.1, length=0.2, place=(0.0, 1e-310, 0.0))
+@example(radius=0.1, length=0.2, place=(0.0, 1e-160, 0.0))
 @given(radius=st.floats(0.005, 0.2), length=LENGTHS, place=PLACES)
 def test_the_nearest_point_of_round_shapes_lies_on_them(radius, length, place):
     point = np.array([place])

@@ -55,6 +55,7 @@ def drag(view, joint, to):
     QTest.mouseRelease(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, end)
 
 
+@pytest.mark.study("rhot_app/ui/wizards", "rhot_app/handfit", "rhot_app/ui/handfit")
 def test_a_hand_of_the_wrong_size_is_fitted_by_anchors_and_used(window, simulated_rig):
     fit, frame = window.fit, window.frame
     Hands.wait(lambda: all(view._kept is not None for view in frame.views), 30.0)

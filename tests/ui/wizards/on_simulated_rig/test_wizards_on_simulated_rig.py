@@ -23,6 +23,7 @@ def baseline_of(rig):
     return float(np.linalg.norm(right - left))
 
 
+@pytest.mark.study("rhot_app/ui/wizards", "rhot_app/calibration/stereo")
 def test_cameras_are_put_together(simulated_rig, open_on_rig):
     truth = simulated_rig.truth
     right = msgspec.structs.replace(truth.nodes[1], pose=CameraPose(translation_m=(0.06, 0.0, 0.0)))
@@ -89,6 +90,7 @@ def test_cameras_are_set_and_the_nodes_keep_it(simulated_rig, open_on_rig):
     hands.until(lambda: obeyed_exposures(simulated_rig) == before)
 
 
+@pytest.mark.study("rhot_app/ui/wizards", "rhot_app/calibration/lens")
 def test_a_lens_is_found(simulated_rig, open_on_rig):
     truth = simulated_rig.truth
     lens = msgspec.structs.replace(truth.nodes[0].intrinsics, fx=600.0, fy=600.0)

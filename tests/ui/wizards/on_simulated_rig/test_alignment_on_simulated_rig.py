@@ -13,6 +13,7 @@ from rhot_app.simulator.scene.scene_description import HandShow
 from rhot_app.ui.backend.contract import TwinChoice
 
 
+@pytest.mark.study("rhot_app/ui/wizards", "rhot_app/objects/alignment")
 def test_the_simulated_tracker_is_aligned(simulated_rig, open_on_rig):
     simulated_rig.stage.show(HandShow("roam"))
     hands = open_on_rig("alignment")

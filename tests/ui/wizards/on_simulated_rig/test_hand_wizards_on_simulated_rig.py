@@ -58,6 +58,7 @@ def test_the_time_of_the_cameras_is_found(simulated_rig, open_on_rig):
     assert simulated_rig.saved.nodes[1].time_offset_s == pytest.approx(0.0, abs=0.003)
 
 
+@pytest.mark.study("rhot_app/ui/wizards", "rhot_app/calibration/depth")
 def test_depth_is_found_without_a_board(simulated_rig, open_on_rig):
     hands = open_on_rig("depth")
     page = hands.window.page
@@ -93,6 +94,7 @@ def click_marker(hands, camera, at):
                             round(place.target.y() + (at[1] + 0.5) * place.scale)))
 
 
+@pytest.mark.study("rhot_app/ui/wizards", "rhot_app/calibration/colour")
 def test_colours_are_learnt(simulated_rig, open_on_rig):
     truth = simulated_rig.truth
     simulated_rig.use(msgspec.structs.replace(truth, markers=other_colours(truth.markers)))
@@ -133,6 +135,7 @@ def test_colours_are_learnt(simulated_rig, open_on_rig):
     hands.until(lambda: hands.sentence == "The old one is back.", 40.0)
 
 
+@pytest.mark.study("rhot_app/ui/wizards", "rhot_app/calibration/hand")
 def test_bones_are_measured(simulated_rig, open_on_rig):
     simulated_rig.stage.show(HandShow("sweep"))
     hands = open_on_rig("bones")
@@ -153,6 +156,7 @@ def test_bones_are_measured(simulated_rig, open_on_rig):
     assert sum(found.bones_mm) == pytest.approx(sum(true.bones_mm), rel=0.1)
 
 
+@pytest.mark.study("rhot_app/ui/wizards", "rhot_app/calibration/filters")
 def test_filters_are_tuned(simulated_rig, open_on_rig):
     lazy = OneEuroSettings(min_cutoff_hz=0.05, beta=0.0)
     simulated_rig.use(msgspec.structs.replace(simulated_rig.truth, filters=FilterSettings(pixel=lazy, position=lazy)))

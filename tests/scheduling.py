@@ -1,0 +1,98 @@
+"""How long tests take, and in which order they run on several processes: files that take longest come first.
+
+A plug-in of pytest, which `tests/conftest.py` loads. A run keeps the seconds of each test in pytest's cache, from where
+``benchmarks/test_times.py`` prints them and renews `WEIGHTS`, the seconds per file that decide the order.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Generator
+from functools import cache
+from pathlib import Path
+
+import pytest
+from xdist.scheduler import LoadFileScheduling
+
+WEIGHTS = Path(__file__).with_name("file_seconds.json")
+CACHE_KEY = "rhot/test_times"
+UNKNOWN_S = 10.0
+"""Seconds that are expected of a file that no run has measured."""
+
+TOGETHER = ("tests/ui/wizards/on_simulated_rig",)
+"""Folders whose files share something that takes long to start, so that one process runs them all."""
+
+
+def unit_of(nodeid: str) -> str:
+    """What runs in one process, one after the other: a file, or a folder of `TOGETHER`."""
+    file = nodeid.partition("::")[0]
+    return next((folder for folder in TOGETHER if file.startswith(f"{folder}/")), file)
+
+
+@cache
+def expected_seconds() -> dict[str, float]:
+    """Seconds by unit, as measured once."""
+    seconds: dict[str, float] = {}
+    for file, value in json.loads(WEIGHTS.read_text()).items():
+        seconds[unit_of(file)] = seconds.get(unit_of(file), 0.0) + value
+    return seconds
+
+
+class Scheduling(LoadFileScheduling):
+    """Hands units to processes in the order in which they were collected."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return unit_of(nodeid)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> Scheduling:
+    config.option.loadscopereorder = False
+    return Scheduling(config, log)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """The longest units first, so that all processes end together. Alone, a process keeps pytest's order."""
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: (-expected_seconds().get(unit_of(item.nodeid), UNKNOWN_S), unit_of(item.nodeid)))
+
+
+def _processor_s() -> float:
+    """Seconds of processor that this process and its ended children have used."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+class TestTimes:
+    """Seconds of every test by the clock and of the processor, kept when the run ends."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self._config = config
+        self._times: dict[str, tuple[float, float]] = {}
+        self._begun_s = 0.0
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self) -> Generator[None, object, object]:
+        self._begun_s = _processor_s()
+        return (yield)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(self) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+        report = yield
+        report.user_properties.append(("processor_s", _processor_s() - self._begun_s))
+        return report
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        wall_s, _ = self._times.get(report.nodeid, (0.0, 0.0))
+        cpu_s = [value for name, value in report.user_properties if name == "processor_s"]
+        self._times[report.nodeid] = (wall_s + report.duration, cpu_s[-1] if cpu_s else 0.0)
+
+    def pytest_sessionfinish(self) -> None:
+        if self._times and not hasattr(self._config, "workerinput"):
+            self._config.cache.set(CACHE_KEY, {name: [round(value, 3) for value in times]
+                                               for name, times in self._times.items()})
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(TestTimes(config))
