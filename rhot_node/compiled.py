@@ -5,18 +5,23 @@ after an update, old and new code would run mixed and nobody would notice. A fol
 numba compiles, and of those that these import, whose constants are compiled in, makes that impossible, and it is
 writable where the package is not. The hash is of their place as well: numba does not find what it compiled of the same
 sources in another one.
+
+A new folder begins with what earlier ones have of modules that are unchanged, with all that they import.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
 import os
 import re
 import shutil
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
@@ -26,34 +31,60 @@ _PACKAGES = ("rhot_node", "rhot_app")
 _COMPILER = b"numba"
 _IMPORTS = re.compile(r"^from ([\w.]+) import ([^()\n]+|\([^)]*)", re.MULTILINE)
 _COMPLETE = "complete"
+_MODULES = "modules.json"
 
 
 def sources_hash(folders: Sequence[Path]) -> str:
     """16 hex digits that change with any source file in `folders` that is compiled, or imported by one that is, and
     with where they lie."""
-    digest = hashlib.sha256()
-    for folder in folders:
-        digest.update(bytes(folder.resolve()))
-    texts = {".".join(path.relative_to(folder.parent).with_suffix("").parts): path.read_bytes()
-             for folder in folders for path in folder.rglob("*.py")}
-    for module in sorted(_compiled_and_imported(texts)):
-        digest.update(module.encode())
-        digest.update(texts[module])
-    return digest.hexdigest()[:16]
+    texts = _texts(folders)
+    return _hash(texts, _with_imports(texts, _compiled(texts)), folders)
 
 
-def _compiled_and_imported(texts: dict[str, bytes]) -> set[str]:
-    """Of modules, by their dotted names, those that are compiled and all that they import, directly or not."""
+def module_hashes(folders: Sequence[Path]) -> dict[str, str]:
+    """Of each module in `folders` that is compiled, a hash of its source and of all that it imports."""
+    texts = _texts(folders)
+    return {module: _hash(texts, _with_imports(texts, [module]), folders) for module in _compiled(texts)}
+
+
+def _texts(folders: Sequence[Path]) -> dict[str, bytes]:
+    """Source files by the dotted names of their modules."""
+    return {".".join(path.relative_to(folder.parent).with_suffix("").parts): path.read_bytes()
+            for folder in folders for path in folder.rglob("*.py")}
+
+
+def _compiled(texts: dict[str, bytes]) -> list[str]:
+    return [module for module, text in texts.items() if _COMPILER in text]
+
+
+def _with_imports(texts: dict[str, bytes], modules: Sequence[str]) -> set[str]:
+    """These modules and all that they import, directly or not."""
     found: set[str] = set()
-    waiting = [module for module, text in texts.items() if _COMPILER in text]
+    waiting = list(modules)
     while waiting:
         module = waiting.pop()
         if module in found or module not in texts:
             continue
         found.add(module)
-        for package, names in _IMPORTS.findall(texts[module].decode()):
-            waiting += [package, *(f"{package}.{name}" for name in re.findall(r"\w+", names))]
+        waiting += _imports(texts[module])
     return found
+
+
+@cache
+def _imports(text: bytes) -> list[str]:
+    """What a source file may import, by dotted names; some are functions and no modules."""
+    return [name for package, names in _IMPORTS.findall(text.decode())
+            for name in (package, *(f"{package}.{name}" for name in re.findall(r"\w+", names)))]
+
+
+def _hash(texts: dict[str, bytes], modules: set[str], folders: Sequence[Path]) -> str:
+    digest = hashlib.sha256()
+    for folder in folders:
+        digest.update(bytes(folder.resolve()))
+    for module in sorted(modules):
+        digest.update(module.encode())
+        digest.update(texts[module])
+    return digest.hexdigest()[:16]
 
 
 def use_own_cache() -> None:
@@ -63,9 +94,9 @@ def use_own_cache() -> None:
     try:
         from platformdirs import user_cache_path
         base = user_cache_path("rhot") / "numba"
-        folder = base / _present_hash()
+        folder = base / sources_hash(_packages())
         if not folder.is_dir():
-            folder.mkdir(parents=True)
+            _begin(folder)
             _forget_old(base)
         folder.touch()
     except OSError:  # no home, or a read-only one: numba then keeps to its own rules
@@ -120,7 +151,7 @@ def compiles_since(t_unix_s: float) -> bool:
 
 def is_compiled_in(cache: Path) -> bool:
     """Whether the cache of a user or service (what XDG_CACHE_HOME names) has any code of the present sources."""
-    return any((cache / "rhot" / "numba" / _present_hash()).rglob("*.nbi"))
+    return any((cache / "rhot" / "numba" / sources_hash(_packages())).rglob("*.nbi"))
 
 
 def mark_complete() -> None:
@@ -129,13 +160,46 @@ def mark_complete() -> None:
         (Path(os.environ[VARIABLE]) / _COMPLETE).touch()
 
 
-def _present_hash() -> str:
+def _packages() -> list[Path]:
     root = Path(__file__).parent.parent
-    return sources_hash([root / name for name in _PACKAGES if (root / name).is_dir()])
+    return [root / name for name in _PACKAGES if (root / name).is_dir()]
+
+
+def _begin(folder: Path) -> None:
+    """Make the folder of the present sources, with what the others beside it have of unchanged modules."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    hashes = module_hashes(_packages())
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".new-", ignore_cleanup_errors=True) as place:
+        new = Path(place) / folder.name
+        new.mkdir()
+        (new / _MODULES).write_text(json.dumps(hashes))
+        for old in _newest_first(folder.parent):
+            with contextlib.suppress(OSError, ValueError):  # of an older version, or being removed
+                _link_unchanged(old, json.loads((old / _MODULES).read_text()), new, hashes)
+        with contextlib.suppress(OSError):  # another process was quicker
+            new.rename(folder)
+
+
+def _link_unchanged(old: Path, old_hashes: dict[str, str], new: Path, hashes: dict[str, str]) -> None:
+    """Link what `old` has of modules whose hash is the same. numba keeps ``f`` of ``package/module.py`` in files named
+    ``module.f-LINE...``, in a folder named by the name and the hash of ``package``'s path."""
+    root = Path(__file__).parent.parent
+    for module in {module for module, digest in hashes.items() if old_hashes.get(module) == digest}:
+        package = root.joinpath(*module.split(".")[:-1])
+        place = f"{package.name}_{hashlib.sha1(os.fsencode(package)).hexdigest()}"
+        for file in (old / place).glob(f"{module.rpartition('.')[2]}.*"):
+            target = new / place / file.name
+            if not target.exists():
+                target.parent.mkdir(exist_ok=True)
+                os.link(file, target)
+
+
+def _newest_first(base: Path) -> list[Path]:
+    folders = [path for path in base.iterdir() if path.is_dir() and not path.name.startswith(".")]
+    return sorted(folders, key=lambda path: path.stat().st_mtime, reverse=True)
 
 
 def _forget_old(base: Path) -> None:
-    folders = sorted((path for path in base.iterdir() if path.is_dir()), key=lambda path: path.stat().st_mtime)
-    for folder in folders[:-_KEPT]:
+    for folder in _newest_first(base)[_KEPT:]:
         if time.time() - folder.stat().st_mtime > _IN_USE_S:  # programs of other checkouts may run on it
             shutil.rmtree(folder, ignore_errors=True)

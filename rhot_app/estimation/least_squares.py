@@ -12,8 +12,8 @@ from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
+from rhot_app.estimation.quantiles import chi_squared
 from rhot_app.estimation.residual import Kernel, Rows, stack
 
 Array = NDArray[np.float64]
@@ -123,6 +123,6 @@ def fit_linear(columns: Array, target: Array, kernel: Kernel, rounds: int, rcond
         solution = np.asarray(np.linalg.lstsq((columns * root[:, :, None]).reshape(-1, len(solution)),
                                               (target * root).ravel(), rcond=rcond)[0], np.float64)
         squared = np.sum((target - columns @ solution) ** 2, axis=1)
-        variance = max(least_sd**2, float(np.median(squared)) / float(chi2.ppf(0.5, target.shape[1])), 1e-18)
+        variance = max(least_sd**2, float(np.median(squared)) / float(chi_squared(0.5, target.shape[1])), 1e-18)
         weights = kernel.weights(squared / variance, dimension)
     return solution, weights

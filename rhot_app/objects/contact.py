@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
+from rhot_app.estimation.quantiles import normal_isf
 from rhot_app.estimation.residual import Kernel, Rows, student
 from rhot_app.hand.dh import DhArrays, riding_points
 from rhot_app.hand.kinematics import TWIST, empty_frames, forward_arrays, jacobian_arrays
@@ -26,7 +26,7 @@ SWITCHING = 1e-3
 """Probability with which noise alone changes the flag of a finger that hovers midway between the two thresholds, where
 it is largest. It is that of one sample."""
 
-BEGIN_SD, END_SD = 0.0, 2.0 * float(norm.isf(SWITCHING))
+BEGIN_SD, END_SD = 0.0, 2.0 * normal_isf(SWITCHING)
 """Standard deviations of the distance: contact begins when the pad is within the surface with a probability of one
 half, and ends beyond a distance that noise exceeds by SWITCHING from midway."""
 

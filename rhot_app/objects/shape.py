@@ -88,7 +88,8 @@ class Sphere:
     def signed_distance(self, points: Array) -> tuple[Array, Array]:
         """See `Shape`."""
         far = np.linalg.norm(points, axis=1)
-        normal = np.where(far[:, None] > _AT_CENTRE_M, points / np.maximum(far, _AT_CENTRE_M)[:, None], [1.0, 0.0, 0.0])
+        central = far[:, None] <= _AT_CENTRE_M
+        normal = np.where(central, [1.0, 0.0, 0.0], points / np.where(central, 1.0, far[:, None]))
         return far - self.radius_m, normal
 
 
@@ -110,7 +111,8 @@ class Cylinder:
     def signed_distance(self, points: Array) -> tuple[Array, Array]:
         """See `Shape`."""
         far = np.hypot(points[:, 0], points[:, 1])
-        radial = np.where(far[:, None] > _AT_CENTRE_M, points[:, :2] / np.maximum(far, _AT_CENTRE_M)[:, None], [1.0, 0.0])
+        axial = far[:, None] <= _AT_CENTRE_M
+        radial = np.where(axial, [1.0, 0.0], points[:, :2] / np.where(axial, 1.0, far[:, None]))
         up = np.where(points[:, 2] < 0.0, -1.0, 1.0)
         away = np.column_stack([far - self.radius_m, np.abs(points[:, 2]) - 0.5 * self.length_m])
         distance, across = _corner_distance(away)

@@ -12,6 +12,8 @@ import pytest
 
 from rhot_node.compiled import VARIABLE, compiles_since, is_complete, mark_complete, sources_hash
 
+ROOT = Path(__file__).parents[2]
+
 
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
@@ -65,6 +67,31 @@ def test_a_start_uses_its_own_folder_and_forgets_old_ones(tmp_path: Path) -> Non
     assert folder.is_dir() and folder.parent == base
     assert sorted(path.name for path in base.iterdir()) == sorted(["old3", "old4", folder.name])
     assert start(tmp_path) == str(folder)
+
+
+def test_an_update_compiles_what_has_changed_only(tmp_path: Path) -> None:
+    """Old code of an unchanged function that calls a changed one would be wrong."""
+    package = Path(shutil.copytree(ROOT / "rhot_node", tmp_path / "rhot_node", ignore=lambda *_: ["__pycache__"]))
+    (package / "inner.py").write_text("from numba import njit\n\n@njit(cache=True)\ndef number(): return 1\n")
+    (package / "calls.py").write_text("from numba import njit\nfrom rhot_node.inner import number\n\n\n"
+                                      "@njit(cache=True)\ndef calls(): return number() + 10\n")
+    (package / "alone.py").write_text("from numba import njit\n\n\n@njit(cache=True)\ndef alone(): return 20\n")
+    program = ("import rhot_node\nfrom rhot_node.alone import alone\nfrom rhot_node.calls import calls\n"
+               "print(calls(), alone(), sum(calls.stats.cache_hits.values()), sum(alone.stats.cache_hits.values()))")
+
+    def run() -> list[int]:
+        environment = {key: value for key, value in os.environ.items() if key != VARIABLE}
+        environment |= {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)}
+        said = subprocess.run([sys.executable, "-P", "-c", program], env=environment, cwd=tmp_path, text=True,
+                              capture_output=True, check=True).stdout
+        return [int(word) for word in said.split()]
+
+    assert run() == [11, 20, 0, 0]
+    assert run() == [11, 20, 1, 1]
+    (package / "inner.py").write_text("from numba import njit\n\n@njit(cache=True)\ndef number(): return 2\n")
+    assert run() == [12, 20, 0, 1]
+    (package / "markers.py").write_text((package / "markers.py").read_text() + "\n# changed\n")
+    assert run() == [12, 20, 1, 1]
 
 
 def test_the_environment_decides_and_a_missing_home_is_no_obstacle(tmp_path: Path) -> None:

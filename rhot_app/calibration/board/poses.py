@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.bundle.adjustment import Bundle, adjust
 from rhot_app.calibration.bundle.model import POINT, BoardFreedom, LensFreedom, Observations
+from rhot_app.estimation.quantiles import f_tail
 from rhot_app.geometry.camera import undistort_points
 from rhot_app.geometry.transforms import apply, exp_so3, rigid
 from rhot_app.progress import Progress, silent
@@ -178,7 +178,7 @@ def _better(plain: Bundle, bent: Bundle, corners: int) -> bool:
     before = plain.noise_px**2 * (2 * corners - plain.determined)
     after = bent.noise_px**2 * left
     ratio = (before - after) / more / max(after / left, 1e-300)
-    return bool(stats.f.sf(ratio, more, left) < _CHANCE)
+    return bool(f_tail(ratio, more, left) < _CHANCE)
 
 
 def _evidence(bundle: Bundle, spread: Array) -> Array:

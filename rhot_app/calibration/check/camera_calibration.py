@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.check.health import HealthFinding
-from rhot_app.calibration.stereo.ruler import lengths_finding
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.project import Intrinsics, Rig
 
@@ -48,6 +47,13 @@ def calibration_finding(rig: Rig) -> HealthFinding | None:
     if rig.calibration is not None and rig.calibration.lengths == "skipped":
         return HealthFinding("stereo", lengths_finding())
     return None
+
+
+def lengths_finding() -> Finding:
+    """What is said when no second length was given."""
+    return Finding("lengths_unproven", Grade.FAIR, "Lengths were never checked against a ruler.",
+                   "If the board's squares are not as large as said, every length is wrong by the same factor.",
+                   "Put the cameras together again with a known length: lens to lens, or a ruler.")
 
 
 def calibration_text(rig: Rig) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.board.poses import PosedView, pose_view
 from rhot_app.calibration.board.shared_views import Dropped, SharedViews
+from rhot_app.calibration.check.camera_calibration import lengths_finding
 from rhot_app.calibration.check.checks import check_cameras
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
@@ -20,7 +21,7 @@ from rhot_app.calibration.stereo.checks import arrangement_findings, dropped_fin
 from rhot_app.calibration.stereo.diagnosis import Doubtful, explain, explain_shot
 from rhot_app.calibration.stereo.points import LensEvidence, lens_evidence, mismatch_finding
 from rhot_app.calibration.stereo.report import StereoFigures, StereoReport, figures_of
-from rhot_app.calibration.stereo.ruler import RulerReading, baseline_finding, lengths_finding, read_ruler, ruler_finding
+from rhot_app.calibration.stereo.ruler import RulerReading, baseline_finding, read_ruler, ruler_finding
 from rhot_app.calibration.stereo.start import Link, PlacedShot, WorldFrame, all_links, place_shot, spanning_tree
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError

@@ -83,13 +83,6 @@ def ruler_finding(result: RulerResult, square_m: float) -> Finding:
     return Finding("ruler", Grade.GOOD, f"{measured}: the size of the squares is right.")
 
 
-def lengths_finding() -> Finding:
-    """What is said when no second length was given."""
-    return Finding("lengths_unproven", Grade.FAIR, "Lengths were never checked against a ruler.",
-                   "If the board's squares are not as large as said, every length is wrong by the same factor.",
-                   "Put the cameras together again with a known length: lens to lens, or a ruler.")
-
-
 def baseline_finding(measured_m: float, nominal_m: float, square_m: float, names: tuple[str, str]) -> Finding:
     """The baseline against one measured by hand between the lenses."""
     ratio = nominal_m / measured_m

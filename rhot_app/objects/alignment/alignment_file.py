@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import msgspec
 import numpy as np
@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.transforms import quaternion_from_rotation, rigid, rotation_from_quaternion
-from rhot_app.objects.alignment.report import AlignmentReport
 from rhot_app.project import Metres
 from rhot_node.files import read_document, write_document
+
+if TYPE_CHECKING:
+    from rhot_app.objects.alignment.report import AlignmentReport
 
 Array = NDArray[np.float64]
 

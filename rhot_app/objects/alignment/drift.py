@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from scipy.stats import chi2
 
 from rhot_app.estimation.least_squares import fit_linear
+from rhot_app.estimation.quantiles import chi_squared_isf
 from rhot_app.estimation.residual import student
 from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.alignment.alignment_file import Alignment
@@ -85,7 +85,7 @@ class DriftMonitor:
         values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
         used = values > 1e-9
         statistic = float(np.sum((vectors.T @ (score / scale))[used] ** 2 / values[used]))
-        limit = float(chi2.isf(FALSE_ALARM, int(used.sum())))
+        limit = float(chi_squared_isf(FALSE_ALARM, int(used.sum())))
         moved = drift @ step
         distance_m = float(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
         stale = statistic > limit

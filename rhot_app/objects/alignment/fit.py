@@ -20,10 +20,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
-from scipy.stats import chi2
 
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import LEAST_DAMPING, Dense, fit_linear, minimise
+from rhot_app.estimation.quantiles import chi_squared
 from rhot_app.estimation.residual import Rows, student
 from rhot_app.geometry.transforms import best_rotation, rigid, skew
 from rhot_app.objects.alignment.model import GAP_S, ROTATION, TRANSLATION, AlignmentEstimate, AlignmentModel
@@ -48,12 +48,12 @@ LASTING_M = 0.5e-3
 LASTING_S = 1.0
 """s: correlation time of that error (`hand.motion.hand_process.BIAS_S`)."""
 
-INLIER_GATE = float(chi2.ppf(0.999, 3))
+INLIER_GATE = float(chi_squared(0.999, 3))
 """Squared Mahalanobis distance of an inlier: 99.9 % of Gaussian errors."""
 
 _KERNEL = student(4.0)
 _NU, _DIMENSION = 4.0, 3
-_GAUSSIAN_SQUARES = chi2.ppf((np.arange(1000) + 0.5) / 1000.0, _DIMENSION)
+_GAUSSIAN_SQUARES = chi_squared((np.arange(1000) + 0.5) / 1000.0, _DIMENSION)
 _GAUSSIAN_SHARE = float(np.mean(_KERNEL.weights(_GAUSSIAN_SQUARES, np.full(1000, 3.0)) * _GAUSSIAN_SQUARES)) / 3.0
 _LEVER_M = 0.1  # of the start: a rotation counts as the motion of a point this far away
 _START_ROWS = 500

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
-from scipy.stats import chi2
 
 from rhot_app.errors import CalibrationError
+from rhot_app.estimation.quantiles import chi_squared, chi_squared_isf
 from rhot_node.errors import printable
 from rhot_node.files import read_document_bytes
 
@@ -23,7 +23,7 @@ JUMP_M, JUMP_RAD = 10e-3, 0.1
 """m and rad: a sample this far from the cubic through its four neighbours is an outlier. For a hand at 5 Hz, 60 samples
 a second and 50 m/s^2 the cubic errs by less than 1 mm (Lagrange's remainder)."""
 
-OUTLIER_GATE = float(np.sqrt(chi2.isf(1e-6, 3) / chi2.ppf(0.5, 3)))
+OUTLIER_GATE = float(np.sqrt(chi_squared_isf(1e-6, 3) / chi_squared(0.5, 3)))
 """And this many times the median distance: Gaussian errors of a stream with few samples a second go beyond once in a
 million samples."""
 

@@ -19,10 +19,10 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from rhot_app.calibration.check.camera_calibration import calibration_error
 from rhot_app.estimation.change_point import ChangePoint, find_change
+from rhot_app.estimation.quantiles import chi_squared_tail
 from rhot_app.geometry.camera import CameraModel, point_rays, undistort_point
 from rhot_app.geometry.transforms import exp_so3, inverse, log_so3, rigid
 from rhot_app.geometry.triangulate import Outcome, triangulate
@@ -329,7 +329,7 @@ class RigRefiner:
         before, after = (float(np.median(np.abs(linearise(since, where, self._focal).error_px))) / math.sqrt(2.0)
                          for where in (self._stored, poses))
         return Refinement(
-            tuple(cameras), poses, chi_squared, freedom, float(chi2.sf(chi_squared, max(freedom, 1))),
+            tuple(cameras), poses, chi_squared, freedom, float(chi_squared_tail(chi_squared, max(freedom, 1))),
             found.knocked_s, before, after, _rms(midpoints(since, self._stored) - midpoints(since, poses)),
             self._places_sd_m(since, found), _rms(midpoints(since, poses) - poses[:, :3, 3].mean(axis=0)),
             found.dispersion, len(since.t_s), len(np.unique(since.voxel)), float(np.ptp(since.t_s)))
