@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Generator
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -20,42 +19,23 @@ CACHE_KEY = "rhot/test_times"
 UNKNOWN_S = 10.0
 """Seconds that are expected of a file that no run has measured."""
 
-TOGETHER = ("tests/ui/wizards/on_simulated_rig",)
-"""Folders whose files share something that takes long to start, so that one process runs them all."""
 
-
-def unit_of(nodeid: str) -> str:
-    """What runs in one process, one after the other: a file, or a folder of `TOGETHER`."""
-    file = nodeid.partition("::")[0]
-    return next((folder for folder in TOGETHER if file.startswith(f"{folder}/")), file)
-
-
-@cache
-def expected_seconds() -> dict[str, float]:
-    """Seconds by unit, as measured once."""
-    seconds: dict[str, float] = {}
-    for file, value in json.loads(WEIGHTS.read_text()).items():
-        seconds[unit_of(file)] = seconds.get(unit_of(file), 0.0) + value
-    return seconds
-
-
-class Scheduling(LoadFileScheduling):
-    """Hands units to processes in the order in which they were collected."""
-
-    def _split_scope(self, nodeid: str) -> str:
-        return unit_of(nodeid)
-
-
-def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> Scheduling:
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> LoadFileScheduling:
+    """Hands whole files to processes in the order in which they were collected."""
     config.option.loadscopereorder = False
-    return Scheduling(config, log)
+    return LoadFileScheduling(config, log)
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """The longest units first, so that all processes end together. Alone, a process keeps pytest's order."""
+    """The longest files first, so that all processes end together. Alone, a process keeps pytest's order."""
     if hasattr(config, "workerinput"):
-        items.sort(key=lambda item: (-expected_seconds().get(unit_of(item.nodeid), UNKNOWN_S), unit_of(item.nodeid)))
+        seconds = json.loads(WEIGHTS.read_text())
+        items.sort(key=lambda item: (-seconds.get(_file(item), UNKNOWN_S), _file(item)))
+
+
+def _file(item: pytest.Item) -> str:
+    return item.nodeid.partition("::")[0]
 
 
 def _processor_s() -> float:

@@ -55,9 +55,9 @@ class SimulatedRig:
         assert started_processes(self.session._place) == []
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def simulated_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedRig]:
-    """One for all wizards: it takes seconds to start. It ends with them, so that later tests have the processor."""
+    """One for all tests of a module: it takes seconds to start, and while it runs it takes half a processor."""
     rig = SimulatedRig(tmp_path_factory.mktemp("rig"))
     yield rig
     rig.close()

@@ -42,6 +42,7 @@ def solved(hands, seconds=120.0):
     assert step.report is not None, step.view().hint
 
 
+@pytest.mark.study("rhot_app/ui/wizards", "rhot_app/calibration/time")
 def test_the_time_of_the_cameras_is_found(simulated_rig, open_on_rig):
     truth = simulated_rig.truth
     late = msgspec.structs.replace(truth.nodes[1], time_offset_s=0.02)
