@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib
+import io
+import json
 import re
 import subprocess
 import sys
@@ -78,15 +82,17 @@ OPTIONS: dict[str, tuple[str, ...]] = {
 def help_of(command: str) -> str:
     """What ``COMMAND --help`` prints; it must end with code 0."""
     program, *arguments = command.split()
-    done = subprocess.run([sys.executable, "-m", MODULES[program], *arguments, "--help"], capture_output=True,
-                          text=True, check=False)
-    assert done.returncode == 0, f"{command} --help: {done.stderr}"
-    return done.stdout
+    main, told = importlib.import_module(f"{MODULES[program]}.__main__").main, io.StringIO()
+    with contextlib.redirect_stdout(told), pytest.raises(SystemExit) as end:
+        main([*arguments, "--help"])
+    assert end.value.code == 0
+    return told.getvalue()
 
 
-def documented_commands() -> list[tuple[str, str]]:
-    """(file, command line) of every command in the documents, with ``./run X`` read as ``rhot X``."""
-    found = []
+@cache
+def documented_commands() -> dict[str, list[str]]:
+    """By command: the lines of the documents that run it, each after its file; ``./run X`` is read as ``rhot X``."""
+    found: dict[str, list[str]] = {}
     for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]:
         text = path.read_text().replace("\\\n", " ") if path.exists() else ""
         spans = re.findall(r"`((?:rhot|rhot-node|\./run) [^`\n]+)`", text)
@@ -95,7 +101,9 @@ def documented_commands() -> list[tuple[str, str]]:
             line = line.split("#")[0].removeprefix(".venv/bin/").strip()
             if re.match(r"\./run (test|setup)\b|\S+ COMMAND", line):
                 continue
-            found.append((path.name, line.replace("./run ", "rhot ")))
+            words = line.replace("./run ", "rhot ").split()
+            command = next(named for count in (3, 2, 1) if (named := " ".join(words[:count])) in OPTIONS)
+            found.setdefault(command, []).append(" ".join([f"{path.name}:", *words]))
     return found
 
 
@@ -106,15 +114,22 @@ def test_help_names_every_option(command: str) -> None:
     assert not missing, f"{command} --help does not mention {', '.join(missing)}"
 
 
-@pytest.mark.parametrize(("file", "line"), documented_commands())
-def test_documented_commands_exist(file: str, line: str) -> None:
-    words = line.split()
-    command = next(named for count in (3, 2, 1) if (named := " ".join(words[:count])) in OPTIONS)
-    if command == "rhot":
-        assert len(words) == 1 or words[1].startswith("-"), f"{file}: there is no command {line!r}"
-    text = help_of(command)
-    for option in re.findall(r"(?<!\S)--?[a-z][a-z-]*", line):
-        assert option in text, f"{file}: {line!r} names {option}, which {command} --help does not"
+def test_documented_commands_exist() -> None:
+    none = [line for line in documented_commands()["rhot"] if re.search(": rhot [^-]", line)]
+    assert not none, f"there are no such commands: {none}"
+
+
+@pytest.mark.parametrize("command", OPTIONS)
+def test_documented_options_exist(command: str) -> None:
+    unknown = {option: line for line in documented_commands().get(command, [])
+               for option in re.findall(r"(?<!\S)--?[a-z][a-z-]*", line) if option not in help_of(command)}
+    assert not unknown, f"{command} --help does not name {unknown}"
+
+
+@pytest.mark.parametrize("module", MODULES.values())
+def test_a_program_starts_as_a_module(module: str) -> None:
+    done = subprocess.run([sys.executable, "-m", module, "--help"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "usage: " in done.stdout, done.stderr
 
 
 def test_the_list_of_commands_is_whole() -> None:
@@ -135,15 +150,35 @@ NO_SUCH_FILE = (
 )
 
 
+REFUSALS = """
+import contextlib, io, json, sys, rhot_app
+sys.modules["numba"] = None  # whatever imports it fails
+from rhot_app.__main__ import main
+told = {}
+for command in json.loads(sys.argv[1]):
+    with contextlib.redirect_stderr(io.StringIO()) as error:
+        code = main(command.replace("NONE", "no-such-file").replace("RIG", sys.argv[2]).split())
+    told[command] = code, error.getvalue()
+print(json.dumps(told))
+"""
+
+
+@pytest.fixture(scope="module")
+def refusals(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]:
+    """By command: its exit code and what it says, in a program without compiled code."""
+    done = subprocess.run([sys.executable, "-c", REFUSALS, json.dumps(NO_SUCH_FILE),
+                           str(ROOT / "resources" / "rigs" / "two_pis.json")], capture_output=True, text=True,
+                          check=False, cwd=tmp_path_factory.mktemp("here"))
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
 @pytest.mark.parametrize("command", NO_SUCH_FILE)
-def test_a_missing_file_is_refused_before_compiled_code_is_loaded(command: str, tmp_path: Path) -> None:
+def test_a_missing_file_is_refused_before_compiled_code_is_loaded(
+        command: str, refusals: dict[str, tuple[int, str]]) -> None:
     """Loading it takes seconds, and the first time of all minutes."""
-    words = command.replace("NONE", "no-such-file").replace("RIG", str(ROOT / "resources/rigs/two_pis.json")).split()
-    code = ("import sys, rhot_app; sys.modules['numba'] = None\n"
-            "from rhot_app.__main__ import main; sys.exit(main(sys.argv[1:]))")
-    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False,
-                          cwd=tmp_path)
-    assert done.returncode == 2 and "no-such-file" in done.stderr, done.stderr
+    code, told = refusals[command]
+    assert code == 2 and "no-such-file" in told, told
 
 
 def test_help_loads_no_numerical_library() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
 from pathlib import Path
 
 from hypothesis import settings
@@ -10,6 +11,7 @@ from hypothesis import settings
 TESTS = Path(__file__).parents[1]
 CLOCKS = {"time.monotonic", "time.perf_counter", "time.time", "time.monotonic_ns", "time.perf_counter_ns",
           "time.process_time", "time.thread_time"}
+SLEEP = {"time.sleep"}
 MAY_SLEEP = {
     "patience.py": "between two looks",
     "capture/test_open_camera.py": "a reader that is late", "capture/test_yuv.py": "a reader that is late",
@@ -30,20 +32,23 @@ def calls(tree: ast.AST, names: set[str]) -> list[ast.Call]:
     return [node for node in ast.walk(tree) if isinstance(node, ast.Call) and ast.unparse(node.func) in names]
 
 
-def files() -> list[tuple[str, ast.Module]]:
-    """Every file of the tests, by its place in them."""
-    return [(path.relative_to(TESTS).as_posix(), ast.parse(path.read_text())) for path in sorted(TESTS.rglob("*.py"))]
+def files(names: set[str]) -> Iterator[tuple[str, ast.Module]]:
+    """Every file of the tests in which one of these names stands, by its place in them."""
+    for path in sorted(TESTS.rglob("*.py")):
+        text = path.read_text()
+        if any(name in text for name in names):
+            yield path.relative_to(TESTS).as_posix(), ast.parse(text)
 
 
 def test_nobody_sleeps_where_something_can_be_waited_for() -> None:
-    sleepers = {name for name, tree in files() if calls(tree, {"time.sleep"})}
+    sleepers = {name for name, tree in files(SLEEP) if calls(tree, SLEEP)}
     assert sleepers - set(MAY_SLEEP) == set(), "wait with eventually or settled of tests/patience.py"
     assert set(MAY_SLEEP) - sleepers == set(), "these sleep no more; take them off the list"
 
 
 def test_no_time_is_demanded_of_a_single_attempt() -> None:
     """A time of the clock that is asserted to be short; patience.py has `quickest` for it."""
-    hasty = [f"{name}:{node.lineno}" for name, tree in files() if name != "patience.py"
+    hasty = [f"{name}:{node.lineno}" for name, tree in files(CLOCKS) if name != "patience.py"
              for node in ast.walk(tree) if isinstance(node, ast.Assert) and calls(node.test, CLOCKS)
              and any(isinstance(op, ast.Lt | ast.LtE) for one in ast.walk(node.test) if isinstance(one, ast.Compare)
                      for op in one.ops)]
