@@ -16,18 +16,18 @@ def box_distance(point, sides):
     return best
 
 
-def triangle_distance(point, triangle):
-    """Distance to a triangle (3, 3): to its plane if the foot lies inside, else to its three edges."""
-    a, b, c = triangle
-    best = np.inf
-    for start, end in ((a, b), (b, c), (c, a)):
-        along = np.clip((point - start) @ (end - start) / ((end - start) @ (end - start)), 0.0, 1.0)
-        best = min(best, float(np.linalg.norm(point - start - along * (end - start))))
-    normal = np.cross(b - a, c - a)
-    normal = normal / np.linalg.norm(normal)
-    foot = point - normal * ((point - a) @ normal)
-    sides = [np.cross(end - start, foot - start) @ normal for start, end in ((a, b), (b, c), (c, a))]
-    return min(best, float(abs((point - a) @ normal))) if min(sides) >= 0.0 else best
+def surface_distance(point, triangles):
+    """Distance to triangles (F, 3, 3): to a plane where the foot lies inside of its triangle, else to three edges."""
+    ends = np.roll(triangles, -1, axis=1)
+    edges = ends - triangles
+    along = np.clip(np.sum((point - triangles) * edges, axis=2) / np.sum(edges**2, axis=2), 0.0, 1.0)
+    to_edges = np.linalg.norm(point - triangles - along[..., None] * edges, axis=2).min()
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    heights = np.sum((point - triangles[:, 0]) * normals, axis=1)
+    feet = point - heights[:, None] * normals
+    sides = np.sum(np.cross(edges, feet[:, None] - triangles) * normals[:, None], axis=2)
+    return min(to_edges, np.abs(heights)[(sides >= 0.0).all(axis=1)].min(initial=np.inf))
 
 
 def winding_number(point, triangles):

@@ -13,8 +13,7 @@ from rhot_node.detect.tags import family_number
 Array = NDArray[np.float64]
 
 FINE = 6  # samples of a pixel along each axis
-CELL = 40  # texture px of a tag's side, times its cells
-PAPER_M = 0.25  # of a tag's side, white around it
+PAPER = 4  # a tag's side is so many times as wide as the white paper around it
 
 
 def render(model: ObjectModel, world_from_object: Array, camera: CameraModel, rng: np.random.Generator, *,
@@ -36,27 +35,25 @@ def render(model: ObjectModel, world_from_object: Array, camera: CameraModel, rn
         high = np.minimum(np.ceil(pixels.max(axis=0) + margin) + 1, [width, height]).astype(int)
         if (high <= low).any():
             continue
-        offsets = (np.arange(FINE) + 0.5) / FINE - 0.5
-        xs = (np.arange(low[0], high[0])[:, None] + offsets).ravel()
-        ys = (np.arange(low[1], high[1])[:, None] + offsets).ravel()
-        grid = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
-        rays = np.column_stack([camera.undistort(grid), np.ones(len(grid))]) @ camera.world_from_camera[:3, :3].T
-        right, up = (corners[1] - corners[0]), (corners[0] - corners[3])
-        along = ((corners[0] - camera.centre) @ normal) / (rays @ normal)
-        place = camera.centre + along[:, None] * rays - corners[0]
-        u, v = place @ right / (right @ right), -(place @ up) / (up @ up)  # 0 to 1 over the tag
-        side = cv2.aruco.getPredefinedDictionary(family_number(tag.family)).markerSize + 2
-        texture = cv2.aruco.generateImageMarker(
-            cv2.aruco.getPredefinedDictionary(family_number(tag.family)), tag.id, side, borderBits=1) > 127
-        inside = (u >= 0) & (u < 1) & (v >= 0) & (v < 1)
-        white = ~inside
-        white[inside] = texture[(v[inside] * side).astype(int), (u[inside] * side).astype(int)]
-        paper = (u > -PAPER_M) & (u < 1 + PAPER_M) & (v > -PAPER_M) & (v < 1 + PAPER_M)
-        values = np.where(white, light[1], light[0]).reshape(len(ys), len(xs))
-        share = paper.reshape(len(ys), len(xs)).astype(float)
-        shape = (high[1] - low[1], FINE, high[0] - low[0], FINE)
-        coverage = share.reshape(shape).mean(axis=(1, 3))
-        drawn = (values * share).reshape(shape).mean(axis=(1, 3))
+        # The lens bends lines by next to nothing within a pixel: its samples lie between the undistorted centres.
+        centres = np.stack(np.meshgrid(*(np.arange(low[k] - 1.0, high[k] + 1.0) for k in (0, 1))), axis=-1)
+        rays = camera.undistort(centres.reshape(-1, 2)).reshape(centres.shape)
+        rays = cv2.resize(rays, None, fx=FINE, fy=FINE)[FINE:-FINE, FINE:-FINE]
+        # (u, v), 0 to 1 over the tag, are ratios of affine functions of the ray.
+        right, down, away = corners[1] - corners[0], corners[3] - corners[0], corners[0] - camera.centre
+        rows = np.linalg.inv(np.column_stack([right, down, away])) @ camera.world_from_camera[:3, :3]
+        u, v, w = (rays @ row[:2] + row[2] for row in rows)
+        dictionary = cv2.aruco.getPredefinedDictionary(family_number(tag.family))
+        side = dictionary.markerSize + 2
+        print_ = cv2.aruco.generateImageMarker(dictionary, tag.id, PAPER * side, borderBits=1)
+        levels = np.pad(np.where(print_ > 127, light[1], light[0]), side, constant_values=light[1])
+        levels = np.pad(levels, 1, constant_values=np.nan)
+        columns, lines = (np.clip(PAPER * side * one / w + side + 1.0, 0, len(levels) - 1).astype(np.intp)
+                          for one in (u, v))
+        samples = levels[lines, columns]
+        paper = np.isfinite(samples)
+        coverage, drawn = (cv2.resize(one, None, fx=1.0 / FINE, fy=1.0 / FINE, interpolation=cv2.INTER_AREA)
+                           for one in (paper.astype(float), np.where(paper, samples, 0.0)))
         patch = image[low[1]:high[1], low[0]:high[0]]
         patch[:] = patch * (1.0 - coverage) + drawn
     image = cv2.GaussianBlur(image, (0, 0), blur_px) + noise * rng.normal(size=image.shape)

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -14,6 +11,7 @@ import pytest
 from aligned_streams import make_scene, random_pose
 from scipy.stats import chi2
 
+from rhot_app.__main__ import main
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.transforms import apply, exp_so3, fit_rigid, inverse, log_so3, quaternion_from_rotation, rigid
 from rhot_app.objects.alignment.alignment_file import load_alignment, save_alignment, to_alignment
@@ -23,8 +21,6 @@ from rhot_app.objects.alignment.model import AlignmentEstimate, AlignmentModel
 from rhot_app.objects.alignment.motion_stream import MotionStream, consistent, read_stream
 from rhot_app.objects.alignment.report import calibrate_alignment
 from rhot_app.recording.qualisys import read_qualisys
-
-SEEDS = 20
 
 
 def errors(fit, scene):
@@ -40,9 +36,9 @@ def errors(fit, scene):
 @cache
 def trials(poses):
     out = []
-    for seed in range(SEEDS):
+    for seed in range(10 if poses else 20):  # 130 and 200 degrees of freedom
         scene = make_scene(seed, poses)
-        fit, _ = align(scene.foreign, scene.rig, search_s=0.1)
+        fit, _ = align(scene.foreign, scene.rig, search_s=0.05)
         out.append((errors(fit, scene), fit))
     return out
 
@@ -61,7 +57,7 @@ def test_the_transform_and_the_offset_are_recovered_from_noisy_streams(poses):
 def test_the_errors_are_consistent_with_the_covariance(poses):
     squares = [error @ np.linalg.solve(fit.covariance, error) for error, fit in trials(poses)]
     size = len(trials(poses)[0][0])
-    assert 0.5 < np.mean(squares) / size < 2.0
+    assert 0.5 < np.mean(squares) / size < 2.0  # 0.7 to 1.35 with p = 0.99 where consistent
     assert np.mean(np.array(squares) < chi2.ppf(0.99, size)) > 0.75
 
 
@@ -256,34 +252,30 @@ def write_csv(path, stream):
     np.savetxt(path, np.hstack(columns), delimiter=",", header=header, comments="")
 
 
-def command(*arguments):
-    return subprocess.run([sys.executable, "-m", "rhot_app", "calibrate", "alignment", *map(str, arguments)],
-                          capture_output=True, text=True, check=False,
-                          env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])})
-
-
-def test_the_command_writes_the_file(tmp_path):
+def test_the_command_writes_the_file(tmp_path, capsys):
+    def command(*arguments):
+        return main(["calibrate", "alignment", *map(str, arguments)]), *capsys.readouterr()
     scene = make_scene(1)
     foreign, rig, out = tmp_path / "vive.csv", tmp_path / "tip.csv", tmp_path / "vive.json"
     write_csv(foreign, scene.foreign)
     write_csv(rig, scene.rig)
-    done = command("--foreign", foreign, "--rig-points", rig, "--out", out, "--json")
-    assert done.returncode == 0, done.stderr
-    said = json.loads(done.stdout)
+    code, told, error = command("--foreign", foreign, "--rig-points", rig, "--out", out, "--json")
+    assert code == 0, error
+    said = json.loads(told)
     assert said["grade"] == "good" and abs(said["time_offset_ms"] - 37.0) < 1.0
     np.testing.assert_allclose(load_alignment(out).rig_from_foreign.matrix, scene.rig_from_foreign, atol=1e-3)
-    done = command("--foreign", foreign, "--rig-points", rig, "--check", out)
-    assert done.returncode == 0 and "The alignment holds" in done.stdout, done.stderr
+    code, told, error = command("--foreign", foreign, "--rig-points", rig, "--check", out)
+    assert code == 0 and "holds" in told, error
     moved = tmp_path / "moved.csv"
     write_csv(moved, MotionStream(scene.rig.times_s, scene.rig.positions + np.array([0.0, 5e-3, 0.0])))
-    done = command("--foreign", foreign, "--rig-points", moved, "--check", out)
-    assert done.returncode == 2 and "stale" in done.stderr and "was moved" in done.stderr
-    done = command("--foreign", foreign, "--rig-points", moved, "--check", out, "--json")
-    assert done.returncode == 2 and json.loads(done.stdout)["distance_mm"] == pytest.approx(5.0, abs=0.5)
+    code, _, error = command("--foreign", foreign, "--rig-points", moved, "--check", out)
+    assert code == 2 and "stale" in error and "was moved" in error
+    code, told, _ = command("--foreign", foreign, "--rig-points", moved, "--check", out, "--json")
+    assert code == 2 and json.loads(told)["distance_mm"] == pytest.approx(5.0, abs=0.5)
     rows = foreign.read_text().splitlines()
     foreign.write_text("\n".join([*rows[:10], "1,2,oops", *rows[10:]]))
-    done = command("--foreign", foreign, "--rig-points", rig)
-    assert done.returncode == 2 and f"{foreign}, line 11" in done.stderr and "Traceback" not in done.stderr
+    code, _, error = command("--foreign", foreign, "--rig-points", rig)
+    assert code == 2 and f"{foreign}, line 11" in error
 
 
 @pytest.mark.parametrize(("text", "words"), [

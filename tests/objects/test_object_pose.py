@@ -15,7 +15,9 @@ from rhot_app.objects.state import Validity
 
 CAMERAS = wide_cameras()
 ARRAYS = CameraArrays.of(CAMERAS)
-COUNT = 300
+FEW = 60
+"""Poses. If all are right, fewer than 5 % are wrong with a confidence of 95 %."""
+
 SMALL = plate("small", 1, 1, 20.0, 0.0, "DICT_4X4_50")
 
 
@@ -46,8 +48,8 @@ def random_pose(rng: np.random.Generator, tilts_deg: tuple[float, float]) -> np.
 
 def test_a_frontal_tag_in_one_camera_is_ambiguous_and_never_surely_wrong() -> None:
     rng = np.random.default_rng(1)
-    ambiguous = wrong = 0
-    for _ in range(COUNT):
+    ambiguous, wrong, count = 0, 0, 300
+    for _ in range(count):
         pose = random_pose(rng, (5.0, 15.0))
         found = solve(SMALL, pose, (0,), rng)
         assert found is not None
@@ -56,16 +58,18 @@ def test_a_frontal_tag_in_one_camera_is_ambiguous_and_never_surely_wrong() -> No
         wrong += found.validity is Validity.TRACKED and angle_deg(found.world_from_object, pose) > 4.0 * tilt_sd
         if found.second is not None and found.second_probability >= 0.01:
             assert min(angle_deg(one, pose) for one in (found.world_from_object, found.second)) < 5.0 * tilt_sd
-    print(f"one camera, 20 mm, 5 to 15 degrees: {ambiguous} of {COUNT} ambiguous, {wrong} surely wrong")
-    assert ambiguous > 0.5 * COUNT
-    assert wrong <= 0.01 * COUNT
+    print(f"one camera, 20 mm, 5 to 15 degrees: {ambiguous} of {count} ambiguous, {wrong} surely wrong")
+    assert ambiguous > 0.5 * count
+    assert wrong <= 0.01 * count
 
 
-@pytest.mark.parametrize("model", [TAG, SMALL], ids=lambda model: model.name)
-def test_two_cameras_decide_the_flip(model: ObjectModel) -> None:
+@pytest.mark.parametrize(("model", "count"), [
+    pytest.param(TAG, FEW, id="tag"), pytest.param(SMALL, FEW, id="small"),
+    pytest.param(SMALL, 300, id="small, rarely", marks=pytest.mark.study("rhot_app/objects", "rhot_app/estimation"))])
+def test_two_cameras_decide_the_flip(model: ObjectModel, count: int) -> None:
     rng = np.random.default_rng(2)
     right = decided = surely_wrong = 0
-    for _ in range(COUNT):
+    for _ in range(count):
         pose = random_pose(rng, (5.0, 60.0))
         found = solve(model, pose, (0, 1), rng)
         assert found is not None
@@ -73,14 +77,14 @@ def test_two_cameras_decide_the_flip(model: ObjectModel) -> None:
         right += near
         decided += found.validity is Validity.TRACKED
         surely_wrong += found.validity is Validity.TRACKED and not near
-    print(f"two cameras, {model.name}: {right} of {COUNT} right, {decided} decided, {surely_wrong} surely wrong")
-    assert right >= 0.99 * COUNT
+    print(f"two cameras, {model.name}: {right} of {count} right, {decided} decided, {surely_wrong} surely wrong")
+    assert right >= 0.99 * count
 
 
 def test_a_second_face_decides_the_flip() -> None:
     rng = np.random.default_rng(3)
     right = done = 0
-    while done < COUNT:
+    while done < FEW:
         pose = random_pose(rng, (10.0, 60.0))
         if len(facing_tags(CUBE, pose, CAMERAS[0])) < 2:
             continue
@@ -88,13 +92,13 @@ def test_a_second_face_decides_the_flip() -> None:
         assert found is not None
         done += 1
         right += angle_deg(found.world_from_object, pose) < 5.0 and found.validity is Validity.TRACKED
-    print(f"second face: {right} of {COUNT} right")
-    assert right >= 0.99 * COUNT
+    print(f"second face: {right} of {FEW} right")
+    assert right == FEW
 
 
 def test_the_covariance_is_that_of_the_errors() -> None:
     rng, squares = np.random.default_rng(4), []
-    for _ in range(COUNT):
+    for _ in range(FEW):
         pose = random_pose(rng, (25.0, 55.0))
         found = solve(CUBE, pose, (0, 1), rng)
         assert found is not None
@@ -103,7 +107,7 @@ def test_the_covariance_is_that_of_the_errors() -> None:
         squares.append(error @ np.linalg.solve(found.covariance, error))
     nees = np.mean(squares) / 6.0
     print(f"NEES {nees:.2f}")
-    assert 0.7 < nees < 1.3
+    assert 0.7 < nees < 1.3  # chi-squared with 360 degrees of freedom, p = 0.9999
 
 
 def test_without_noise_the_pose_is_exact() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -98,9 +99,16 @@ def test_an_object_that_was_moved_in_a_gap_is_found_again() -> None:
     assert max(error) < 5e-3
 
 
+@cache
+def still() -> PoseStream:
+    """The first 1500 samples of a real tracker that stands still."""
+    stream = read_pose_stream(STILL)
+    return PoseStream(stream.t_ns[:1500], stream.poses[:1500])
+
+
 @needs_vive
 def test_a_real_tracker_that_stands_still() -> None:
-    stream = read_pose_stream(STILL)
+    stream = still()
     sd = np.sqrt(np.diag(noise_of(stream)))
     states = track_stream("vive", stream)
     accepted = np.array([kept for _, kept in states])
@@ -116,7 +124,7 @@ def test_a_real_tracker_that_stands_still() -> None:
 
 @needs_vive
 def test_jumps_in_a_real_stream_are_rejected() -> None:
-    stream, chosen = jumped(read_pose_stream(STILL), 0.02)
+    stream, chosen = jumped(still(), 0.02)
     accepted = np.array([kept for _, kept in track_stream("vive", stream)])
     assert not accepted[chosen].any()
     assert accepted[~chosen].mean() > 0.98

@@ -28,7 +28,7 @@ from rhot_node.capture.yuv import YuvWriter
 
 CUBE = cube("cube", 60.0, 45.0, "DICT_APRILTAG_36h11")
 WORLD_FROM_CUBE = rigid(exp_so3([0.5, 0.4, 0.1]) @ exp_so3([np.pi, 0.0, 0.0]), [-0.08, -0.04, 0.55])
-SECONDS = 2.0
+SECONDS = 1.0
 SAME_M = 5e-5  # of a state that is replayed
 WORST_M, WORST_RAD = 1e-3, np.radians(0.5)
 
@@ -48,10 +48,10 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 
 def record(folder: Path, scene: Scene, node: RigNode) -> None:
-    """Half a second of what `node` sees of a hand and a cube at rest."""
+    """A quarter of a second of what `node` sees of a hand and a cube at rest."""
     rng, camera = np.random.default_rng(node.node_id), CameraModel.from_rig(node.intrinsics, node.pose)
     with YuvWriter(folder, WIDTH, HEIGHT, EXPOSURE_NS, ROW_TIME_NS) as writer:
-        for frame in range(round(0.5 * FPS)):
+        for frame in range(round(0.25 * FPS)):
             picture = draw(scene.pixels(node, frame / FPS), scene.rig.markers)
             luma = picture[:WIDTH * HEIGHT].reshape(HEIGHT, WIDTH)
             luma[:] = np.clip(render(CUBE, WORLD_FROM_CUBE, camera, rng), 1, 254)
