@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from bench import Bench
+from processes import forked_programs, fresh_programs  # noqa: F401
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from processes import forked_programs, fresh_programs  # noqa: F401
 from tracked_log import states_of_log
 
 from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import msgspec
 import pytest
+from processes import forked_programs, fresh_programs  # noqa: F401
 from streams import Stream
 
 from rhot_app.hand.anatomy import load_hand

@@ -1,0 +1,201 @@
+"""Programs of RHOT in processes that are forked from one that has imported and compiled them: each starts at once.
+
+In a room whose conftest imports `forked_programs`, ``python -m rhot_app ...`` and ``python -m rhot_node ...`` start
+that way when a test or the product calls subprocess. A test that uses `fresh_programs` starts them as users do.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import ctypes
+import gc
+import importlib
+import json
+import os
+import runpy
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PRELOADED = {
+    "rhot_app": ("rhot_app.engine.command", "rhot_app.engine.serve", "rhot_app.engine.offline.replay_command",
+                 "rhot_app.calibration.check.checks", "rhot_app.outputs.outputs", "rhot_app.outputs.web_view",
+                 "rhot_app.simulator.nodes.synthetic_node", "rhot_app.sources.links",
+                 "rhot_app.sources.poses.poses_command", "rhot_app.tracking.trackers"),
+    "rhot_node": ("rhot_node.capture.open", "rhot_node.commands", "rhot_node.daemon", "rhot_node.detect.fast",
+                  "rhot_node.foreground_store", "rhot_node.health.checks", "rhot_node.network.control",
+                  "rhot_node.network.link", "rhot_node.network.pairing", "rhot_node.network.requests",
+                  "rhot_node.plugins", "rhot_node.video.recorder", "rhot_node.warm_up"),
+}
+ROOT = Path(__file__).parents[1]
+Popen = subprocess.Popen
+SERVER_ENVIRONMENT = dict(os.environ)
+PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
+MESSAGE_BYTES = 1 << 17
+
+
+@pytest.fixture(scope="module", autouse=True)
+def forked_programs() -> Iterator[None]:
+    """subprocess starts RHOT's programs by forks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(subprocess, "Popen", ForkingPopen)
+        yield
+
+
+@pytest.fixture
+def fresh_programs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """subprocess starts all programs from nothing, as it does outside of tests."""
+    monkeypatch.setattr(subprocess, "Popen", Popen)
+
+
+class ForkingPopen(Popen):
+    """subprocess.Popen that has ``python -m MODULE ...`` of these packages forked by a server that has imported them.
+
+    The program is a child of this process all the same. What its modules read of the environment at their import, they
+    keep. So a program with another cache of compiled code starts from nothing.
+    """
+
+    def _execute_child(self, args: Any, executable: Any, preexec_fn: Any, close_fds: bool,
+                       pass_fds: Sequence[int], cwd: Any, env: Any, startupinfo: Any, creationflags: int, shell: bool,
+                       p2cread: int, p2cwrite: int, c2pread: int, c2pwrite: int, errread: int, errwrite: int,
+                       *more: Any) -> None:
+        pipes = p2cread, p2cwrite, c2pread, c2pwrite, errread, errwrite
+        words = [args] if isinstance(args, str | bytes | os.PathLike) else [os.fspath(arg) for arg in args]
+        package = words[2].partition(".")[0] if words[:2] == [sys.executable, "-m"] else ""
+        environment = dict(os.environ if env is None else env)
+        has_own_cache = environment.get("NUMBA_CACHE_DIR") != SERVER_ENVIRONMENT.get("NUMBA_CACHE_DIR")
+        if package not in PRELOADED or preexec_fn is not None or pass_fds or has_own_cache:
+            super()._execute_child(args, executable, preexec_fn, close_fds, pass_fds, cwd, env, startupinfo,
+                                   creationflags, shell, *pipes, *more)
+            return
+        request = {"module": words[2], "arguments": words[3:], "folder": str(Path(cwd or ".").resolve()),
+                   "environment": environment, "new_session": more[5]}
+        streams = [number if stream == -1 else stream for number, stream in enumerate((p2cread, c2pwrite, errwrite))]
+        try:
+            self.pid = start(_server(package)[0], json.dumps(request).encode(), streams)
+        finally:
+            self._close_pipe_fds(*pipes)
+        self._child_created = True
+
+
+@cache
+def _server(package: str) -> tuple[socket.socket, subprocess.Popen[bytes]]:
+    """The server of a package. It ends when its socket is closed, with this process at the latest."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with theirs:
+        process = Popen([sys.executable, __file__, package, str(theirs.fileno())], stdin=subprocess.DEVNULL,
+                        stdout=subprocess.DEVNULL, env=SERVER_ENVIRONMENT, pass_fds=[theirs.fileno()])
+    return ours, process
+
+
+def start(server: socket.socket, request: bytes, streams: Sequence[int]) -> int:
+    """The process id of a new program; `streams` are its standard ones.
+
+    The server forks twice, and the process between the two ends: its child is then given to this process.
+    """
+    prctl = ctypes.CDLL(None).prctl
+    prctl(PR_SET_CHILD_SUBREAPER, 1)
+    try:
+        socket.send_fds(server, [request], streams)
+        pid = int(server.recv(MESSAGE_BYTES))
+        server.recv(MESSAGE_BYTES)
+    finally:
+        prctl(PR_SET_CHILD_SUBREAPER, 0)
+    return pid
+
+
+def serve(tests: socket.socket) -> dict[str, Any]:
+    """Fork for each request; returns it in the fork. Ends with the tests."""
+    while True:
+        request, streams, _, _ = socket.recv_fds(tests, MESSAGE_BYTES, 3)
+        if not request:
+            os._exit(0)
+        ready, given = os.pipe()
+        between = os.fork()
+        if between == 0:
+            pid = os.fork()
+            if pid != 0:
+                tests.send(str(pid).encode())
+                os._exit(0)
+            tests.close()
+            os.close(given)
+            os.read(ready, 1)
+            os.close(ready)
+            for number, stream in enumerate(streams):
+                os.dup2(stream, number)
+                os.close(stream)
+            return dict(json.loads(request))
+        os.waitpid(between, 0)
+        tests.send(b"it is your child")
+        for descriptor in (*streams, ready, given):
+            os.close(descriptor)
+
+
+def preload(package: str) -> None:
+    """Import what the package's programs do, and load its compiled code."""
+    if package == "rhot_node":
+        sys.modules["scipy"] = None  # as the program does first of all
+    for module in PRELOADED[package]:
+        importlib.import_module(module)
+    if package == "rhot_node":
+        from rhot_node.detect.fast import FastDetector
+        from rhot_node.files import resource_path
+        from rhot_node.markers import load_markers
+        from rhot_node.warm_up import warm_up
+        markers = load_markers(resource_path("markers", "rhot6.json"))
+        warm_up(FastDetector(markers), markers, (640, 480))
+    else:
+        from rhot_app.engine.pipeline import warm_up as warm_up_tracker
+        from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
+        from rhot_app.tracking.trackers import make_tracker
+        rig = synthetic_rig()
+        warm_up_tracker(make_tracker(rig), rig)
+
+
+def main() -> None:
+    """The server of a package; in each of its forks a program."""
+    code: Any = 1
+
+    def leave() -> None:  # after all else that is done at an exit; modules need not be cleared, that takes long
+        with contextlib.suppress(OSError):
+            sys.stdout.flush()
+        os._exit(code)
+
+    atexit.register(leave)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.path[0] = str(ROOT)
+    package, descriptor = sys.argv[1:]
+    preload(package)
+    gc.collect()
+    gc.freeze()
+    request = serve(socket.socket(fileno=int(descriptor)))
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if request["new_session"]:
+        os.setsid()
+    os.chdir(request["folder"])
+    os.environ.clear()
+    os.environ.update(request["environment"])
+    module = request["module"]
+    sys.argv = ["", *request["arguments"]]
+    sys.path[:1] = [request["folder"], *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
+    for name in (module, f"{module}.__main__"):
+        sys.modules.pop(name, None)  # the program is a module of its own, though it may have been imported
+    try:
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+        code = 0
+    except SystemExit as exit:
+        code = exit.code or 0
+        if isinstance(code, str):
+            raise
+
+
+if __name__ == "__main__":
+    main()
