@@ -1,17 +1,23 @@
 """Compiles the numerical code once and leaves it in numba's cache, so that the first start is as quick as any other.
 
-``python -m rhot_app.warm`` does it after an installation; it fails, with the reason, when the installation is broken.
+``python -m rhot_app.warm`` compiles everything, on all processors; it fails, with the reason, when the installation is
+broken. ``python -m rhot_app.warm window`` compiles what the window needs on the simulated rig, or another name of
+`PARTS`. ``--background`` compiles on one processor and takes only time that nobody else wants.
 """
 
 from __future__ import annotations
 
+import argparse
+import contextlib
 import gc
 import os
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from typing import get_args
 
 import msgspec
 import numpy as np
@@ -31,12 +37,12 @@ from rhot_app.hand.skeleton import ANGLES
 from rhot_app.hand.solvers.finger_ik import solve_fingers
 from rhot_app.hand.solvers.palm_fit import fit_palm
 from rhot_app.outputs.joints import JointConverter
-from rhot_app.project import Rig, TrackerSettings, load_rig
+from rhot_app.project import IkMethod, Rig, TrackerSettings, load_rig
 from rhot_app.simulator.film.shot import make_renderer, make_shot
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BareHandShow, BoardShow, HandShow
 from rhot_app.tracking.trackers import make_tracker
-from rhot_node.compiled import mark_complete
+from rhot_node.compiled import ALL, VARIABLE, WINDOW, is_complete, mark_complete
 from rhot_node.detect.fast import FastDetector
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
@@ -60,6 +66,13 @@ def warm_solvers(_rig: Rig) -> None:
     points = forward(hand, pose)
     fit_palm(hand, points.joints[0], points.marker_centres, pose, 1.0 / 30.0)
     solve_fingers(hand, pose, points.marker_centres)
+
+
+def warm_other_solvers(rig: Rig) -> None:
+    """Compile the classic tracker's other methods of inverse kinematics."""
+    for ik in get_args(IkMethod):
+        chosen = msgspec.structs.replace(rig, tracker=TrackerSettings(kind="classic", ik=ik))
+        warm_up_tracker(make_tracker(chosen), chosen)
 
 
 def warm_estimator(rig: Rig) -> None:
@@ -117,11 +130,16 @@ def warm_outputs(rig: Rig) -> None:
 
 
 STEPS: dict[str, Callable[[Rig], None]] = {"tracker": warm_tracker, "solvers": warm_solvers,
-                                           "detector": warm_detector, "estimator": warm_estimator,
-                                           "twin": warm_twin, "boards": warm_boards,
-                                           "calibrations": warm_calibrations, "bare hand": warm_bare_hand,
-                                           "outputs": warm_outputs}
+                                           "detector": warm_detector, "twin": warm_twin, "outputs": warm_outputs,
+                                           "estimator": warm_estimator, "bare hand": warm_bare_hand,
+                                           "boards": warm_boards, "calibrations": warm_calibrations,
+                                           "other solvers": warm_other_solvers}
 """In this order two processors share them evenly, and neither compiles what the other one is compiling."""
+
+PARTS: dict[str, tuple[str, ...]] = {
+    WINDOW: ("tracker", "solvers", "detector", "twin", "outputs"), ALL: tuple(STEPS),
+    "estimator": ("estimator",), "contours": ("bare hand",), "other solvers": ("other solvers",)}
+"""What can be compiled by itself, as steps."""
 
 _COLLECT_EVERY = 100_000
 """Objects between two searches for garbage, 700 by default: a compiler makes millions that stay, and searching them
@@ -136,14 +154,57 @@ def warm(name: str) -> str:
     return f"{name}: {time.monotonic() - begun:.1f} s"
 
 
-def main() -> int:
-    """Take all steps, side by side; returns the exit code."""
-    with ProcessPoolExecutor(min(len(STEPS), os.cpu_count() or 1), get_context("spawn")) as pool:
-        print(f"0 of {len(STEPS)} compiled", flush=True)
-        for done, step in enumerate(as_completed([pool.submit(warm, name) for name in STEPS]), 1):
-            print(f"{done} of {len(STEPS)} compiled; {step.result()}", flush=True)
-    mark_complete()
+def end_with_parent() -> None:
+    """Have this process end when its parent does, however that ends."""
+    parent = parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def yield_processor() -> None:
+    """Have this process, and what it starts, run only when no other one wants to. Linux; elsewhere by niceness."""
+    with contextlib.suppress(OSError):
+        os.nice(19)
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Take the steps of a part, side by side; prints a line after each. Returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m rhot_app.warm", description="Compile the numerical code.")
+    parser.add_argument("part", nargs="?", choices=PARTS, default=ALL, help=f"what to compile (default {ALL})")
+    parser.add_argument("--background", action="store_true", help="take only time that nobody else wants")
+    args = parser.parse_args(arguments)
+    if args.background:
+        yield_processor()
+    steps = [name for name in PARTS[args.part] if not is_complete(name)]
+    workers = 1 if args.background else min(len(steps), os.cpu_count() or 1)
+    try:
+        _compile(steps, max(1, workers))
+    except OSError as exc:
+        print(f"rhot: {os.environ.get(VARIABLE, 'compiled code')}: {exc.strerror or exc}. 200 MB must be free there. "
+              "Start again then; what has been compiled stays.", file=sys.stderr)
+        return 2
+    for part, names in PARTS.items():
+        if all(map(is_complete, names)):
+            mark_complete(part)
     return 0
+
+
+def _compile(steps: Sequence[str], workers: int) -> None:
+    """Take the steps in processes of their own; prints a line after each."""
+    print(f"0 of {len(steps)} compiled", flush=True)
+    with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:
+        running = {pool.submit(warm, name): name for name in steps}
+        for done, step in enumerate(as_completed(running), 1):
+            line = step.result()
+            mark_complete(running[step])
+            print(f"{done} of {len(steps)} compiled; {line}", flush=True)
 
 
 if __name__ == "__main__":

@@ -17,10 +17,11 @@ import json
 import os
 import re
 import shutil
+import stat
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -30,8 +31,11 @@ _IN_USE_S = 3600.0
 _PACKAGES = ("rhot_node", "rhot_app")
 _COMPILER = b"numba"
 _IMPORTS = re.compile(r"^from ([\w.]+) import ([^()\n]+|\([^)]*)", re.MULTILINE)
-_COMPLETE = "complete"
 _MODULES = "modules.json"
+
+ALL = "all"
+WINDOW = "window"
+"""Parts of the code that are noted as compiled (`mark_complete`); `rhot_app.warm` has more."""
 
 
 def sources_hash(folders: Sequence[Path]) -> str:
@@ -91,24 +95,39 @@ def use_own_cache() -> None:
     """Point numba at the folder of the present sources, unless the environment names one. Call before compiling any."""
     if VARIABLE in os.environ:
         return
-    try:
-        from platformdirs import user_cache_path
-        base = user_cache_path("rhot") / "numba"
-        folder = base / sources_hash(_packages())
-        if not folder.is_dir():
-            _begin(folder)
-            _forget_old(base)
-        folder.touch()
-    except OSError:  # no home, or a read-only one: numba then keeps to its own rules
-        return
-    os.environ[VARIABLE] = str(folder)
-    if "numba" in sys.modules:  # it reads the environment only when it loads, and a caller may have used it before
-        sys.modules["numba"].config.CACHE_DIR = str(folder)
+    name = sources_hash(_packages())
+    for base in _bases():
+        with contextlib.suppress(OSError):  # no home, or one that cannot be written
+            folder = base / "numba" / name
+            if not folder.is_dir():
+                _begin(folder)
+                _forget_old(folder.parent)
+            folder.touch()
+            os.environ[VARIABLE] = str(folder)
+            if "numba" in sys.modules:  # it reads the environment when it loads, and a caller may have used it before
+                sys.modules["numba"].config.CACHE_DIR = str(folder)
+            return
 
 
-def is_complete() -> bool:
-    """Whether everything has been compiled for the present sources (`mark_complete`)."""
-    return VARIABLE in os.environ and (Path(os.environ[VARIABLE]) / _COMPLETE).exists()
+def _bases() -> Iterator[Path]:
+    """Where compiled code may be kept: the user's cache, else the virtual environment, else this user's own folder
+    among the temporary ones."""
+    from platformdirs import user_cache_path
+
+    yield user_cache_path("rhot")
+    if sys.prefix != sys.base_prefix:
+        yield Path(sys.prefix) / "rhot-cache"
+    own = Path(tempfile.gettempdir()) / f"rhot-cache-{os.getuid()}"
+    with contextlib.suppress(OSError):
+        own.mkdir(mode=0o700, exist_ok=True)
+        status = own.lstat()
+        if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o022:
+            yield own  # code that others could replace would run as this user
+
+
+def is_complete(part: str = ALL) -> bool:
+    """Whether a part has been compiled for the present sources (`mark_complete`)."""
+    return VARIABLE in os.environ and (Path(os.environ[VARIABLE]) / f"complete-{part}").exists()
 
 
 def announce_compilation(takes: str = "some minutes") -> None:
@@ -138,26 +157,15 @@ def announce_compilation(takes: str = "some minutes") -> None:
 _announced = False  # the listener stays registered until the process ends
 
 
-def compiles_since(t_unix_s: float) -> bool:
-    """Whether programs that began at this time have to compile: nothing is compiled yet, or something has been since,
-    while all of it was not."""
-    if is_complete():
-        return False
-    files = list(Path(os.environ[VARIABLE]).rglob("*.nbi")) if VARIABLE in os.environ else []
-    with contextlib.suppress(OSError):  # one that is being replaced
-        return not files or any(file.stat().st_mtime >= t_unix_s for file in files)
-    return True
-
-
 def is_compiled_in(cache: Path) -> bool:
     """Whether the cache of a user or service (what XDG_CACHE_HOME names) has any code of the present sources."""
     return any((cache / "rhot" / "numba" / sources_hash(_packages())).rglob("*.nbi"))
 
 
-def mark_complete() -> None:
-    """Note that everything has been compiled for the present sources. Raises OSError."""
+def mark_complete(part: str = ALL) -> None:
+    """Note that a part has been compiled for the present sources. Raises OSError."""
     if VARIABLE in os.environ:
-        (Path(os.environ[VARIABLE]) / _COMPLETE).touch()
+        (Path(os.environ[VARIABLE]) / f"complete-{part}").touch()
 
 
 def _packages() -> list[Path]:

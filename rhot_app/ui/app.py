@@ -8,13 +8,18 @@ import os
 import signal
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from rhot_app.engine.compilation import BackgroundCompilation
 from rhot_app.engine.directory import default_directory
 from rhot_app.errors import EngineError
 from rhot_app.project import load_rig
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
 from rhot_node.files import require_replaceable
+
+if TYPE_CHECKING:
+    from rhot_app.ui.common.controller import Controller
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,6 +61,7 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
         _require_settings_file(args.settings)
     choose_gl_platform()
     cap_software_gl()
+    session = Session(args.directory)
     from rhot_app.ui.common.job import workers
 
     workers()
@@ -69,7 +75,6 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     from rhot_app.ui.main_window import MainWindow
     from rhot_app.ui.scene.surface import choose_format
 
-    session = Session(args.directory)
     settings = Settings(args.settings)
     if args.reset:
         settings.reset()
@@ -85,6 +90,10 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     for number in (signal.SIGINT, signal.SIGTERM):
         # a handler may run in the middle of a drawing, so closing waits for its turn
         signal.signal(number, lambda *_: QTimer.singleShot(0, window.close))
+    compilation = BackgroundCompilation()
+    watch = QTimer(interval=COMPILATION_MS)
+    watch.timeout.connect(lambda: follow_compilation(compilation, controller))
+    watch.start()
     window.show()
     if twin is not None:
         window.open_twin(twin)
@@ -93,10 +102,21 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     elif session.found():
         controller.attach()
     code = app.exec()
+    compilation.close()
     left_running = controller.shut_down()
     if left_running:
         print(left_running)
     return int(code)
+
+
+COMPILATION_MS = 500
+
+
+def follow_compilation(compilation: BackgroundCompilation, controller: Controller) -> None:
+    """Compile the rest of the numerical code once a rig is open, or nobody opens one, and say how far it is."""
+    if not controller.working:
+        compilation.start()
+    controller.background = compilation.sentence
 
 
 # -- what must be settled before Qt and OpenGL are imported ------------------------------------------------------------

@@ -57,6 +57,8 @@ def _notices(controller: Controller) -> list[Notice]:
             notices.append(Notice("info", f"Recording to {status.log_path} ({recording_text(status)})."))
     if controller.twin_pace is not None and controller.running:
         notices.append(_pace_notice(controller.twin_pace))
+    if controller.background and controller.opened is not None:
+        notices.append(Notice("info", controller.background))
     return notices
 
 

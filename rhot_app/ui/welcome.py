@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
-
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -23,13 +21,9 @@ from PySide6.QtWidgets import (
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.words import shipped_motions
-from rhot_node.compiled import compiles_since
 
 _TITLE_PT = 20.0
 _CARD_WIDTH_PX = 300
-_LOOK_MS = 1000
-
-COMPILING = "Compiling the numerical code, once; this takes minutes"
 
 
 class WelcomePage(QWidget):
@@ -45,10 +39,6 @@ class WelcomePage(QWidget):
         super().__init__(parent)
         self.setObjectName("welcome")
         self.setProperty("guide", "start")
-        self._busy: tuple[str, float] | None = None
-        self._began_s, self._compiles = 0.0, False  # Unix time; whether nodes or engine have compiled since
-        self._look = QTimer(self, interval=_LOOK_MS)
-        self._look.timeout.connect(self._look_again)
         self._pages = QStackedWidget()
         self._pages.addWidget(self._choice_page(motion))
         self._pages.addWidget(self._progress_page())
@@ -138,24 +128,10 @@ class WelcomePage(QWidget):
 
     def show_busy(self, busy: tuple[str, float] | None) -> None:
         """Progress of what is under way; None shows the choices."""
-        if busy is None:
-            self._look.stop()
-        elif not self._look.isActive():
-            self._began_s = time.time()
-            self._compiles = compiles_since(self._began_s)
-            self._look.start()
-        self._busy = busy
         self._pages.setCurrentIndex(0 if busy is None else 1)
-        self._say()
-
-    def _look_again(self) -> None:
-        self._compiles = self._compiles or compiles_since(self._began_s)
-        self._say()
-
-    def _say(self) -> None:
-        if self._busy is not None:
-            self.progress_label.setText(COMPILING if self._compiles else self._busy[0])
-            self.progress_bar.setValue(round(100 * self._busy[1]))
+        if busy is not None:
+            self.progress_label.setText(busy[0])
+            self.progress_bar.setValue(round(100 * busy[1]))
 
 
 def _card(title: str, sentence: str, *actions: QWidget) -> QFrame:

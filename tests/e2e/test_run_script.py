@@ -51,7 +51,7 @@ def test_a_long_step_says_how_far_it_is(tmp_path: Path) -> None:
 def test_who_waits_for_another_set_up_is_told(tmp_path: Path) -> None:
     (tmp_path / "lock").touch()
     program = ('LOCK=lock\nis_set_up() { false; }\nfind_python() { echo python3; }\nmissing_packages() { :; }\n'
-               'build_venv() { echo built; }\ncompile_code() { :; }\nset_up core')
+               'build_venv() { echo built; }\ncompile_code() { :; }\nset_up core none')
     with (tmp_path / "lock").open() as held:
         fcntl.flock(held, fcntl.LOCK_EX)
         process = start(program, "say", "set_up", cwd=tmp_path)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rhot_node.compiled import VARIABLE, compiles_since, is_complete, mark_complete, sources_hash
+from rhot_node.compiled import VARIABLE, is_complete, mark_complete, sources_hash
 
 ROOT = Path(__file__).parents[2]
 
@@ -94,37 +94,41 @@ def test_an_update_compiles_what_has_changed_only(tmp_path: Path) -> None:
     assert run() == [12, 20, 1, 1]
 
 
-def test_the_environment_decides_and_a_missing_home_is_no_obstacle(tmp_path: Path) -> None:
+def test_the_environment_decides(tmp_path: Path) -> None:
     assert start(tmp_path, **{VARIABLE: "/elsewhere"}) == "/elsewhere"
+
+
+def test_without_a_home_code_is_kept_elsewhere_and_not_where_others_could_replace_it(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    assert start(tmp_path / "file") == ""
+    of_environment = Path(start(tmp_path / "file"))
+    assert of_environment.is_dir() and of_environment.is_relative_to(sys.prefix)
+    temporary = tmp_path / f"rhot-cache-{os.getuid()}"
+    code = ("import sys; sys.prefix = sys.base_prefix; import os, rhot_node; "
+            f"print(os.environ.get({VARIABLE!r}, ''))")
+    environment = {key: value for key, value in os.environ.items() if key != VARIABLE}
+    environment |= {"XDG_CACHE_HOME": str(tmp_path / "file"), "TMPDIR": str(tmp_path)}
+
+    def folder() -> str:
+        return subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True,
+                              check=True).stdout.strip()
+
+    assert Path(folder()).is_relative_to(temporary) and temporary.stat().st_mode & 0o077 == 0
+    temporary.chmod(0o777)
+    assert folder() == ""
 
 
 def test_complete_belongs_to_one_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     assert not is_complete()
     mark_complete()
-    assert is_complete()
+    assert is_complete() and not is_complete("window")
+    mark_complete("window")
+    assert is_complete("window")
     monkeypatch.setenv(VARIABLE, str(tmp_path / "next"))
     assert not is_complete()
     monkeypatch.delenv(VARIABLE)
     assert not is_complete()
     mark_complete()
-
-
-def test_programs_compile_until_all_is_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(VARIABLE, str(tmp_path))
-    assert compiles_since(100.0), "nothing is compiled yet"
-    (tmp_path / "detect_1").mkdir()
-    (tmp_path / "detect_1" / "kernel.py311.nbi").touch()
-    os.utime(tmp_path / "detect_1" / "kernel.py311.nbi", (50.0, 50.0))
-    assert not compiles_since(100.0)
-    (tmp_path / "tracker.py311.nbi").touch()
-    assert compiles_since(100.0)
-    mark_complete()
-    assert not compiles_since(100.0)
-    monkeypatch.delenv(VARIABLE)
-    assert compiles_since(100.0)
 
 
 def test_a_process_says_at_once_and_only_then_that_it_compiles(tmp_path: Path) -> None:
@@ -141,7 +145,7 @@ def test_a_process_says_at_once_and_only_then_that_it_compiles(tmp_path: Path) -
     first = said()
     assert first.count("being compiled") == 1 and "minutes" in first
     assert said() == "", "it is in the cache"
-    (tmp_path / "cache" / "complete").touch()
+    (tmp_path / "cache" / "complete-all").touch()
     (tmp_path / "program.py").write_text(f"{program}twice(1j)\n")
     assert "some seconds" in said()
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from rhot_app.engine.client import EngineClient
+from rhot_app.engine.compilation import compile_part, part_of
 from rhot_app.engine.directory import EngineDirectory, open_directory
 from rhot_app.engine.process import (
     end_started,
@@ -27,6 +28,7 @@ from rhot_app.engine.process import (
 from rhot_app.errors import EngineError, SimulatorError
 from rhot_app.project import load_rig, parse_rig, save_rig, with_tracker
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
+from rhot_node.compiled import WINDOW
 
 if TYPE_CHECKING:
     from rhot_app.simulator.nodes.remote import TwinRemote
@@ -34,8 +36,9 @@ if TYPE_CHECKING:
 
 ENGINE_ROLE = "engine"
 TWIN_ROLE = "simulated nodes"
+COMPILER_ROLE = "compiler"
 START_TIMEOUT_S = 360.0
-"""The first start of all compiles the numerical code; on a slow or busy machine that takes minutes."""
+"""A slow or busy machine takes long, above all where compiled code cannot be kept."""
 
 TWIN_COMMAND: tuple[str, ...] = (sys.executable, "-m", "rhot_app.simulator.nodes.live")
 TWIN_RIG = "simulated.rig.json"
@@ -83,16 +86,20 @@ class Session:
     def open_rig(self, path: Path, report: Report) -> Opened:
         """End what the app ran before and start an engine on `path`; raises RigError or EngineError."""
         report("Reading the rig file …", 0.1)
-        load_rig(path)
+        rig = load_rig(path)
         self._clear(report)
+        self._compile(part_of(rig), report)
         return self._start_engine(path, report)
 
     def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
         """Start the simulated nodes, then an engine on the rig that they write; raises SimulatorError, EngineError."""
         self._clear(report)
+        self._compile(WINDOW, report)
         report("Starting two simulated cameras …", 0.15)
         rig_path = self._start_twin(choice, report)
-        save_rig(rig_path, with_tracker(load_rig(rig_path), choice.tracker))
+        rig = with_tracker(load_rig(rig_path), choice.tracker)
+        save_rig(rig_path, rig)
+        self._compile(part_of(rig), report)
         return self._start_engine(rig_path, report)
 
     def restart_engine(self, path: str, start: bool, report: Report) -> Opened:
@@ -160,6 +167,9 @@ class Session:
         report("Ending what ran before …", 0.12)
         self._twin_started = False
         end_started(self._place)
+
+    def _compile(self, part: str, report: Report) -> None:
+        compile_part(part, report, lambda pid: remember_process(self._place, pid, COMPILER_ROLE))
 
     def _start_engine(self, path: Path, report: Report) -> Opened:
         report("Starting the engine …", 0.5)

@@ -103,6 +103,8 @@ class Controller(QObject):
         self._job: Job | None = None
         self.busy: tuple[str, float] | None = None
         self.problem = ""
+        self.background = ""
+        """What is done beside the tracking, in a sentence."""
         self._restarts: list[float] = []
         self._restarting = False
         self._was_running = False

@@ -12,6 +12,7 @@ import msgspec
 
 from rhot_app import rig_history
 from rhot_app.calibration.verdict import Verdict
+from rhot_app.engine.compilation import compile_part, part_of
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
 
@@ -142,7 +143,9 @@ class Proposal:
 
 
 def set_rig(command: Command, rig: Rig) -> None:
-    """Have the engine go on with `rig`; raises EngineError."""
+    """Have the engine go on with `rig`, whose tracker is compiled first: the engine tracks meanwhile. Raises
+    EngineError."""
+    compile_part(part_of(rig), lambda text, fraction: None)
     command("set_rig", timeout_s=_SET_RIG_S, document=msgspec.to_builtins(rig))
 
 
