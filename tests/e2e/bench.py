@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import msgspec
+from patience import PATIENCE_S
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.status import NodeStatus
@@ -101,16 +102,16 @@ class Bench:
         return (self.folder / f"{name}.log").read_text(errors="replace")
 
     def clear(self) -> None:
-        """End all processes: politely first. Fails the test when one had to be killed."""
-        for process in self.processes:
-            with contextlib.suppress(ProcessLookupError):
-                process.send_signal(signal.SIGTERM)
-        stubborn = [process for process in self.processes if not ends(process, 5.0)]
-        for process in stubborn:
-            process.kill()
-            process.wait()
-        assert not stubborn, f"did not end when asked: {[process.args for process in stubborn]}"
-
+        """End all processes: politely first. Fails the test when one had to be killed or ends with another code."""
+        running = [process for process in self.processes if process.poll() is None]
+        for process in running:
+            process.terminate()
+        for process in running:
+            if not ends(process, PATIENCE_S):
+                process.kill()
+                process.wait()
+        codes = {str(process.args[2:4]): process.returncode for process in running}
+        assert not any(codes.values()), f"did not end well when asked: {codes}"
 
     def _spawn(self, arguments: Sequence[str], name: str) -> subprocess.Popen[bytes]:
         with (self.folder / f"{name}.log").open("ab") as log:

@@ -9,7 +9,6 @@ import contextlib
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import cv2
@@ -46,18 +45,17 @@ def grab(path: Path) -> np.ndarray:
 
 
 def await_moving_hand(folder: Path, timeout_s: float = START_S) -> None:
-    """Wait until a window shows a hand that moves."""
+    """Wait until a window shows a hand that moves: many colours, and many pixels that change."""
     scene = np.s_[80:540, 220:900]
-    end = time.monotonic() + timeout_s
-    last = grab(folder / "last.png")
-    while time.monotonic() < end:
-        time.sleep(0.7)
-        now = grab(folder / "now.png")
-        moved = (np.abs(last[scene].astype(int) - now[scene]).max(axis=2) > 40).sum() > 100
-        if moved and len(np.unique(now.reshape(-1, 3) >> 4, axis=0)) > 200:
-            return
-        last = now
-    raise AssertionError("no window shows a hand that moves")
+    pictures = [grab(folder / "first.png")]
+
+    def moves() -> bool:
+        pictures.append(grab(folder / "now.png"))
+        last, now = (picture[scene].astype(int) for picture in pictures[-2:])
+        colours = np.unique((now >> 4) @ (1, 16, 256))
+        return len(colours) > 200 and (np.abs(last - now).max(axis=2) > 40).sum() > 100
+
+    eventually(moves, timeout_s, told=lambda: "no window shows a hand that moves")
 
 
 def tracks(client: EngineClient) -> bool:

@@ -21,6 +21,7 @@ BARE_S = 400.0
 """After so long a hand that does not work the mouse fails the test; the command itself looks for it for 360 s."""
 
 
+@pytest.mark.study("rhot_app/mouse", "rhot_app/simulator/nodes")
 def test_the_simulated_hand_works_the_mouse_by_itself() -> None:
     """The cursor moves, and OSC says the same."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
-from patience import eventually
+from patience import PATIENCE_S, eventually
 
 RUN = Path(__file__).resolve().parents[2] / "run"
 FUNCTIONS = ("say", "fail", "on_virtual_screen", "close_screen")
@@ -31,7 +31,7 @@ ticks.start(20)
 window.show()
 QTimer.singleShot(50, lambda: print("shown", flush=True))
 app.exec()
-time.sleep(0.5)  # the app ends its engine while it still holds the screen
+time.sleep(0.2)  # the app ends its engine while it still holds the screen
 QApplication.primaryScreen().grabWindow(window.winId())
 print("ended well", flush=True)
 """
@@ -88,11 +88,11 @@ def test_an_ended_run_says_nothing_and_leaves_nothing(script, how):
     if how.startswith("Ctrl-C"):
         os.killpg(process.pid, signal.SIGINT)
         if how.endswith("twice"):
-            time.sleep(0.2)
+            time.sleep(0.05)
             os.killpg(process.pid, signal.SIGINT)
     else:
         process.send_signal(signal.SIGTERM if how == "kill" else signal.SIGHUP)
-    out, err = process.communicate(timeout=10)
+    out, err = process.communicate(timeout=PATIENCE_S)
     assert (out, err) == ("ended well\n", "")
     assert screens(folder) == [] and not folder.exists()
 
@@ -100,7 +100,7 @@ def test_an_ended_run_says_nothing_and_leaves_nothing(script, how):
 def test_a_killed_run_takes_window_and_screen_along(script):
     process, folder = start(script)
     process.kill()
-    out, err = process.communicate(timeout=10)
+    out, err = process.communicate(timeout=PATIENCE_S)
     assert (out, err) == ("ended well\n", "")
     eventually(lambda: screens(folder) == [])
     shutil.rmtree(folder)
