@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
@@ -14,6 +14,7 @@ from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 
 SHORT = Lengths(static_s=4.0, distance_s=0.8, rod_s=10.0, flash_s=10.0, plumb_s=1.5,
                 distances_m=(0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 1.0))
+BRIEF = replace(SHORT, static_s=2.0, distance_s=0.4, rod_s=5.0, flash_s=6.0)
 
 
 @dataclass(frozen=True)
@@ -25,11 +26,11 @@ class Recorded:
     rig: Rig
 
 
-def recorded(folder: Path, seed: int) -> Recorded:
+def recorded(folder: Path, seed: int, lengths: Lengths = SHORT) -> Recorded:
     """Make it."""
     folder.mkdir()
     scene = make_scene(twin_defaults(), seed)
-    return Recorded(folder, record_protocol(scene, folder, sketched=True, lengths=SHORT), simulated_rig(scene))
+    return Recorded(folder, record_protocol(scene, folder, sketched=True, lengths=lengths), simulated_rig(scene))
 
 
 def with_baseline(rig: Rig, factor: float) -> Rig:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from simulated_protocol import Recorded, recorded, with_baseline
+from simulated_protocol import BRIEF, Recorded, recorded, with_baseline
 
 from rhot_app.__main__ import main
 from rhot_app.certificate.charts import chart_of
@@ -21,7 +21,7 @@ from rhot_app.project import save_rig
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
-    return recorded(tmp_path_factory.mktemp("command") / "recordings", 3)
+    return recorded(tmp_path_factory.mktemp("command") / "recordings", 3, BRIEF)
 
 
 @pytest.fixture
