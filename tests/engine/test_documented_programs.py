@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE_S
 
 from rhot_app.project import save_rig
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
@@ -45,7 +46,7 @@ def test_programs_read_states_of_an_engine_and_of_its_log(tmp_path: Path, enviro
             assert reader.stdout.readline().startswith("[")
             reader.kill()
         engine.send_signal(signal.SIGTERM)
-        assert engine.wait(10) == 0
+        assert engine.wait(PATIENCE_S) == 0
     for node in nodes:
         node.close()
     done = subprocess.run([sys.executable, "-c", program("tracking.md")], cwd=tmp_path, env=environment, text=True,
@@ -55,7 +56,7 @@ def test_programs_read_states_of_an_engine_and_of_its_log(tmp_path: Path, enviro
 
 
 def test_a_take_is_held_against_its_truth(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "rhot_app", "simulate", "--seconds", "2", "--points", "--out", "take"]
+    command = [sys.executable, "-m", "rhot_app", "simulate", "--seconds", "1.5", "--points", "--out", "take"]
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=60)
     done = subprocess.run([sys.executable, "-c", program("twin.md")], cwd=tmp_path, text=True, capture_output=True,
                           timeout=60)

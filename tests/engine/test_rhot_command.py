@@ -9,11 +9,10 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from patience import eventually
+from patience import PATIENCE_S, eventually
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.process import ensure_engine, running_engine, started_processes, stop_engine
-from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import EngineError
 from rhot_app.project import save_rig
 from rhot_app.recording.raw_log import LogReader
@@ -23,11 +22,12 @@ from rhot_app.state import HandState
 IMPORTED = """
 import sys
 from rhot_app.__main__ import main
-try:
-    main({arguments!r})
-except SystemExit as exit:
-    assert not exit.code, exit.code
-heavy = sorted({{"numba", "cv2", "scipy", "PySide6"}} & set(sys.modules))
+for arguments in ["--help"], ["--version"], ["engine", "--help"], ["replay", "--help"]:
+    try:
+        main(arguments)
+    except SystemExit as exit:
+        assert not exit.code, exit.code
+heavy = sorted({"numba", "cv2", "scipy", "PySide6"} & set(sys.modules))
 assert not heavy, heavy
 """
 
@@ -36,11 +36,10 @@ def rhot(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-m", "rhot_app", *arguments], capture_output=True, text=True, timeout=90)
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["engine", "--help"], ["replay", "--help"]])
-def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
-    done = subprocess.run([sys.executable, "-c", IMPORTED.format(arguments=arguments)], capture_output=True, text=True)
+def test_help_imports_nothing_heavy() -> None:
+    done = subprocess.run([sys.executable, "-c", IMPORTED], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert done.stdout
+    assert all(word in done.stdout for word in ("COMMAND", "--rig", "--speed"))
 
 
 def test_mistakes_end_with_a_sentence_and_2(tmp_path: Path) -> None:
@@ -83,11 +82,12 @@ def test_engine_process_from_start_to_end(tmp_path: Path) -> None:
         second = rhot("engine", "--rig", str(rig_path), "--directory", str(place))
         assert second.returncode == 2 and str(engine.pid) in second.stderr
         with EngineClient(place) as client:
-            states = [m for _ in range(30) for m in client.poll(0.05) if isinstance(m, HandState)]
-            assert len(states) > 20
+            states: list[object] = []
+            eventually(lambda: states.extend(m for m in client.poll(0.05) if isinstance(m, HandState))
+                       or len(states) > 40)
             assert client.status is not None and client.status.log_bytes > 0
         engine.send_signal(signal.SIGTERM)
-        assert engine.wait(10) == 0
+        assert engine.wait(PATIENCE_S) == 0
         assert engine.stderr.read() == ""
     for node in nodes:
         node.close()
@@ -124,7 +124,7 @@ def test_an_engine_with_an_uncalibrated_rig_says_so_once_and_tells_its_clients(t
             told = [advice for advice in client.status.advice if advice.text.startswith("Not calibrated")]
             assert len(told) == 1 and told[0].lasting and told[0].mender == "lens"
         engine.send_signal(signal.SIGTERM)
-        assert engine.wait(10) == 0
+        assert engine.wait(PATIENCE_S) == 0
         assert engine.stderr.read() == ""
 
 
@@ -137,11 +137,10 @@ def kept_replay_serves_on(log_path: Path, place: Path) -> None:
         assert "Ctrl+C ends it" in kept.stdout.readline()
         with EngineClient(place) as client:
             assert client.command("hello")["pid"] == kept.pid
-            client.poll(0.3)
             client.command("start")
-            assert any(isinstance(message, HandState) for _ in range(50) for message in client.poll(0.1))
+            eventually(lambda: client.poll(0.1) and client.state is not None)
         kept.send_signal(signal.SIGTERM)
-        assert kept.wait(10) == 0
+        assert kept.wait(PATIENCE_S) == 0
 
 
 def test_background_engine_is_killed_found_dead_and_started_again(tmp_path: Path) -> None:
@@ -157,7 +156,7 @@ def test_background_engine_is_killed_found_dead_and_started_again(tmp_path: Path
     again = ensure_engine(rig_path, place)
     assert again != pid
     with EngineClient(place) as client:
-        assert any(isinstance(message, EngineStatus) for _ in range(20) for message in client.poll(0.1))
+        eventually(lambda: client.poll(0.1) and client.status is not None)
     stop_engine(place)
     assert running_engine(place) is None
     assert started_processes(directory) == []
