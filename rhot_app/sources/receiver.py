@@ -153,6 +153,8 @@ class NodeReceiver:
     def close(self) -> None:
         """End the thread and close the port. May be called twice."""
         self._ending.set()
+        with contextlib.suppress(OSError):  # "not connected", which it never is; Linux ends a blocked read all the same
+            self._socket.shutdown(socket.SHUT_RD)
         if self._thread.is_alive():
             self._thread.join()
         self._socket.close()
