@@ -42,17 +42,29 @@ from rhot_app.simulator.film.shot import make_renderer, make_shot
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BareHandShow, BoardShow, HandShow
 from rhot_app.tracking.trackers import make_tracker
+from rhot_node.clock import NodeClock
 from rhot_node.compiled import ALL, VARIABLE, WINDOW, is_complete, mark_complete
 from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.tags import TagDetector
 from rhot_node.files import resource_path
+from rhot_node.foreground_store import ForegroundStore
 from rhot_node.markers import load_markers
+from rhot_node.slice_search import SliceSearch
+from rhot_node.tag_search import warm_up_picture
 from rhot_node.warm_up import warm_up as warm_up_detector
+from rhot_node.wire.messages import FAMILIES
 
 
 def warm_detector(rig: Rig) -> None:
     """Compile what a node does with a frame."""
     camera = rig.nodes[0].intrinsics
     warm_up_detector(FastDetector(rig.markers), rig.markers, (camera.width, camera.height))
+
+
+def warm_searches(_rig: Rig) -> None:
+    """Compile how a node searches for tags and for the edges of a bare hand, which it does before it is ready."""
+    SliceSearch(0, NodeClock(), ForegroundStore(None)).warm_up()
+    TagDetector((FAMILIES[0],)).detect(warm_up_picture(FAMILIES[0]))
 
 
 def warm_tracker(rig: Rig) -> None:
@@ -131,13 +143,14 @@ def warm_outputs(rig: Rig) -> None:
 
 STEPS: dict[str, Callable[[Rig], None]] = {"tracker": warm_tracker, "solvers": warm_solvers,
                                            "detector": warm_detector, "twin": warm_twin, "outputs": warm_outputs,
+                                           "searches": warm_searches,
                                            "estimator": warm_estimator, "bare hand": warm_bare_hand,
                                            "boards": warm_boards, "calibrations": warm_calibrations,
                                            "other solvers": warm_other_solvers}
 """In this order two processors share them evenly, and neither compiles what the other one is compiling."""
 
 PARTS: dict[str, tuple[str, ...]] = {
-    WINDOW: ("tracker", "solvers", "detector", "twin", "outputs"), ALL: tuple(STEPS),
+    WINDOW: ("tracker", "solvers", "detector", "twin", "searches", "outputs"), ALL: tuple(STEPS),
     "estimator": ("estimator",), "contours": ("bare hand",), "other solvers": ("other solvers",)}
 """What can be compiled by itself, as steps."""
 
