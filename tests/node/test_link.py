@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
-from patience import PATIENCE_S
+from patience import PATIENCE_S, eventually
 
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings
@@ -70,11 +70,14 @@ def free_port() -> int:
 
 
 def say(master: socket.socket, link: UdpLink, *messages: Message | bytes) -> None:
-    for message in messages:
-        data = message if isinstance(message, bytes) else encode(message)
-        master.sendto(data, ("127.0.0.1", link.port))
-    for _ in messages:
-        link.step(0.2)
+    """Send these, and have the link act upon all of them."""
+    taken = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(link, "take", lambda *datagram: taken.append(UdpLink.take(link, *datagram)))
+        for message in messages:
+            data = message if isinstance(message, bytes) else encode(message)
+            master.sendto(data, ("127.0.0.1", link.port))
+        eventually(lambda: link.step(0.02) or len(taken) == len(messages))
 
 
 def ask(master: socket.socket, link: UdpLink, session: int = 0) -> ClockReply:

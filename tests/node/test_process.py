@@ -46,7 +46,7 @@ def run_node() -> Iterator[Callable[..., Node]]:
         node.end(signal.SIGKILL)
 
 
-def test_a_whole_life(run_node: Callable[..., Node], tmp_path: Path, recording: Path) -> None:
+def test_a_whole_life(run_node: Callable[..., Node], tmp_path: Path, recording: Path, fresh_programs: None) -> None:
     node = run_node(write_settings(tmp_path), f"yuv:{recording}", "--loop")
     assert {key: node.ready[key] for key in ("event", "node_id", "name", "width", "height")} == {
         "event": "ready", "node_id": 3, "name": "left", "width": SIZE[0], "height": SIZE[1]}
@@ -200,7 +200,7 @@ def start():
 thread = threading.Thread(target=start); thread.start(); thread.join()
 print(node.pid, flush=True)
 node.stdout.readline()
-time.sleep(0.5)
+time.sleep(0.2)
 print(node.poll(), flush=True)
 time.sleep(60)
 """
