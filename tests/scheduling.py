@@ -12,7 +12,6 @@ from collections.abc import Generator
 from pathlib import Path
 
 import pytest
-from xdist.scheduler import LoadFileScheduling
 
 WEIGHTS = Path(__file__).with_name("file_seconds.json")
 CACHE_KEY = "rhot/test_times"
@@ -20,8 +19,11 @@ UNKNOWN_S = 10.0
 """Seconds that are expected of a file that no run has measured."""
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> LoadFileScheduling:
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
     """Hands whole files to processes in the order in which they were collected."""
+    from xdist.scheduler import LoadFileScheduling  # which a node's tests do without
+
     config.option.loadscopereorder = False
     return LoadFileScheduling(config, log)
 

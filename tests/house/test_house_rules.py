@@ -15,9 +15,6 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("rhot_node", "rhot_app")
 COMFORTABLE_LINES = 300
-MOST_FILES = 15
-CROWDED: dict[str, str] = {}
-"""Folders that may hold more, and why."""
 UNOWNED = re.compile(r"\b(?:TO" r"DO|FIX" r"ME|XX" r"X)\b(?!\((\w+)\):)")
 FROM_IMPORT = re.compile(r"^ *from ([\w.]+) import (\([^)]*\)|.*)", re.MULTILINE)
 
@@ -92,14 +89,6 @@ def test_long_files_are_named() -> None:
         lines = len(path.read_text().splitlines())
         if lines > COMFORTABLE_LINES:
             warnings.warn(f"{path.relative_to(ROOT)} has {lines} lines; does it do two things?", stacklevel=1)
-
-
-def test_no_folder_is_crowded() -> None:
-    """Past 15 files a folder gets sub-folders by subject."""
-    files = [path for path in sources(*PACKAGES) if path.name != "__init__.py"]
-    folders = {str(path.parent.relative_to(ROOT)) for path in files}
-    crowded = {folder for folder in folders if sum(path.parent == ROOT / folder for path in files) > MOST_FILES}
-    assert crowded == set(CROWDED), "files per folder"
 
 
 def test_what_is_left_for_later_has_an_owner() -> None:

@@ -51,7 +51,9 @@ def test_the_lock_satisfies_every_dependency(python: str) -> None:
             assert requirement.specifier.contains(version), f"{requirement} but the lock has {version}; renew it"
 
 
-def test_every_locked_package_has_hashes() -> None:
-    blocks = re.split(r"\n(?=[a-z])", (ROOT / "requirements" / "app.lock").read_text())
+@pytest.mark.parametrize("lock", ["app.lock", "uv.lock"])
+def test_every_locked_package_has_hashes(lock: str) -> None:
+    blocks = re.split(r"\n(?=[a-z])", (ROOT / "requirements" / lock).read_text())
+    assert any(block[0].isalnum() for block in blocks)
     without = [block.split(" ")[0] for block in blocks if block[0].isalnum() and "--hash=sha256:" not in block]
     assert not without, f"no hash: {', '.join(without)}"
