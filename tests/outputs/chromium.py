@@ -31,8 +31,6 @@ class Page:
     def __init__(self, connection: ClientConnection) -> None:
         self._connection = connection
         self._numbers = itertools.count(1)
-        self.call("Page.enable")
-        self.call("Security.setIgnoreCertificateErrors", ignore=True)
 
     def call(self, method: str, **arguments: Any) -> dict[str, Any]:
         """One DevTools command and its answer."""
@@ -70,9 +68,31 @@ class Page:
         return base64.b64decode(self.call("Page.captureScreenshot")["data"])
 
 
+class Browser:
+    """A browser that runs. Its pages are given by `page`, one after the other."""
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+
+    @contextlib.contextmanager
+    def page(self) -> Iterator[Page]:
+        """A new page in front."""
+        with connect(self._address, max_size=2**26) as connection:
+            browser = Page(connection)
+            target = browser.call("Target.createTarget", url="about:blank", newWindow=True)["targetId"]
+            place = f"{self._address.partition('/devtools/')[0]}/devtools/page/{target}"
+            with connect(place, max_size=2**26) as own:
+                page = Page(own)
+                page.call("Page.enable")
+                page.call("Page.bringToFront")
+                page.call("Security.setIgnoreCertificateErrors", ignore=True)
+                yield page
+            browser.call("Target.closeTarget", targetId=target)
+
+
 @contextlib.contextmanager
-def chromium() -> Iterator[Page]:
-    """A page in a browser of its own. Skips the test where there is no Chromium; fails it where CI is set."""
+def chromium() -> Iterator[Browser]:
+    """A browser. Skips the test where there is no Chromium; fails it where CI is set."""
     program = next(filter(None, map(shutil.which, PROGRAMS)), None)
     if program is None:
         sentence = "Chromium is missing: `./run test` installs it as root, or `sudo apt-get install chromium`."
@@ -84,33 +104,22 @@ def chromium() -> Iterator[Page]:
                                    stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                    text=True)
         try:
-            with connect(_page_address(process), max_size=2**26) as connection:
-                yield Page(connection)
+            yield Browser(_address(process))
         finally:
             process.terminate()
             process.wait(PATIENCE_S)
 
 
-def _page_address(process: subprocess.Popen[str]) -> str:
-    """The DevTools socket of the first page."""
+def _address(process: subprocess.Popen[str]) -> str:
+    """The DevTools socket of a browser."""
     assert process.stderr is not None
     said = []
     for line in process.stderr:
         said.append(line)
         _, found, browser = line.partition("DevTools listening on ")
         if found:
-            return _attach(browser.strip())
+            return browser.strip()
     raise AssertionError(f"Chromium did not start: {''.join(said)}")
-
-
-def _attach(browser: str) -> str:
-    with connect(browser) as connection:
-        def pages() -> list[str]:
-            connection.send(json.dumps({"id": 1, "method": "Target.getTargets"}))
-            targets = json.loads(connection.recv(PATIENCE_S))["result"]["targetInfos"]
-            return [target["targetId"] for target in targets if target["type"] == "page"]
-        eventually(pages)
-        return f"{browser.partition('/devtools/')[0]}/devtools/page/{pages()[0]}"
 
 
 def saved(picture: bytes, name: str) -> None:

@@ -84,9 +84,9 @@ def test_a_stuck_output_drops_the_oldest(rig: Rig, sink: FakeSink, make, monkeyp
 def test_an_output_is_limited_to_its_rate(rig: Rig, sink: FakeSink, make) -> None:
     output = make(rate_hz=50.0)
     state = state_of(rig, neutral_pose())
-    assert settled(lambda: output.send(state) is None, 1.0)
+    seconds = eventually(lambda: output.send(state) or len(sink.got) > 20)
     eventually(lambda: output.status().sent == len(sink.got))
-    assert 25 <= len(sink.got) <= 52  # fewer where the machine was busy, never more
+    assert len(sink.got) <= 2 + 50.0 * seconds  # fewer where the machine was busy, never more
 
 
 @pytest.mark.parametrize("error", [OutputError("the line is dead; plug it in."), ZeroDivisionError("oops")])
@@ -122,7 +122,7 @@ def test_an_output_that_never_ends_is_left_behind(rig: Rig, sink: FakeSink, make
 def test_a_client_that_never_reads_is_let_go_and_others_go_on(stream: Callable[..., Stream],
                                                              monkeypatch: pytest.MonkeyPatch) -> None:
     from rhot_app.outputs import web_server
-    monkeypatch.setattr(web_server, "SILENT_S", 1.0)
+    monkeypatch.setattr(web_server, "SILENT_S", 0.3)
     port = free_port()
     running = stream(f"ws:{port}?joints=openxr")
     eventually(lambda: running.outputs.status()[0].state == "running")
