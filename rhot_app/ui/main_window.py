@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
@@ -18,6 +19,7 @@ from PySide6.QtWidgets import (
 from rhot_app.ui.actions import Actions, MainToolBar
 from rhot_app.ui.appearance import Appearance, DisplayPrediction
 from rhot_app.ui.backend.contract import TwinChoice
+from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.guide import page_of
 from rhot_app.ui.common.settings import Settings
@@ -47,7 +49,9 @@ _SIZE = (1280, 800)
 class MainWindow(QMainWindow):
     """`controller` does, this shows. `tick` is one turn of the timer, so that tests can turn by hand."""
 
-    def __init__(self, controller: Controller, settings: Settings) -> None:
+    def __init__(self, controller: Controller, settings: Settings,
+                 make_solver: Callable[[], Solver] = Solver) -> None:
+        """`make_solver` makes what runs the long work of wizards and replays."""
         super().__init__()
         self.controller = controller
         self.settings = settings
@@ -58,8 +62,9 @@ class MainWindow(QMainWindow):
         self.recordings = Recordings(controller, self.tell)
         self.rig_watch = RigFileWatch(controller)
         self.wizards = Launcher(controller.backend.asker, controller.backend.client,
-                                lambda: self.appearance.scheme, settings, self)
-        self.replays = ReplayWindows(settings, lambda: self.appearance.scheme, self, lambda: controller.rig)
+                                lambda: self.appearance.scheme, settings, self, make_solver)
+        self.replays = ReplayWindows(settings, lambda: self.appearance.scheme, self, lambda: controller.rig,
+                                     make_solver)
         self.setObjectName("main window")
         self.setWindowTitle("RHOT")
         scheme = scheme_named(settings.scheme)

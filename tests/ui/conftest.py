@@ -2,72 +2,61 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_backend import FakeBackend
-from patience import PATIENCE_S
+from fake_backend import FakeBackend, InProcessSolver
 
 from rhot_app.ui.app import cap_software_gl, choose_gl_platform
 
 choose_gl_platform()
 cap_software_gl()
 
-from PySide6.QtCore import QCoreApplication, QPoint, Qt  # after the OpenGL platform was chosen  # noqa: E402
+from person import Person  # after the OpenGL platform was chosen  # noqa: E402
+from PySide6.QtCore import QCoreApplication, Qt  # noqa: E402
 from PySide6.QtGui import QPalette  # noqa: E402
-from PySide6.QtTest import QTest  # noqa: E402
-from PySide6.QtWidgets import QApplication, QWidget  # noqa: E402
+from PySide6.QtWidgets import QApplication  # noqa: E402
 
 QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
 
+from rhot_app.ui.backend.solver import Solver  # noqa: E402
 from rhot_app.ui.common.controller import Controller  # noqa: E402
 from rhot_app.ui.common.settings import Settings  # noqa: E402
 from rhot_app.ui.common.theme import apply_theme, scheme_named  # noqa: E402
 from rhot_app.ui.main_window import MainWindow  # noqa: E402
+from rhot_app.ui.models import proposal  # noqa: E402
 from rhot_app.ui.models.pacing import FramePacer  # noqa: E402
 from rhot_app.ui.scene.surface import choose_format  # noqa: E402
 
 
-class Bench:
-    """A window on a fake engine, a person's hands, and time that passes."""
+class Bench(Person):
+    """A person in front of the main window on a fake engine."""
 
-    def __init__(self, folder: Path, backend: FakeBackend | None = None, scheme: str = "dark") -> None:
+    def __init__(self, folder: Path, backend: FakeBackend | None = None, scheme: str = "dark",
+                 make_solver: Callable[[], Solver] = InProcessSolver) -> None:
         self.backend = backend or FakeBackend()
         settings = Settings(folder / "app.ini")
         settings.scheme = scheme
         self.controller = Controller(self.backend, self.backend.client)
-        self.window = MainWindow(self.controller, settings)
+        self.window = MainWindow(self.controller, settings, make_solver)
         if QApplication.palette().color(QPalette.ColorRole.Window).name() != scheme_named(scheme).window:
             self.window.appearance.set_scheme(scheme)
         self.window.screen_parts.pacer = FramePacer(most_hz=4.0)  # software OpenGL is slow, and few tests look at it
-        self.window.show()
-        self.window.activateWindow()
-        assert QTest.qWaitForWindowActive(self.window)
+        super().__init__(self.window)
 
-    def click(self, button: QWidget) -> None:
-        """Click the middle of a button."""
-        assert button.isVisible()
-        QTest.mouseClick(button, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
-                         QPoint(button.width() // 2, button.height() // 2))
+    def told(self) -> Any:
+        return self.window.toolbar.badge.word, self.window.advice.texts
 
-    def press(self, key: Qt.Key, widget: QWidget | None = None,
-              modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
-        """Press a key in the window."""
-        QTest.keyClick(widget or self.window, key, modifier)
+    def said(self, *words: str) -> bool:
+        """Whether one of the sentences at the bottom has all these words."""
+        return any(all(word in text for word in words) for text in self.window.advice.texts)
 
-    def until(self, condition: Callable[[], Any], timeout_s: float = PATIENCE_S) -> None:
-        """Let the window run until `condition` holds; the last look happens after the time is up."""
-        end = time.monotonic() + timeout_s
-        while time.monotonic() < end and not condition():
-            QTest.qWait(10)
-        assert condition()
-
-    def run(self, seconds: float) -> None:
-        """Let the window run for a while."""
-        QTest.qWait(round(1000 * seconds))
+    @property
+    def calm(self) -> bool:
+        """Whether nothing is wrong, as the window says."""
+        return self.said("in order")
 
     def track(self) -> None:
         """Bring the window to the simulated rig, tracking, with nothing wrong, from wherever it is."""
@@ -76,8 +65,7 @@ class Bench:
         if self.controller.rig is None:
             self.until(lambda: self.window.welcome.twin_button.isVisible())
             self.click(self.window.welcome.twin_button)
-        self.until(lambda: self.window.toolbar.badge.word == "TRACKING"
-                   and self.window.advice.texts == ["Everything is in order."])
+        self.until(lambda: self.window.toolbar.badge.word == "TRACKING" and self.calm)
         self.backend.calls.clear()
         self.backend.engine.commands.clear()
 
@@ -101,6 +89,14 @@ def themed(qapp: Any) -> Any:
 def own_documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Recordings of the tests never land in the user's own folders."""
     monkeypatch.setenv("XDG_DOCUMENTS_DIR", str(tmp_path))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def nothing_compiled() -> Iterator[None]:
+    """A fake engine goes on with any rig at once: no process compiles a tracker for it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(proposal, "compile_part", lambda *args: None)
+        yield
 
 
 @pytest.fixture

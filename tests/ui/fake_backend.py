@@ -1,14 +1,50 @@
-"""Processes that are none: what `rhot_app.ui.backend.session.Session` does, on a `FakeEngine`."""
+"""Processes that are none: what `Session` and `Solver` of `rhot_app.ui.backend` do, on a `FakeEngine` and at once."""
 
 from __future__ import annotations
 
+import pickle
 import threading
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from fake_engine import FakeClient, FakeEngine
 
-from rhot_app.errors import RigError, SimulatorError
+from rhot_app.errors import CalibrationError, RhotError, RigError, SimulatorError
+from rhot_app.progress import Progress
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
+from rhot_app.ui.backend.solver import Solver, StoppedError
+
+
+class InProcessSolver(Solver):
+    """Works in the caller's thread: a process takes half a second to start. What goes there and back must pickle."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._stopped = threading.Event()
+
+    def prepare(self, module: str) -> None:
+        """There is nothing to start."""
+
+    def run(self, function: Callable[..., Any], arguments: tuple[Any, ...], progress: Progress,
+            options: Mapping[str, Any] | None = None) -> Any:
+        self._stopped = stopped = threading.Event()
+
+        def report(text: str, fraction: float) -> None:
+            if stopped.is_set():
+                raise StoppedError("Stopped.")
+            progress(text, fraction)
+
+        work, given, more = pickle.loads(pickle.dumps((function, arguments, dict(options or {}))))
+        try:
+            return pickle.loads(pickle.dumps(work(*given, progress=report, **more)))
+        except StoppedError:
+            raise
+        except (RhotError, OSError) as exc:
+            raise CalibrationError(str(exc)) from exc
+
+    def stop(self) -> None:
+        self._stopped.set()
 
 
 class FakeBackend:

@@ -28,7 +28,6 @@ RATE_HZ = 15.0
 _IN_FLIGHT = 2
 _RETRY_S = 0.3
 _KEPT = 6
-_RATE_WINDOW_S = 2.0
 _OVERTAKEN_NS = 1_000_000_000
 _STALE_NS = 1_000_000_000
 
@@ -55,7 +54,6 @@ class LiveFeed:
         self._period_s = 1.0 / rate_hz
         self._lock = threading.Lock()
         self._pictures: dict[str, deque[Picture]] = {name: deque(maxlen=_KEPT) for name in cameras}
-        self._arrivals: dict[str, deque[float]] = {name: deque(maxlen=64) for name in cameras}
         self._due_s = dict.fromkeys(cameras, 0.0)
         self._problems = dict.fromkeys(cameras, "")
         self._ending = threading.Event()
@@ -109,13 +107,6 @@ class LiveFeed:
         return {name: min(pictures, key=lambda picture: abs(picture.received_ns - anchor_ns))
                 for name, pictures in recent.items()}
 
-    def rate_hz(self, camera: str) -> float:
-        """Pictures per second over the last two seconds."""
-        now = time.monotonic()
-        with self._lock:
-            recent = [t for t in self._arrivals[camera] if now - t < _RATE_WINDOW_S]
-        return (len(recent) - 1) / (recent[-1] - recent[0]) if len(recent) > 2 else 0.0
-
     def problem(self, camera: str) -> str:
         """Why there are no pictures of a camera, "" while they come."""
         with self._lock:
@@ -154,7 +145,6 @@ class LiveFeed:
             kept = self._pictures[camera]
             if not kept or not _overtaken(picture, kept[-1]):
                 kept.append(picture)
-                self._arrivals[camera].append(time.monotonic())
 
 
 def _overtaken(picture: Picture, newest: Picture) -> bool:
@@ -185,9 +175,9 @@ _AGAIN_S = 0.5
 class StateFeed:
     """`start` may be called again; `stop` ends it for good. Everything else from any thread."""
 
-    def __init__(self, listen: Callable[[], Listener]) -> None:
-        """`listen` makes the client, in the feed's own thread."""
-        self._listen = listen
+    def __init__(self, listen: Callable[[], Listener], clock: Callable[[], float] = time.monotonic) -> None:
+        """`listen` makes the client, in the feed's own thread; `clock` gives seconds."""
+        self._listen, self._clock = listen, clock
         self._states: deque[tuple[float, HandState]] = deque()
         self._lock = threading.Lock()
         self._ending = threading.Event()
@@ -207,13 +197,13 @@ class StateFeed:
 
     def recent(self, seconds: float = KEPT_S) -> list[HandState]:
         """The states that came within the last seconds, oldest first."""
-        since = time.monotonic() - seconds
+        since = self._clock() - seconds
         with self._lock:
             return [state for came, state in self._states if came >= since]
 
     def add(self, state: HandState) -> None:
         """Take a state in, as if it had been heard now."""
-        now = time.monotonic()
+        now = self._clock()
         with self._lock:
             self._states.append((now, state))
             while now - self._states[0][0] > KEPT_S:

@@ -34,7 +34,7 @@ class Solver:
     """Runs one piece of work at a time. `run` waits, so call it in a worker; `stop` may be called from any thread."""
 
     def __init__(self, niceness: int = NICENESS) -> None:
-        """`niceness` of the process; by default it takes only what nobody else wants."""
+        """`niceness` of the process; by default the window and the engine come first."""
         self._command = (*_COMMAND, str(niceness))
         self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None

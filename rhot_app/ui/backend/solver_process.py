@@ -19,8 +19,8 @@ from typing import Any, BinaryIO
 from rhot_app.errors import RhotError
 from rhot_node.errors import NodeError
 
-NICENESS = 19
-"""Below the window and below simulated nodes: the live picture comes first."""
+NICENESS = 10
+"""Below the window and the engine, which come first; a busy computer still lets the work go on."""
 
 _REPORT_S = 0.05
 

@@ -182,6 +182,11 @@ class AdviceBar(QWidget):
         """The sentences shown."""
         return [notice.text for notice in self._shown or []]
 
+    @property
+    def buttons(self) -> dict[str, QPushButton]:
+        """The buttons beside the sentences, by their words."""
+        return {button.text(): button for *_, button in self._lines if button.isVisible()}
+
     def _act(self, index: int) -> None:
         notice = self._on_line[index]
         if notice is not None:

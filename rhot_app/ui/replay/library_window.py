@@ -19,6 +19,7 @@ from rhot_app.keys import load_master_keys
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import Collected, collect_videos
+from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.job import Job, Progress
 from rhot_app.ui.dialogs.recordings import recordings_folder
 from rhot_app.ui.models.palette import Scheme
@@ -44,14 +45,15 @@ class LibraryWindow(QDialog):
     renamed = Signal(object, object)
 
     def __init__(self, scheme: Scheme, folder: Path | None = None, cache: Path | None = None,
-                 parent: QWidget | None = None, rig: Callable[[], Rig | None] = lambda: None) -> None:
+                 parent: QWidget | None = None, rig: Callable[[], Rig | None] = lambda: None,
+                 make_solver: Callable[[], Solver] = Solver) -> None:
         super().__init__(parent)
         self.setWindowTitle("Recordings")
         self.setProperty("guide", "recording")
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
         self.resize(*_SIZE)
         self.library = Library(folder or recordings_folder(), cache or summaries_folder())
-        self.summaries = Summaries(self.library, self)
+        self.summaries = Summaries(self.library, make_solver(), self)
         self._listing: Job | None = None
         self._collecting: Job | None = None
         self._rig = rig

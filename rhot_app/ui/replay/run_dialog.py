@@ -116,8 +116,6 @@ class RunDialog(QDialog):
 
 _COUNT = itertools.count()
 
-_NICENESS = 10  # somebody waits for it, but window and engine come first
-
 
 def states_folder() -> Path:
     """Where the states of open recordings lie: a disk, because a folder in memory would hold 300 MB for ten minutes."""
@@ -132,9 +130,9 @@ class TrackingWork(QObject):
     failed = Signal(str)
     changed = Signal()
 
-    def __init__(self, folder: Path | None = None, parent: QObject | None = None) -> None:
+    def __init__(self, solver: Solver, folder: Path | None = None, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self.solver = Solver(_NICENESS)
+        self.solver = solver
         self.text = ""
         self._folder = folder or states_folder()
         self._job: Job | None = None

@@ -17,10 +17,10 @@ class Summaries(QObject):
 
     changed = Signal(object)
 
-    def __init__(self, library: Library, parent: QObject | None = None) -> None:
+    def __init__(self, library: Library, solver: Solver, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._library = library
-        self._solver = Solver()
+        self._solver = solver
         self._made: dict[Path, tuple[int, Summary]] = {}  # with the size of the file that each is of
         self._sizes: dict[Path, int] = {}
         self._words: dict[Path, str] = {}

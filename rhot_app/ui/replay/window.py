@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
@@ -19,6 +20,7 @@ from PySide6.QtWidgets import (
 
 from rhot_app.engine.observer import condition_of
 from rhot_app.recording.bookmarks import Bookmark
+from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.recordings import LOG_FILTER, recordings_folder
@@ -44,15 +46,15 @@ class ReplayWindow(QMainWindow):
     """`open` tracks a recording and shows it. `tick` is one turn of the timer, so that tests can turn by hand."""
 
     def __init__(self, settings: Settings, scheme: Scheme, states: Path | None = None,
-                 parent: QWidget | None = None) -> None:
-        """`states`: the folder for the states of open recordings."""
+                 parent: QWidget | None = None, make_solver: Callable[[], Solver] = Solver) -> None:
+        """`states`: the folder for the states of open recordings; `make_solver`: what tracks them."""
         super().__init__(parent)
         self.setObjectName("replay window")
         self.setWindowTitle("RHOT replay")
         self.setProperty("guide", "recording")
         self.resize(*_SIZE)
         self.replay: Replay | None = None
-        self.work = TrackingWork(states, self)
+        self.work = TrackingWork(make_solver(), states, self)
         self.dialog: RunDialog | None = None
         self.bookmarks = BookmarkWriter(self)
         self.guide: GuideViewer | None = None

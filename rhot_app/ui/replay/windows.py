@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from rhot_app.project import Rig
+from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.recordings import LOG_FILTER, recordings_folder
 from rhot_app.ui.models.palette import Scheme
@@ -20,9 +21,9 @@ class ReplayWindows:
     with it."""
 
     def __init__(self, settings: Settings, scheme: Callable[[], Scheme], parent: QWidget,
-                 rig: Callable[[], Rig | None] = lambda: None) -> None:
+                 rig: Callable[[], Rig | None] = lambda: None, make_solver: Callable[[], Solver] = Solver) -> None:
         self._settings, self._scheme, self._parent = settings, scheme, parent
-        self._rig = rig
+        self._rig, self._make_solver = rig, make_solver
         self.window: ReplayWindow | None = None
         self.library: LibraryWindow | None = None
 
@@ -36,7 +37,7 @@ class ReplayWindows:
         """Replay a recording, in the window that replays already if there is one."""
         if self.window is None or not self.window.isVisible():
             self._end_window()
-            self.window = ReplayWindow(self._settings, self._scheme())
+            self.window = ReplayWindow(self._settings, self._scheme(), make_solver=self._make_solver)
         _bring_forward(self.window)
         self.window.open(path)
 
@@ -44,7 +45,8 @@ class ReplayWindows:
         """The page with all recordings."""
         if self.library is None or not self.library.isVisible():
             self._end_library()
-            self.library = LibraryWindow(self._scheme(), parent=self._parent, rig=self._rig)
+            self.library = LibraryWindow(self._scheme(), parent=self._parent, rig=self._rig,
+                                         make_solver=self._make_solver)
             self.library.open_asked.connect(self.open)
             self.library.renamed.connect(self._follow)
         else:

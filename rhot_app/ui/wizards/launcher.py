@@ -19,6 +19,7 @@ from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import Rig, parse_rig
 from rhot_app.rig_history import Version
 from rhot_app.ui.backend.contract import Asker, Listener
+from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.shapes import shape_icon
 from rhot_app.ui.models.palette import Scheme
@@ -51,8 +52,9 @@ class Launcher(QObject):
     failed = Signal(str)
 
     def __init__(self, connect: Callable[[], Asker], listen: Callable[[], Listener], scheme: Callable[[], Scheme],
-                 memory: Memory, window: QWidget) -> None:
+                 memory: Memory, window: QWidget, make_solver: Callable[[], Solver] = Solver) -> None:
         super().__init__(window)
+        self._make_solver = make_solver
         self._memory = memory
         self._connect = connect
         self._listen = listen
@@ -121,7 +123,7 @@ class Launcher(QObject):
     def _show(self, wizard: Wizard, now: RigNow) -> None:
         self._job = None
         kit = Kit(now.rig, now.path, self._connect, self._scheme(), self._memory, now.node_settings,
-                  self._listen)
+                  self._listen, self._make_solver)
         self.wizard = WizardWindow(wizard.make_plan(kit), kit, self._window)
         self.wizard.rig_used.connect(lambda rig: self.rig_used.emit())
         self.wizard.used.connect(lambda proposal, on: self._note(proposal, str(now.path or ""), on=on))

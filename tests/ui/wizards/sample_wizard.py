@@ -55,7 +55,7 @@ class CollectStep(Step):
         self.enough = 3
 
     def see(self, pictures):
-        return {name: float(picture.bgr[240].max(axis=1).argmax()) for name, picture in pictures.items()}
+        return {name: float(picture.bgr[120].max(axis=1).argmax()) for name, picture in pictures.items()}
 
     def take(self, seen):
         self.seen = seen
@@ -80,8 +80,8 @@ class CollectStep(Step):
         count = len(self.captured)
         overlays = {}
         for name, x in (self.seen or {}).items():
-            overlays[name] = (Cells(np.eye(3)), Dots(np.array([[x, 240.0]])), Tag(x, 200.0, "edge"),
-                              Line(np.array([[x, 100.0], [x + 60, 100.0], [x, 160.0]]), closed=True, shaded=True))
+            overlays[name] = (Cells(np.eye(3)), Dots(np.array([[x, 120.0]])), Tag(x, 100.0, "edge"),
+                              Line(np.array([[x, 50.0], [x + 30, 50.0], [x, 80.0]]), closed=True, shaded=True))
         bars = (Bar("pictures", count / self.enough, "captured so far"), Bar("tilt", 0.4), Bar("size", 1.0))
         return StepView("Hold the board still and press Space.", done=count >= self.enough, bars=bars,
                         overlays=overlays, kept=count)

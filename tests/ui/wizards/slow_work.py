@@ -19,6 +19,7 @@ def count(steps: int, pause_s: float, *, progress: Callable[[str, float], None])
 
 def hold_the_interpreter(seconds: float, *, progress: Callable[[str, float], None]) -> str:
     """Compute in pure Python, as solvers do between calls of numpy."""
+    progress("holding", 0.0)
     end, total = time.monotonic() + seconds, 0
     while time.monotonic() < end:
         total += sum(k * k for k in range(2000))

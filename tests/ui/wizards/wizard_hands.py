@@ -2,69 +2,82 @@
 
 from __future__ import annotations
 
-import time
-
-from patience import PATIENCE_S
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtTest import QTest
+from person import NONE, Person, wait
+from PySide6.QtCore import Qt
 from screen_pictures import SIZE, check
 
 
-class Hands:
-    """Clicks and keys on one `WizardWindow`."""
+class Hands(Person):
+    """A person in front of one `WizardWindow`; `path` is the rig's file, `asker` what answers for the engine."""
+
+    wait = staticmethod(wait)
 
     def __init__(self, window):
-        self.window = window
         window.resize(SIZE)
-        window.show()
-        window.activateWindow()
-        assert QTest.qWaitForWindowActive(window)
+        super().__init__(window)
 
-    @staticmethod
-    def wait(condition, timeout_s=PATIENCE_S):
-        end = time.monotonic() + timeout_s
-        while time.monotonic() < end and not condition():
-            QTest.qWait(10)
-        assert condition()
+    def told(self):
+        frame = self.window.frame
+        return f"at {self.title!r}: {self.sentence!r} {frame.hint.text()!r} {frame.verdict.verdict}"
 
-    def until(self, condition, timeout_s=PATIENCE_S):
-        try:
-            self.wait(condition, timeout_s)
-        except AssertionError:
-            frame = self.window.frame
-            raise AssertionError(f"at {self.title!r}: {self.sentence!r} {frame.hint.text()!r} "
-                                 f"{frame.verdict.verdict}") from None
+    def key(self, key, modifier=NONE):
+        self.press(key, modifier=modifier)
 
-    def run(self, seconds):
-        QTest.qWait(round(1000 * seconds))
-
-    def click(self, widget):
-        assert widget.isVisible() and widget.isEnabled()
-        QTest.mouseClick(widget, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
-                         QPoint(widget.width() // 2, widget.height() // 2))
-
-    def type(self, field, text):
-        """Click into a field and type something instead of what stands there."""
-        self.click(field)
-        field.selectAll()
-        QTest.keyClicks(field, text)
-
-    def key(self, key, modifier=Qt.KeyboardModifier.NoModifier):
-        QTest.keyClick(self.window, key, modifier)
+    def undo(self):
+        """Ctrl+Z, outside text fields."""
+        self.frame.middle.setFocus()
+        self.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
 
     def keep(self, name, least_colours=20):
         """Take the picture of the page as it is now, for the guide."""
-        self.run(0.4)
         check(name, self.window.grab().toImage(), least_colours)
 
     def next(self):
         """Click Next once it can be clicked."""
-        self.until(lambda: self.window.frame.next_button.isEnabled())
-        self.click(self.window.frame.next_button)
+        self.until(self.frame.next_button.isEnabled)
+        self.click(self.frame.next_button)
+
+    def record(self, seconds=0.01):
+        """Space: a movement of so many seconds."""
+        step = self.window.step
+        step.seconds = seconds
+        self.frame.middle.setFocus()
+        self.key(Qt.Key.Key_Space)
+        self.until(lambda: step.phase == "recorded")
+
+    def solved(self):
+        """Wait for the report of a step that solves."""
+        step = self.window.step
+        self.until(lambda: step.report is not None or step.view().hint)
+        assert step.report is not None, step.view().hint
+        return step.report
+
+    def use(self):
+        """On the last page: use what is proposed."""
+        assert self.window.step.usable
+        self.next()
+        self.until(lambda: self.window.step.state == "used")
+
+    def restore(self):
+        """On the last page, after use: bring the old one back."""
+        self.click(self.window.page.restore_button)
+        self.until(lambda: self.window.step.state == "restored")
+
+    @property
+    def frame(self):
+        return self.window.frame
 
     @property
     def sentence(self):
-        return self.window.frame.sentence.text()
+        return self.frame.sentence.text()
+
+    @property
+    def hint(self):
+        return self.frame.hint.text()
+
+    @property
+    def verdict(self):
+        return self.frame.verdict.verdict
 
     @property
     def title(self):

@@ -20,8 +20,8 @@ Draw = Callable[[int, float], np.ndarray]
 
 def grey_picture(node_id: int, t_s: float) -> np.ndarray:
     """A picture in which something moves."""
-    picture = np.full((480, 640, 3), 60 + 20 * node_id, np.uint8)
-    cv2.circle(picture, (round(320 + 200 * np.sin(t_s)), 240), 40, (60, 160, 220), -1)
+    picture = np.full((240, 320, 3), 60 + 20 * node_id, np.uint8)
+    cv2.circle(picture, (round(160 + 100 * np.sin(t_s)), 120), 20, (60, 160, 220), -1)
     return picture
 
 
@@ -48,8 +48,14 @@ class FakeRigAsker:
         self.path = ""
         self.saved: list[int] = []
         self.closed = 0
-        self._number = 0
+        self.number = 0
+        self._sent: dict[int, tuple[np.ndarray, bytes]] = {}  # the last picture of each node and its JPEG
         self._lock = threading.Lock()
+
+    @property
+    def told(self) -> dict[int, dict[str, Any]]:
+        """The nodes' settings by node id, as they give them."""
+        return {node_id: msgspec.to_builtins(one) for node_id, one in self.settings.items()}
 
     def connect(self) -> FakeRigAsker:
         """One asker for everybody."""
@@ -64,8 +70,8 @@ class FakeRigAsker:
             raise EngineError(self.refuse)
         with self._lock:
             self.commands.append(name)
-            self._number += 1
-            number = self._number
+            self.number += 1
+            number = self.number
         if name == "still":
             return self._still(arguments["node_id"], number)
         if name == "set_rig":
@@ -79,8 +85,12 @@ class FakeRigAsker:
     def _still(self, node_id: int, number: int) -> dict[str, Any]:
         time.sleep(self.delay_s)
         now_s = time.monotonic()
-        _, jpeg = cv2.imencode(".jpg", self.draw(node_id, now_s), [cv2.IMWRITE_JPEG_QUALITY, 98])
-        return {"jpeg": jpeg.tobytes(), "answer": {"number": number, "t_node_ns": round(1e9 * now_s)}}
+        picture = self.draw(node_id, now_s)
+        before, jpeg = self._sent.get(node_id, (None, b""))
+        if picture is not before:
+            jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 98])[1].tobytes()
+            self._sent[node_id] = picture, jpeg
+        return {"jpeg": jpeg, "answer": {"number": number, "t_node_ns": round(1e9 * now_s)}}
 
     def _node(self, node_id: int, request: dict[str, Any]) -> dict[str, Any]:
         if request["request"] == "set_settings":
@@ -88,4 +98,4 @@ class FakeRigAsker:
             if request.get("save", True):
                 self.saved.append(node_id)
             return {"restart": []}
-        return {"settings": msgspec.to_builtins(self.settings[node_id])}
+        return {"settings": self.told[node_id]}

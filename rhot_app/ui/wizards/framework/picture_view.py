@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+import numpy as np
+from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
@@ -89,6 +90,15 @@ class PictureView(QWidget):
         if self._flash_until and time.monotonic() >= self._flash_until:
             self._flash_until = 0.0
             self.update()
+
+    @property
+    def problem(self) -> str:
+        """Why there is no new picture; "" while all is well."""
+        return self._problem
+
+    def to_widget(self, x: float, y: float) -> QPoint:
+        """Where px (x, y) of the frame is drawn."""
+        return self._place().to_widget(np.array([[x, y]]))[0].toPoint()
 
     def _place(self) -> FramePlacement:
         width, height = (self._image.width(), self._image.height()) if not self._image.isNull() else (640, 480)

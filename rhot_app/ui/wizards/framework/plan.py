@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 from rhot_app.project import Rig
 from rhot_app.ui.backend.contract import Asker, Listener
+from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.page import Page
 
@@ -34,7 +35,7 @@ class Kit:
     """What every wizard is given: the rig in force, its file (None: it came from none), a way to ask the engine, the
     colours of the screen, and what was entered before. Node settings by node id are as the nodes gave them when the
     wizard was opened. `listen` makes a client that hears the hand's states, for wizards that calibrate by a moving
-    hand."""
+    hand; `make_solver` what runs their long work."""
 
     rig: Rig
     rig_path: Path | None
@@ -43,6 +44,7 @@ class Kit:
     memory: Memory
     node_settings: dict[int, dict[str, Any]] = field(default_factory=dict)
     listen: Callable[[], Listener] | None = None
+    make_solver: Callable[[], Solver] = Solver
 
 
 @dataclass(frozen=True, slots=True)

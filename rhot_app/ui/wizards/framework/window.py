@@ -44,7 +44,7 @@ class WizardWindow(QDialog):
         self.feed = LiveFeed({node.name: node.node_id for node in kit.rig.nodes if not node.text_datagrams},
                              kit.connect)
         self.looker = PictureWorker(self.feed)
-        self.work = Work(self)
+        self.work = Work(kit.make_solver(), self)
         self.frame = WizardFrame(plan, self.feed.cameras, self.work, kit.scheme, self)
         self.current = 0
         self._dirty = True
@@ -52,7 +52,7 @@ class WizardWindow(QDialog):
         self._kept = 0
         self._frozen: Mapping[str, Picture] = {}
         self._job: Job | None = None
-        self._guide: GuideViewer | None = None
+        self.guide: GuideViewer | None = None
         self._ending: Job | None = None
         self._connect_everything()
         self._go_to(0)
@@ -219,9 +219,9 @@ class WizardWindow(QDialog):
 
     def open_guide(self) -> None:
         """This wizard's section of the guide, beside it."""
-        if self._guide is None:
-            self._guide = GuideViewer(self)
-        self._guide.open_page(self.plan.guide, self.plan.title)
+        if self.guide is None:
+            self.guide = GuideViewer(self)
+        self.guide.open_page(self.plan.guide, self.plan.title)
 
     # -- the end ---------------------------------------------------------------------------------------------------
 

@@ -24,9 +24,9 @@ class Work(QObject):
 
     changed = Signal()
 
-    def __init__(self, parent: QObject | None = None) -> None:
+    def __init__(self, solver: Solver, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self.solver = Solver()
+        self.solver = solver
         self.task: Task | None = None
         self.text = ""
         self.halted = False  # cancelled or failed: not to begin again by itself

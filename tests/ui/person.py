@@ -1,0 +1,73 @@
+"""A person in front of a window: clicks, keys, and the patience to wait for what the window does."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from patience import PATIENCE_S
+from PySide6.QtCore import QEventLoop, QPoint, Qt, QTimer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+
+LEFT, NONE = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+
+
+def pause(seconds: float) -> None:
+    """Let Qt run. `QTest.qWait` would do so as well, but it lets no other thread of Python's run meanwhile."""
+    loop = QEventLoop()
+    QTimer.singleShot(round(1000 * seconds), loop.quit)
+    loop.exec()
+
+
+def wait(condition: Callable[[], Any], timeout_s: float = PATIENCE_S, told: Callable[[], Any] = lambda: "") -> None:
+    """Let Qt run until `condition` holds; fails with what `told` gives when it never does."""
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end and not condition():
+        pause(0.005)
+    assert condition(), told()
+
+
+class Person:
+    """Clicks and keys on one window, which is shown and has the keyboard."""
+
+    def __init__(self, window: Any) -> None:
+        self.window = window
+        window.show()
+        window.activateWindow()
+        assert QTest.qWaitForWindowActive(window)
+
+    def told(self) -> Any:
+        """What a failure says of the window."""
+        return self.window.windowTitle()
+
+    def until(self, condition: Callable[[], Any], timeout_s: float = PATIENCE_S) -> None:
+        """Let the window run until `condition` holds; the last look happens after the time is up."""
+        wait(condition, timeout_s, self.told)
+
+    def run(self, seconds: float) -> None:
+        """Let the window run for a while: for what must not happen."""
+        pause(seconds)
+
+    def click(self, widget: QWidget, at: QPoint | None = None) -> None:
+        """Click the middle of a widget, or another place of it."""
+        assert widget.isVisible() and widget.isEnabled()
+        QTest.mouseClick(widget, LEFT, NONE, at or widget.rect().center())
+
+    def drag(self, widget: QWidget, *places: QPoint) -> None:
+        """Press at the first place, move over the others, let go at the last."""
+        QTest.mousePress(widget, LEFT, NONE, places[0])
+        for place in places[1:]:
+            QTest.mouseMove(widget, place)
+        QTest.mouseRelease(widget, LEFT, NONE, places[-1])
+
+    def press(self, key: Qt.Key, widget: QWidget | None = None, modifier: Qt.KeyboardModifier = NONE) -> None:
+        """Press a key."""
+        QTest.keyClick(widget or self.window, key, modifier)
+
+    def type(self, field: Any, text: str) -> None:
+        """Click into a field and type something instead of what stands there."""
+        self.click(field)
+        field.selectAll()
+        QTest.keyClicks(field, text)

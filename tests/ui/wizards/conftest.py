@@ -1,0 +1,46 @@
+"""Wizards' windows on a rig without processes; all are closed in the end."""
+
+from __future__ import annotations
+
+import pytest
+from fake_backend import InProcessSolver
+from patience import PATIENCE_S
+from wizard_hands import Hands
+from wizard_rig import FakeMemory
+
+from rhot_app.project import save_rig
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards.framework.plan import Kit
+from rhot_app.ui.wizards.framework.window import WizardWindow
+
+
+def wizards(folder):
+    """Yields what opens ``make_plan(kit)`` in a window, on the rig of an asker and a file of it."""
+    opened = []
+
+    def open_(make_plan, asker, *, listen=None, make_solver=InProcessSolver, in_file=True):
+        path = folder / "desk.json" if in_file else None
+        if path is not None:
+            save_rig(path, asker.rig)
+        kit = Kit(asker.rig, path, asker.connect, DARK, FakeMemory(), asker.told, listen, make_solver)
+        hands = Hands(WizardWindow(make_plan(kit), kit))
+        hands.path, hands.asker, hands.rig, hands.memory = path, asker, asker.rig, kit.memory
+        opened.append(hands.window)
+        return hands
+
+    yield open_
+    for window in opened:
+        assert window.end().wait(PATIENCE_S)
+        window.deleteLater()
+
+
+@pytest.fixture
+def open_wizard(themed, tmp_path):
+    """Opens windows of one test."""
+    yield from wizards(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def open_shared(themed, tmp_path_factory):
+    """Opens windows that all tests of a module share."""
+    yield from wizards(tmp_path_factory.mktemp("wizard"))
