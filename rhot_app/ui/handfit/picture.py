@@ -90,6 +90,16 @@ class FitPicture(QWidget):
 
     # -- what is shown ---------------------------------------------------------------------------------------------
 
+    @property
+    def shown(self) -> Image | None:
+        """The picture; None while there is none."""
+        return self._kept
+
+    @property
+    def problem(self) -> str:
+        """Why there is no new picture; "" while all is well."""
+        return self._problem
+
     def show_image(self, image: Image | None, problem: str = "", *, bgr: bool = False) -> None:
         """A picture (H, W, 3); None: `problem` in its place."""
         if image is self._kept and problem == self._problem:

@@ -30,14 +30,14 @@ _KEEP = "The hand was changed and not saved. Close without it?"
 
 
 class HandFitWindow(QDialog):
-    """Shows one `HandFit`. `used` when the rig has the hand."""
+    """Shows one `HandFit`. `used` when the rig has the hand. `cameras`: None while none run."""
 
     used = Signal()
 
     def __init__(self, fit: HandFit, scheme: Scheme, memory: Memory, kept: Kept, live: LiveCameras | None = None,
                  parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.fit, self._live, self._memory = fit, live, memory
+        self.fit, self.cameras, self._memory = fit, live, memory
         self.setWindowTitle(TITLE)
         self.setProperty("guide", "fitting")
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
@@ -226,7 +226,7 @@ class HandFitWindow(QDialog):
         """Stop what runs, in a worker, because a question to a node may be under way."""
         self._timer.stop()
         self._changes.end()
-        live = self._live
+        live = self.cameras
 
         def stop() -> None:
             if live is not None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+
 from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QLineEdit, QPushButton
 
 from rhot_app.errors import EngineError
@@ -24,14 +27,14 @@ from rhot_app.ui.wizards.steps.alignment_steps import (
 _KIND, _DETAIL, _TRACKER = "pose source", "pose source detail", "pose tracker"  # as they are remembered
 
 
-def make_plan(kit: Kit) -> Plan:
-    """Connect, move both, look at the fit, use it."""
+def make_plan(kit: Kit, poses: PoseFeed | None = None, now_ns: Callable[[], int] = time.monotonic_ns) -> Plan:
+    """Connect, move both, look at the fit, use it. `poses` hears the other tracker; `now_ns` is the master's clock."""
     if kit.listen is None:
         raise EngineError("this window cannot hear the hand; open the wizard from the main window.")
-    states, poses = StateFeed(kit.listen), PoseFeed()
+    states, poses = StateFeed(kit.listen), poses or PoseFeed()
     simulated = simulated_kind(kit.rig_path)
     source = SourceStep(KINDS if simulated is None else (simulated, *KINDS), poses)
-    together = TogetherStep(kit.rig.markers.ids, poses, states.recent)
+    together = TogetherStep(kit.rig.markers.ids, poses, states.recent, now_ns)
     solver = AlignmentSolver(together, kit.rig_path)
     solve = SolveStep(solver.task, lambda result: result.report.verdict, charts_of)
     accept = AcceptStep(lambda: solver.propose(solve.report), "Record a movement of both first.")

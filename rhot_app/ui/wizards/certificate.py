@@ -165,6 +165,11 @@ class FlashPage(MovementPage):
         self._timer.timeout.connect(self.turn)
         self._choose(ids[0])
 
+    @property
+    def edges(self) -> tuple[tuple[int, bool], ...]:
+        """When the patch was switched, by the clock, and whether it was lit then."""
+        return self._said.edges
+
     def _choose(self, name: str) -> None:
         marker = self._said.rig.markers.markers[self._said.rig.markers.ids.index(name)]
         self._said.flash_marker = name

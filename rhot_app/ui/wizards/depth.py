@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -24,11 +27,11 @@ from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.depth_steps import DistanceStep, LawStep, propose
 
 
-def make_plan(kit: Kit) -> Plan:
+def make_plan(kit: Kit, clock: Callable[[], float] = time.monotonic) -> Plan:
     """Measure, look at the law, use it."""
     if kit.listen is None:
         raise EngineError("this window cannot hear the markers; open the wizard from the main window.")
-    states = StateFeed(kit.listen)
+    states = StateFeed(kit.listen, clock)
     distances = DistanceStep(kit.rig, states.recent)
     law = LawStep(distances)
     accept = AcceptStep(lambda: propose(distances.report, kit.rig, kit.rig_path), "Measure some distances first.")

@@ -6,7 +6,7 @@ from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, Step
-from rhot_app.ui.wizards.steps.refined_steps import EngineFeed, MakeProposal, MoveStep, propose
+from rhot_app.ui.wizards.steps.refined_steps import ASK_S, EngineFeed, MakeProposal, MoveStep, propose
 
 TITLE = "Use refined calibration"
 
@@ -24,9 +24,9 @@ class MovePage(Page):
         self._feed.start()
 
 
-def make_plan(kit: Kit) -> Plan:
-    """Move, compare, use it."""
-    feed = EngineFeed(kit.connect, "refined")
+def make_plan(kit: Kit, ask_s: float = ASK_S) -> Plan:
+    """Move, compare, use it. The engine is asked every `ask_s`."""
+    feed = EngineFeed(kit.connect, "refined", ask_s)
     return compared(kit, TITLE, feed, MoveStep(feed), propose,
                     "The calibration in force still holds, or too little of the hand was seen.")
 

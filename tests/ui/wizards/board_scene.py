@@ -9,6 +9,7 @@ from rhot_app.calibration.board.boards import STANDARD_BOARD, Chessboard
 from rhot_app.calibration.board.corners import BoardView, detect
 from rhot_app.geometry.transforms import exp_so3, inverse, rigid, rotation_from_quaternion
 from rhot_app.project import Rig
+from rhot_app.ui.backend.feed import Picture
 
 _PX_PER_SQUARE = 40
 _NEAR_PX = 12.0  # perspective moves the mean of the corners off the middle's picture
@@ -37,7 +38,8 @@ class BoardScene:
         self.rig = rig
         self.board = board
         self.world_from_board: np.ndarray | None = None
-        self.noise = np.random.default_rng(3).integers(-3, 4, (480, 640, 3), dtype=np.int16)
+        self._noise = np.random.default_rng(3).integers(0, 7, (480, 640), dtype=np.uint8)
+        self._drawn: dict[int, tuple[object, np.ndarray]] = {}  # by node: where the board was, and that picture
         self._texture = board_texture(board)
 
     def place(self, rotation: tuple[float, float, float], centre_m: tuple[float, float, float]) -> None:
@@ -46,12 +48,12 @@ class BoardScene:
         turn = exp_so3(np.array(rotation))
         self.world_from_board = rigid(turn, np.array(centre_m) - turn @ middle)
 
-    def homography(self, node_id: int) -> np.ndarray:
+    def homography(self, node_id: int, world_from_board: np.ndarray) -> np.ndarray:
         """(3, 3) px of a camera from px of the texture."""
         node = next(node for node in self.rig.nodes if node.node_id == node_id)
         lens = node.intrinsics
         world_from_camera = rigid(rotation_from_quaternion(node.pose.rotation_wxyz), node.pose.translation_m)
-        camera_from_board = inverse(world_from_camera) @ self.world_from_board
+        camera_from_board = inverse(world_from_camera) @ world_from_board
         matrix = np.array([[lens.fx, 0, lens.cx], [0, lens.fy, lens.cy], [0, 0, 1]])
         scale, first = self.board.square_m / _PX_PER_SQUARE, (_SQUARES_BESIDE + 1) * _PX_PER_SQUARE - 0.5
         board_from_texture = np.array([[scale, 0, -scale * first], [0, scale, -scale * first], [0, 0, 1]])
@@ -63,17 +65,25 @@ class BoardScene:
 
     def near(self, node_id: int, view: BoardView | None) -> bool:
         """Whether a camera's view shows the board where it is now."""
-        if view is None:
+        if view is None or self.world_from_board is None:
             return False
         middle = np.array(self._texture.shape[::-1]) / 2.0
-        spot = self.homography(node_id) @ [*middle, 1.0]
+        spot = self.homography(node_id, self.world_from_board) @ [*middle, 1.0]
         return bool(np.linalg.norm(view.pixels.mean(axis=0) - spot[:2] / spot[2]) < _NEAR_PX)
 
-    def draw(self, node_id: int, t_s: float) -> np.ndarray:
+    def draw(self, node_id: int, t_s: float = 0.0) -> np.ndarray:
         """What the camera sees."""
-        picture = np.full((480, 640, 3), 110, np.uint8)
-        if self.world_from_board is not None:
-            grey = cv2.warpPerspective(self._texture, self.homography(node_id), (640, 480), flags=cv2.INTER_AREA,
-                                       borderMode=cv2.BORDER_CONSTANT, borderValue=110)
-            picture = cv2.cvtColor(cv2.GaussianBlur(grey, (0, 0), 0.7), cv2.COLOR_GRAY2BGR)
-        return np.clip(picture + self.noise, 0, 255).astype(np.uint8)
+        where = self.world_from_board
+        before, picture = self._drawn.get(node_id, (self, self._noise))
+        if where is not before:
+            grey = np.full((480, 640), 110, np.uint8)
+            if where is not None:
+                cv2.warpPerspective(self._texture, self.homography(node_id, where), (640, 480), grey, cv2.INTER_AREA,
+                                    cv2.BORDER_CONSTANT, 110)
+            picture = cv2.cvtColor(cv2.add(cv2.GaussianBlur(grey, (0, 0), 0.7), self._noise), cv2.COLOR_GRAY2BGR)
+            self._drawn[node_id] = where, picture
+        return picture
+
+    def pictures(self) -> dict[str, Picture]:
+        """What all cameras see now."""
+        return {node.name: Picture(node.name, self.draw(node.node_id), 1, 0, 0) for node in self.rig.nodes}

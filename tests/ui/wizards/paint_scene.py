@@ -1,38 +1,51 @@
-"""Painted fingertips before two cameras, for the tests of the colour wizard; drawn once, shown in turn."""
+"""Painted fingertips before two cameras, for the tests of the colour wizard; drawn once and moved."""
 
 from __future__ import annotations
 
+from functools import cached_property
+
+import cv2
 import msgspec
 import numpy as np
 from colour_scenes import PAINTS, picture, place
 
+from rhot_app.ui.backend.feed import Picture
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import to_bgr
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers
 
-BESIDE = (-14.0, 0.0)  # the second camera sees everything there
+BESIDE = -14  # px to the right: the second camera sees everything there
 STEPS = 12
-_MOVE_PX = 9.0  # down from picture to picture, and as much to and fro: another place for every marker
+_MOVE_PX = 9  # down from picture to picture, and as much to and fro: another place for every marker
 
 
 class PaintScene:
-    """`draw` for a `FakeRigAsker`: the hand goes down and comes up, two and a half pictures a second; or it rests."""
+    """`draw` for a `FakeRigAsker`: the hand rests, or it goes down and comes up, a step with every picture."""
 
     def __init__(self, paints: dict[str, tuple[int, int, int]] = PAINTS, **options: object) -> None:
         self.moving = False
-        self._pictures = {(node_id, step): to_bgr(picture(paints, shift=self._shift(node_id, step), seed=step,
-                                                          light=1.0 - 0.02 * step, **options))
-                          for node_id in (1, 2) for step in range(STEPS)}
+        self._turns = {1: 0, 2: 0}
+        self._first = to_bgr(picture(paints, **options))
 
     @staticmethod
     def _shift(node_id: int, step: int) -> tuple[float, float]:
-        return (BESIDE[0] if node_id == 2 else 0.0) + _MOVE_PX * (step % 2), _MOVE_PX * step
+        return (BESIDE if node_id == 2 else 0) + _MOVE_PX * (step % 2), _MOVE_PX * step
 
-    def draw(self, node_id: int, t_s: float) -> np.ndarray:
-        """The picture of a node at a time."""
-        turn = int(2.5 * t_s) % (2 * STEPS - 2) if self.moving else 0
-        return self._pictures[node_id, min(turn, 2 * STEPS - 2 - turn)]
+    def draw(self, node_id: int, t_s: float = 0.0) -> np.ndarray:
+        """The next picture of a node."""
+        self._turns[node_id] += self.moving
+        turn = self._turns[node_id] % (2 * STEPS - 1) if self.moving else 0  # odd: who sees every second sees all
+        step = min(turn, 2 * STEPS - 2 - turn)
+        x, y = self._shift(node_id, step)
+        moved = cv2.warpAffine(self._first, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]), (320, 240),
+                               flags=cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+        return cv2.convertScaleAbs(moved, alpha=1.0 - 0.02 * step)
+
+    @cached_property
+    def at_rest(self) -> dict[str, Picture]:
+        """What both cameras see of a hand that rests."""
+        return {name: Picture(name, self.draw(node_id), node_id, 0, 0) for node_id, name in ((1, "left"), (2, "right"))}
 
     @staticmethod
     def where(name: str, node_id: int = 1) -> tuple[float, float]:

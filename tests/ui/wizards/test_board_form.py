@@ -17,7 +17,6 @@ from wizard_rig import FakeMemory
 from rhot_app.__main__ import main
 from rhot_app.calibration.board.boards import STANDARD_BOARD, CharucoBoard, Chessboard
 from rhot_app.calibration.board.size_check import Beyond
-from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
 from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep, fields_from, remembered_fields
 from rhot_app.ui.wizards.models.drawing import Dots
@@ -35,10 +34,6 @@ def scene():
     scene = BoardScene(synthetic_rig(), STANDARD_BOARD)
     scene.place((0.1, -0.2, 0.05), (0.04, 0.0, 0.6))
     return scene
-
-
-def pictures_of(scene):
-    return {node.name: Picture(node.name, scene.draw(node.node_id, 0.0), 1, 0, 0) for node in scene.rig.nodes}
 
 
 def test_fields_make_boards():
@@ -64,10 +59,10 @@ def test_an_impossible_board_is_a_sentence():
 def test_the_board_is_confirmed_by_what_is_seen(scene):
     step = BoardStep(MEASURED)
     assert not step.view().done and step.view().may_go_on, "no tick before anything was seen"
-    assert step.view().sentence == "Show the board to check it."
-    step.take(step.see(pictures_of(scene)))
+    assert "Show the board" in step.view().sentence
+    step.take(step.see(scene.pictures()))
     view = step.view()
-    assert view.sentence == "Seen by left and right: this is the board." and view.done
+    assert "left and right" in view.sentence and view.done
     dots = next(mark for mark in view.overlays["left"] if isinstance(mark, Dots))
     corners = scene.board.object_points() @ scene.world_from_board[:3, :3].T + scene.world_from_board[:3, 3]
     expected = 530.0 * corners[:, :2] / corners[:, 2:] + [319.5, 239.5]
@@ -77,9 +72,9 @@ def test_the_board_is_confirmed_by_what_is_seen(scene):
 def test_a_smaller_count_is_found_out(scene):
     step = BoardStep(BoardFields(cols=8, square_mm=25.0))
     for _ in range(3):
-        step.take(step.see(pictures_of(scene)))
+        step.take(step.see(scene.pictures()))
     assert "9x6" in step.view().hint
-    seen_before = step.see(pictures_of(scene))
+    seen_before = step.see(scene.pictures())
     step.change(BoardFields(cols=9, square_mm=25.0))
     step.take(seen_before)
     assert step.view().hint == "", "what was seen of another board is past"
@@ -87,19 +82,19 @@ def test_a_smaller_count_is_found_out(scene):
 
 def test_squares_that_go_on_forbid_the_count(scene):
     step = BoardStep(MEASURED)
-    sight = step.see(pictures_of(scene))
+    sight = step.see(scene.pictures())
     for _ in range(3):
         step.take(replace(sight, beyond=(Beyond(column=True, row=False),) * 2))
     view = step.view()
-    assert not view.done and view.sentence == "Count the corners again." and "10x6" in view.hint
+    assert not view.done and "Count" in view.sentence and "10x6" in view.hint
 
 
 def test_a_larger_count_is_explained(scene):
     step = BoardStep(BoardFields(cols=10, rows=7, square_mm=25.0))
-    step.take(step.see(pictures_of(scene)))
+    step.take(step.see(scene.pictures()))
     assert "seems to have 9x6" in step.view().hint
     scene.world_from_board = None
-    step.take(step.see(pictures_of(scene)))
+    step.take(step.see(scene.pictures()))
     assert "seems to have 9x6" in step.view().hint, "the reason is looked for now and then only"
 
 
@@ -109,21 +104,26 @@ def test_a_board_without_a_right_way_up_is_told():
 
 def test_a_board_that_nobody_measured_is_shown_but_not_done(scene):
     step = BoardStep(BoardFields())
-    step.take(step.see(pictures_of(scene)))
+    step.take(step.see(scene.pictures()))
     view = step.view()
-    assert not view.may_go_on and view.sentence == "Measure the squares and type their size."
+    assert not view.may_go_on and "Measure the squares" in view.sentence
     assert set(view.overlays) == {"left", "right"}, "the person sees that it is the right one"
 
 
 @pytest.fixture
-def page(qtbot, themed):
-    page = BoardPage(BoardStep(fields_from("")), FakeMemory())
+def memory():
+    return FakeMemory()
+
+
+@pytest.fixture
+def page(qtbot, themed, memory):
+    page = BoardPage(BoardStep(fields_from("")), memory)
     qtbot.addWidget(page)
     page.show()
     return page
 
 
-def test_the_page_hides_what_a_chessboard_has_not_and_undoes(qtbot, page):
+def test_the_page_hides_what_a_chessboard_has_not_and_undoes(qtbot, page, memory):
     step = page.step
     assert not page.marker.isVisible() and not page.legacy.isVisible()
     page.kind.setCurrentIndex(1)
@@ -131,21 +131,21 @@ def test_the_page_hides_what_a_chessboard_has_not_and_undoes(qtbot, page):
     qtbot.keyClicks(page.square, "20")
     assert page.marker.isVisible() and page.marker.placeholderText() == "15", "the marker goes along with its square"
     assert step.board == CharucoBoard(10, 7, 0.02, 0.015)
-    assert remembered_fields(page._memory[MEMORY]) == step.fields
+    assert remembered_fields(memory[MEMORY]) == step.fields
     while step.undo():
         pass
     page.show_view(step.view())
     assert page.square.text() == "" and page.kind.currentData() == "chessboard"
 
 
-def test_what_was_measured_last_is_offered_and_not_filled_in(qtbot, page):
+def test_what_was_measured_last_is_offered_and_not_filled_in(qtbot, page, memory):
     qtbot.keyClicks(page.square, "x24,6")
     assert page.square.value == page.step.fields.square_mm == 24.6, "what is no number cannot be typed"
-    again = BoardPage(BoardStep(fields_from(page._memory[MEMORY])), page._memory)
+    again = BoardPage(BoardStep(fields_from(memory[MEMORY])), memory)
     qtbot.addWidget(again)
     assert again.square.text() == "" and "24.6" in again.square.placeholderText()
     again.cols.setValue(8)
-    assert remembered_fields(page._memory[MEMORY]).square_mm == 24.6, "until something else is measured"
+    assert remembered_fields(memory[MEMORY]).square_mm == 24.6, "until something else is measured"
 
 
 def test_the_board_is_printed_as_rhot_target_draws_it(qtbot, page, tmp_path, monkeypatch):
@@ -166,4 +166,4 @@ def test_the_board_is_printed_as_rhot_target_draws_it(qtbot, page, tmp_path, mon
 def test_a_board_too_large_for_the_paper_is_a_sentence(qtbot, page):
     page.cols.setValue(20)
     qtbot.mouseClick(page.print_button, Qt.MouseButton.LeftButton)
-    assert "does not fit on A4" in page.note.text()
+    assert "A4" in page.note.text()

@@ -10,20 +10,15 @@ import pytest
 from bones_twin import SIX, Sloppiness, person, record
 from fake_engine import FakeEngine
 from log_writing import write_log
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from synthetic_rig import WIDE, Viewing, make_rig, observe
 from wizard_hand import HeldMarker, RecordingAsker
-from wizard_hands import Hands
-from wizard_rig import FakeMemory
 
 from rhot_app.calibration.hand.bones import solve_bones
 from rhot_app.hand.skeleton import FINGERS
-from rhot_app.project import load_rig, save_rig
-from rhot_app.ui.models.palette import DARK
+from rhot_app.project import load_rig
 from rhot_app.ui.wizards.bones import make_plan
-from rhot_app.ui.wizards.framework.plan import Kit
-from rhot_app.ui.wizards.framework.window import WizardWindow
 from rhot_app.ui.wizards.models.movement import QuietCoach
 from rhot_app.ui.wizards.models.step import Bar
 from rhot_app.ui.wizards.steps.bones_steps import SweepCoach, make_coach
@@ -68,23 +63,10 @@ class FreeHand:
 
 
 @pytest.fixture
-def hands(themed, tmp_path):
-    rig, path = make_rig(), tmp_path / "desk.json"
-    asker = RecordingAsker(rig, write=lambda log: write_movement(rig, log))
-    save_rig(path, rig)
-    kit = Kit(rig, path, asker.connect, DARK, FakeMemory(), {}, HeldMarker(FakeEngine()).connect)
-    hands = Hands(WizardWindow(make_plan(kit), kit))
-    hands.path, hands.asker, hands.rig = path, asker, rig
-    yield hands
-    hands.window.end().wait(5.0)
-    hands.window.deleteLater()
-
-
-def use(hands):
-    hands.next()
-    hands.click(hands.window.frame.next_button)
-    hands.until(lambda: hands.window.step.state == "used")
-    return load_rig(hands.path).hand
+def hands(open_wizard):
+    rig = make_rig()
+    return open_wizard(make_plan, RecordingAsker(rig, write=lambda log: write_movement(rig, log)),
+                       listen=HeldMarker(FakeEngine()).connect)
 
 
 def enter(box, text):
@@ -96,13 +78,9 @@ def enter(box, text):
 
 def test_from_a_movement_to_a_rig_with_that_hand(hands):
     hands.next()
-    hands.window.step.seconds = 0.5
-    hands.key(Qt.Key.Key_Space)
-    hands.until(lambda: hands.window.step.phase == "recorded", timeout_s=20.0)
+    hands.record()
     hands.next()
-    step, page = hands.window.step, hands.window.page
-    hands.until(lambda: step.report is not None or step.view().hint, timeout_s=90.0)
-    assert step.report is not None, step.view().hint
+    report, page = hands.solved(), hands.window.page
     assert page.table.rowCount() == 15
     words = {page.table.item(row, 3).text() for row in range(15)}
     assert "observed" not in words, "six markers show no single phalanx"
@@ -110,22 +88,22 @@ def test_from_a_movement_to_a_rig_with_that_hand(hands):
     assert Qt.BrushStyle.BDiagPattern in styles, "what is only usual is hatched"
     assert "index" in page.reaches.text()
     before = load_rig(hands.path).hand
-    saved = use(hands)
+    hands.next()
+    hands.use()
+    saved = load_rig(hands.path).hand
     ratio = sum(saved.fingers["index"].bones_mm) / sum(before.fingers["index"].bones_mm)
-    assert ratio == pytest.approx(step.report.hand.fingers["index"].bones_mm[0] / before.fingers["index"].bones_mm[0],
+    assert ratio == pytest.approx(report.hand.fingers["index"].bones_mm[0] / before.fingers["index"].bones_mm[0],
                                   rel=0.05) and saved != before
-    hands.click(hands.window.page.restore_button)
-    hands.until(lambda: hands.window.step.state == "restored")
+    hands.restore()
     assert load_rig(hands.path).hand == before
 
 
 def test_bones_entered_by_hand_need_no_movement(hands):
     page, step = hands.window.page, hands.window.step
     enter(page.boxes["index.proximal"], "47.5")
-    assert step.lengths == {"index.proximal": 47.5} and hands.window.frame.verdict.verdict.acceptable
+    assert step.lengths == {"index.proximal": 47.5} and hands.verdict.acceptable
     enter(page.boxes["index.medial"], "25")
-    page.undo_button.setFocus()
-    hands.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    hands.undo()
     assert step.lengths == {"index.proximal": 47.5}
     hands.until(lambda: page.boxes["index.medial"].value() == 0.0)
     hands.next()
@@ -134,14 +112,16 @@ def test_bones_entered_by_hand_need_no_movement(hands):
     table = hands.window.page.table
     known = {table.item(row, 0).text(): table.item(row, 3).text() for row in range(15)}
     assert known["index proximal"] == "entered" and known["ring medial"].startswith(("not observed", "partly"))
-    saved = use(hands)
+    hands.next()
+    hands.use()
+    saved = load_rig(hands.path).hand
     assert saved.fingers["index"].bones_mm[0] == 47.5
     assert saved.fingers["ring"] == hands.rig.hand.fingers["ring"]
 
 
 def test_centimetres_are_found_out(hands):
     enter(hands.window.page.boxes["middle.proximal"], "4.9")
-    verdict = hands.window.frame.verdict.verdict
+    verdict = hands.verdict
     assert verdict is not None and not verdict.acceptable and "centimetres" in verdict.findings[0].sentence
 
 
@@ -166,11 +146,9 @@ def test_the_coach_counts_what_each_finger_has_done():
 def test_every_bar_of_the_movement_is_in_sight(hands):
     """Time, sight and five fingers are more than the usual rows."""
     hands.next()
-    bars = hands.window.frame.bars
+    bars = hands.frame.bars
     bars.show_bars(tuple(Bar(name, 0.5) for name in ("time", "in sight", *FINGERS)))
-    hands.run(0.1)
-    last = bars.mapTo(hands.window, QPoint(0, len(bars.bars) * bars.row_px))
-    assert last.y() <= hands.window.frame._lower.geometry().bottom() and bars.height() >= len(bars.bars) * bars.row_px
+    hands.until(lambda: bars.visibleRegion().boundingRect().bottom() + 1 >= len(bars.bars) * bars.row_px)
 
 
 def test_markers_that_name_no_place_get_a_quiet_coach():

@@ -9,14 +9,12 @@ from fake_engine import synthetic_rig
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMessageBox
-from wizard_hands import Hands
 from wizard_rig import FakeMemory, FakeRigAsker
 
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.camera import make_plan
 from rhot_app.ui.wizards.framework.plan import Kit
-from rhot_app.ui.wizards.framework.window import WizardWindow
 from rhot_app.ui.wizards.models.drawing import Layer
 from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, CameraEye
 from rhot_node.config import CameraSettings
@@ -57,18 +55,9 @@ def asker():
     return asker
 
 
-def node_settings(asker):
-    return {node.node_id: asker.command("node", node_id=node.node_id, request={"request": "settings"})["answer"][
-        "settings"] for node in asker.rig.nodes}
-
-
 @pytest.fixture
-def hands(themed, asker):
-    kit = Kit(asker.rig, None, asker.connect, DARK, FakeMemory(), node_settings(asker))
-    hands = Hands(WizardWindow(make_plan(kit), kit))
-    yield hands
-    hands.window.end().wait(5.0)
-    hands.window.deleteLater()
+def hands(open_wizard, asker):
+    return open_wizard(make_plan, asker, in_file=False)
 
 
 def row(hands, field):
@@ -80,7 +69,7 @@ def exposures(asker):
 
 
 def drag_grey(hands):
-    view = hands.window.frame.wall.views["left"]
+    view = hands.frame.wall.views["left"]
     hands.until(lambda: view.shown is not None)
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
                      view.rect().center() + QPoint(0, 80))
@@ -92,27 +81,24 @@ def test_from_a_dark_picture_to_saved_settings(hands, asker):
     assert asker.saved == [], "what is tried out is not saved"
     row(hands, "exposure_us").box.setValue(5.0)
     hands.until(lambda: exposures(asker) == [5000.0, 5000.0])
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None)
+    hands.until(lambda: hands.verdict is not None)
     hands.next()
     assert hands.window.page.table.item(0, 2).text() == "5.00 ms"
-    hands.next()
-    hands.until(lambda: hands.window.frame.next_button.text() == "Close")
+    hands.use()
     assert asker.saved == [1, 2] and exposures(asker) == [5000.0, 5000.0]
-    hands.click(hands.window.page.restore_button)
-    hands.until(lambda: hands.sentence == "The old one is back.")
+    hands.restore()
     assert exposures(asker) == [4000.0, 4000.0] and asker.saved == [1, 2, 2, 1]
 
 
 def test_a_good_check_is_a_result_and_ticks_the_menu(hands, asker):
     asker.draw = lambda node_id, t_s: np.full((480, 640, 3), 130, np.uint8)
-    hands.until(lambda: hands.sentence == "The pictures are good: press Next.")
-    hands.until(lambda: hands.window.frame.steps.states[0] == "current" and hands.window.step.view().done)
+    hands.until(lambda: "good" in hands.sentence)
+    hands.until(lambda: hands.frame.steps.states[0] == "current" and hands.window.step.view().done)
     told = []
     hands.window.used.connect(lambda proposal, on: told.append((proposal.reason, proposal.rig, on)))
     hands.next()
     assert hands.window.page.table.rowCount() > 0
-    hands.next()
-    hands.until(lambda: hands.window.frame.next_button.text() == "Close")
+    hands.use()
     assert told == [("camera settings", None, True)] and asker.saved == []
 
 
@@ -127,15 +113,15 @@ def test_closing_puts_back_what_was_tried_out(hands, asker, monkeypatch):
 
 def test_too_bright_pictures_are_striped_and_told(hands, asker):
     row(hands, "exposure_us").box.setValue(30.0)
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None
-                and "over" in hands.window.frame.verdict.verdict.codes)
+    hands.until(lambda: hands.verdict is not None
+                and "over" in hands.verdict.codes)
 
     def striped(camera):  # the other camera's pictures may be the first to be too bright
-        layer = next((mark for mark in hands.window.frame.wall.views[camera].overlay if isinstance(mark, Layer)), None)
+        layer = next((mark for mark in hands.frame.wall.views[camera].overlay if isinstance(mark, Layer)), None)
         return layer is not None and layer.rgba[..., 3].mean() > 20.0
 
     hands.until(lambda: striped("left") and striped("right"))
-    finding = next(f for f in hands.window.frame.verdict.verdict.findings if f.code == "over")
+    finding = next(f for f in hands.verdict.findings if f.code == "over")
     assert finding.figure.startswith(("left: ", "right: ")) and "Shorten exposure to " in finding.remedy
 
 
@@ -169,16 +155,18 @@ def test_grey_paper_balances_the_colours(hands, asker):
     page.which.setCurrentIndex(1)
     drag_grey(hands)
     hands.until(page.balance_button.isEnabled)
-    for _ in range(8):
+
+    def balanced():
         if page.balance_button.isEnabled():
             hands.click(page.balance_button)
-        hands.run(0.8)
-    camera = asker.settings[1].camera
-    assert camera.red_gain == pytest.approx(0.8, abs=0.06) and camera.blue_gain == pytest.approx(1.0, abs=0.06)
+        camera = asker.settings[1].camera
+        return camera.red_gain == pytest.approx(0.8, abs=0.06) and camera.blue_gain == pytest.approx(1.0, abs=0.06)
+
+    hands.until(balanced)
 
 
 def test_choices_say_only_what_differs(asker):
-    choices = CameraChoices(asker.rig.nodes, node_settings(asker))
+    choices = CameraChoices(asker.rig.nodes, asker.told)
     assert choices.changed == () and choices.rows(choices.changed) == ()
     choices.change((2,), RED, 1.5)
     assert [node.name for node in choices.changed] == ["right"]
@@ -189,9 +177,9 @@ def test_choices_say_only_what_differs(asker):
 
 
 def test_a_silent_node_has_no_knobs(themed, asker, qtbot):
-    kit = Kit(asker.rig, None, asker.connect, DARK, FakeMemory(), {})
+    kit = Kit(asker.rig, None, asker.connect, DARK, FakeMemory())
     plan = make_plan(kit)
     view = plan.pages[0].step.view()
-    assert view.sentence == "No camera answers."
+    assert "No camera" in view.sentence and not view.may_go_on
     for page in plan.pages:
         qtbot.addWidget(page)

@@ -15,7 +15,7 @@ from rhot_app.calibration.colour.colours import solve_colours
 from rhot_app.calibration.verdict import Grade
 from rhot_app.project import Rig
 from rhot_app.ui.backend.feed import Picture
-from rhot_app.ui.wizards.steps.colour_pick import MaskMaker, PickStep
+from rhot_app.ui.wizards.steps.colour_pick import PickStep
 from rhot_app.ui.wizards.steps.colour_result import ApartStep, BoundsStep, propose
 from rhot_node.detect.illuminant import gains_of
 from rhot_node.detect.image import to_bgr
@@ -72,9 +72,9 @@ def test_a_light_that_has_changed_since_the_picking_is_said_on_the_mask_and_in_t
         rig: Rig, steps: tuple[BoundsStep, ApartStep]) -> None:
     bounds, apart = steps
     look(bounds)
-    assert "Since the colours were picked" not in bounds.view().hint
+    assert "colder" not in bounds.view().hint
     look(bounds, MOST, COLDER)
-    assert "Since the colours were picked" in bounds.view().hint and "colder" in bounds.view().hint
+    assert "were picked" in bounds.view().hint and "colder" in bounds.view().hint
     apart.enter()
     look(apart)
     calm = apart.view().verdict
@@ -82,9 +82,9 @@ def test_a_light_that_has_changed_since_the_picking_is_said_on_the_mask_and_in_t
     look(apart, MOST, COLDER)
     verdict = apart.view().verdict
     assert verdict is not None and "temperature" in verdict.codes
-    assert verdict.grade is Grade.FAIR and verdict.sentence.startswith("Usable, not good: 6 colours")
+    assert verdict.grade is Grade.FAIR and "6 colours" in verdict.sentence
     (finding,) = [one for one in verdict.findings if one.code == "temperature"]
-    assert finding.figure.startswith("Camera left: The light has become colder")
+    assert "left" in finding.figure and "colder" in finding.figure
     proposal = propose(apart.judged, rig, None, {})
     assert proposal is not None and proposal.verdict == verdict
     look(apart, 2 * MOST)  # the colder pictures are remembered for a while
@@ -92,20 +92,22 @@ def test_a_light_that_has_changed_since_the_picking_is_said_on_the_mask_and_in_t
 
 
 @pytest.mark.parametrize(("change", "said"), [
-    ({"ring": (25, 165, 205)}, ""),
-    ({"ring": None}, "ring is found by 0 of 1 cameras. left: not found. "),
-    ({"ring": (110, 121, 125)}, "left: not found. Its paint is too pale or too dark: chroma up to"),
-    ({"little": (25, 165, 205)}, "ring is found by 1 of 1 cameras. left: doubtful. 1 more of its colour is in the"),
+    ({"ring": (25, 165, 205)}, ()),
+    ({"ring": None}, ("ring", "0 of 1", "not found")),
+    ({"ring": (110, 121, 125)}, ("not found", "too pale")),
+    ({"little": (25, 165, 205)}, ("ring", "1 of 1", "doubtful", "1 more of its colour")),
 ], ids=["seen", "gone", "pale", "twice"])
 def test_the_masks_page_says_why_the_chosen_marker_is_not_found_or_in_doubt(
-        steps: tuple[BoundsStep, ApartStep], change: dict, said: str) -> None:
-    bounds, _ = steps
+        steps: tuple[BoundsStep, ApartStep], change: dict, said: tuple) -> None:
+    bounds = BoundsStep(steps[0].picks)
+    bounds.enter()
+    bounds.take_result(steps[0].report)
     bounds.chosen = "ring"
-    bounds._maker = MaskMaker()
     paints = {name: rgb for name, rgb in {**PAINTS, **change}.items() if rgb is not None}
     image = to_bgr(picture(paints, background=(60, 62, 66)))
     bounds.take(bounds.see({"left": Picture("left", image, 0, 0, 0)}))
-    assert said in bounds.view().hint and ("left: " in bounds.view().hint) == bool(said)
+    hint = bounds.view().hint
+    assert all(words in hint for words in said) and ("left: " in hint) == bool(said)
 
 
 def test_markers_that_were_never_seen_say_nothing_of_the_light(rig: Rig) -> None:

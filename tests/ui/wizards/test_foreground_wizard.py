@@ -6,15 +6,11 @@ import cv2
 import numpy as np
 import pytest
 from fake_engine import synthetic_rig
-from patience import eventually, settled
-from wizard_hands import Hands
-from wizard_rig import FakeMemory, FakeRigAsker
+from patience import PATIENCE_S, eventually, settled
+from wizard_rig import FakeRigAsker
 
 from rhot_app.errors import EngineError
-from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.foreground import make_plan
-from rhot_app.ui.wizards.framework.plan import Kit
-from rhot_app.ui.wizards.framework.window import WizardWindow
 from rhot_app.ui.wizards.steps import foreground_steps
 from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, SkinStep, findings_of, mask_of, propose
 from rhot_node.foreground_store import ForegroundStore
@@ -81,55 +77,47 @@ def nodes(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def hands(themed, nodes):
-    settings = {node.node_id: {"node_id": node.node_id} for node in nodes.rig.nodes}
-    kit = Kit(nodes.rig, None, nodes.connect, DARK, FakeMemory(), settings)
-    hands = Hands(WizardWindow(make_plan(kit), kit))
-    yield hands
-    hands.window.end().wait(5.0)
-    hands.window.deleteLater()
+def hands(open_wizard, nodes):
+    return open_wizard(make_plan, nodes, in_file=False)
 
 
 def test_from_an_empty_scene_to_what_the_nodes_keep(hands, nodes):
-    assert "Take the hand out" in hands.sentence and not hands.window.frame.next_button.isEnabled()
+    assert "Take the hand out" in hands.sentence and not hands.frame.next_button.isEnabled()
     hands.click(hands.window.page.learn_button)
-    hands.until(lambda: hands.sentence.startswith("Learnt."))
+    hands.until(lambda: hands.sentence.startswith("Learnt"))
     hands.next()
     nodes.hand = True
     assert "Hold your bare hand" in hands.sentence
     hands.click(hands.window.page.learn_button)
-    hands.until(lambda: hands.sentence.startswith("The hand and little else"))
+    hands.until(lambda: hands.window.step.view().done)
     for store in nodes.stores.values():
         assert store.report(640, 480)["skin"] == "learnt"
         assert not store.path.exists(), "nothing is kept before the last step"
     hands.keep("foreground-hand")
     hands.next()
     assert hands.window.page.table.rowCount() == 4
-    hands.next()
-    hands.until(lambda: hands.window.frame.next_button.text() == "Close")
+    hands.use()
     assert nodes.saved == [1, 2]
     assert all(ForegroundStore(store.path).report(640, 480)["background"] for store in nodes.stores.values())
-    hands.click(hands.window.page.restore_button)
-    hands.until(lambda: hands.sentence == "The old one is back.")
+    hands.restore()
     assert not any(store.report(640, 480)["background"] for store in nodes.stores.values())
 
 
 def test_a_hand_that_was_there_all_the_time_is_not_found(hands, nodes):
     nodes.hand = True
     hands.click(hands.window.page.learn_button)
-    hands.until(lambda: hands.sentence.startswith("Learnt."))
+    hands.until(lambda: hands.sentence.startswith("Learnt"))
     hands.next()
     hands.click(hands.window.page.learn_button)
-    hands.until(lambda: hands.sentence.startswith("Read what is wrong"))
-    assert "No skin was found" in hands.window.frame.hint.text()
-    assert "less than 0.5%" in hands.window.frame.verdict.verdict.findings[0].sentence
-    assert not hands.window.frame.next_button.isEnabled()
+    hands.until(lambda: hands.verdict is not None and "No skin" in hands.hint)
+    assert "0.5%" in hands.verdict.findings[0].sentence
+    assert not hands.frame.next_button.isEnabled()
 
 
 def test_closing_without_use_forgets_what_was_tried_out(hands, nodes):
     hands.click(hands.window.page.learn_button)
-    hands.until(lambda: hands.sentence.startswith("Learnt."))
-    hands.window.end().wait(5.0)
+    hands.until(lambda: hands.sentence.startswith("Learnt"))
+    hands.window.end().wait(PATIENCE_S)
     assert not any(store.report(640, 480)["background"] for store in nodes.stores.values())
 
 
@@ -139,18 +127,18 @@ def test_closing_while_the_scene_is_learnt_keeps_the_old_one(hands, nodes, monke
     eventually(lambda: not old.learning)
     before = old.current.mean.copy()
     nodes.hand = True  # so that the scene is another one
-    monkeypatch.setattr(foreground_steps, "SECONDS", 1.0)
+    monkeypatch.setattr(foreground_steps, "SECONDS", 0.4)
     hands.click(hands.window.page.learn_button)
     hands.until(lambda: old.learning)
-    hands.window.end().wait(5.0)
-    assert settled(lambda: np.array_equal(old.current.mean, before) and not nodes.stores[2].current.mean.size, 1.5)
+    hands.window.end().wait(PATIENCE_S)
+    assert settled(lambda: np.array_equal(old.current.mean, before) and not nodes.stores[2].current.mean.size, 0.8)
 
 
 def test_a_node_that_does_not_answer_is_named(hands, nodes):
     nodes.broken = True
     hands.click(hands.window.page.learn_button)
-    hands.until(lambda: "does not answer" in hands.window.frame.hint.text())
-    assert hands.window.page.learn_button.isEnabled() and not hands.window.frame.next_button.isEnabled()
+    hands.until(lambda: "does not answer" in hands.hint)
+    assert hands.window.page.learn_button.isEnabled() and not hands.frame.next_button.isEnabled()
 
 
 @pytest.mark.parametrize(("boxes", "code"), [
@@ -216,9 +204,9 @@ def test_a_node_that_cannot_take_it_back_is_named_and_the_others_do(nodes):
 def test_what_some_nodes_learnt_before_another_failed_is_forgotten_at_the_end(hands, nodes):
     nodes.failing = [(2, "learn_background")]
     hands.click(hands.window.page.learn_button)
-    hands.until(lambda: "does not answer" in hands.window.frame.hint.text())
+    hands.until(lambda: "does not answer" in hands.hint)
     hands.until(lambda: nodes.stores[1].report(640, 480)["background"])
-    hands.window.end().wait(5.0)
+    hands.window.end().wait(PATIENCE_S)
     assert not nodes.stores[1].report(640, 480)["background"]
 
 

@@ -10,20 +10,17 @@ import numpy as np
 import pytest
 from fake_engine import synthetic_rig
 from knocked_rig import moved
-from wizard_hands import Hands
-from wizard_rig import FakeMemory, FakeRigAsker
+from wizard_rig import FakeRigAsker
 
 from rhot_app.calibration.verdict import Finding, Grade, judge
 from rhot_app.engine.status import Advice
-from rhot_app.project import load_rig, save_rig
+from rhot_app.project import load_rig
 from rhot_app.rig_history import versions
-from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.status_words import _advice_notice
 from rhot_app.ui.wizards import adapted, refined
-from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD, Kit
-from rhot_app.ui.wizards.framework.window import WizardWindow
+from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD
 from rhot_app.ui.wizards.steps.adapted_steps import propose as propose_hand
-from rhot_app.ui.wizards.steps.refined_steps import propose
+from rhot_app.ui.wizards.steps.refined_steps import EngineFeed, MoveStep, propose
 
 
 class RefiningAsker(FakeRigAsker):
@@ -53,40 +50,33 @@ def hand_answer(rig):
 
 
 @pytest.fixture(params=[refined])
-def hands(themed, tmp_path, request):
-    rig, path = synthetic_rig(), tmp_path / "desk.json"
-    save_rig(path, rig)
-    asker = RefiningAsker(rig)
+def hands(open_wizard, request):
+    asker = RefiningAsker(synthetic_rig())
     asker.answer = {"known": False}
-    kit = Kit(rig, path, asker.connect, DARK, FakeMemory(), {})
-    hands = Hands(WizardWindow(request.param.make_plan(kit), kit))
-    hands.path, hands.asker, hands.rig = path, asker, rig
-    yield hands
-    hands.window.end().wait(5.0)
-    hands.window.deleteLater()
+    return open_wizard(lambda kit: request.param.make_plan(kit, ask_s=0.02), asker)
 
 
 def test_it_is_used_only_when_asked_and_can_be_taken_back(hands):
-    assert not hands.window.frame.next_button.isEnabled()
+    assert not hands.frame.next_button.isEnabled()
     hands.asker.answer = answer_of(hands.rig)
-    hands.until(lambda: hands.window.frame.next_button.isEnabled())
     hands.next()
     assert load_rig(hands.path) == hands.rig, "nothing was changed yet"
-    hands.click(hands.window.frame.next_button)
-    hands.until(lambda: hands.window.step.state == "used")
+    hands.use()
     assert load_rig(hands.path).nodes[1].pose != hands.rig.nodes[1].pose
     assert [one.replaced_by for one in versions(hands.path)] == ["refined calibration"]
-    hands.click(hands.window.page.restore_button)
-    hands.until(lambda: hands.window.step.state == "restored")
+    hands.restore()
     assert load_rig(hands.path) == hands.rig
 
 
 @pytest.mark.parametrize(("stale", "grade"), [(False, Grade.GOOD), (True, Grade.POOR)])
-def test_what_holds_or_is_not_determined_leads_nowhere(hands, stale, grade):
-    hands.asker.answer = answer_of(hands.rig, stale=stale, grade=grade)
-    hands.until(lambda: "One moment" not in hands.sentence)
-    hands.until(lambda: ("holds" if not stale else "Go on") in hands.sentence)
-    assert not hands.window.frame.next_button.isEnabled()
+def test_what_holds_or_is_not_determined_leads_nowhere(stale, grade):
+    asker = RefiningAsker(synthetic_rig())
+    feed = EngineFeed(asker.connect, "refined")
+    step = MoveStep(feed)
+    asker.answer = answer_of(asker.rig, stale=stale, grade=grade)
+    feed.step(asker)
+    view = step.view()
+    assert ("holds" if not stale else "Go on") in view.sentence and not view.may_go_on
 
 
 def test_only_poses_are_proposed():
@@ -106,13 +96,11 @@ def test_the_engines_sentence_has_the_button():
 
 @pytest.mark.parametrize("hands", [adapted], indirect=True)
 def test_an_adapted_hand_is_used_only_when_asked(hands):
-    assert not hands.window.frame.next_button.isEnabled()
+    assert not hands.frame.next_button.isEnabled()
     hands.asker.answer = hand_answer(hands.rig)
-    hands.until(lambda: hands.window.frame.next_button.isEnabled())
     hands.next()
     assert load_rig(hands.path) == hands.rig, "nothing was changed yet"
-    hands.click(hands.window.frame.next_button)
-    hands.until(lambda: hands.window.step.state == "used")
+    hands.use()
     assert load_rig(hands.path).hand.fingers["index"].radii_mm == (9.0, 8.0, 7.0)
     assert [one.replaced_by for one in versions(hands.path)] == ["hand adapted while it was tracked"]
 

@@ -1,6 +1,9 @@
-"""The wizard that puts cameras together, clicked through on drawn boards; its models on their own."""
+"""The wizard that puts cameras together, clicked through on drawn boards; its steps on their own."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
 
 import msgspec
 import numpy as np
@@ -9,34 +12,33 @@ from board_scene import BoardScene, compile_search
 from fake_engine import EXACT, synthetic_rig
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from wizard_hands import Hands
-from wizard_rig import FakeMemory, FakeRigAsker
+from wizard_rig import FakeRigAsker
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD, Chessboard
 from rhot_app.calibration.check.checks import check_rig
 from rhot_app.geometry.transforms import rotation_from_quaternion
-from rhot_app.project import CameraPose, load_rig, save_rig
+from rhot_app.project import CameraPose, load_rig
 from rhot_app.ui.backend.feed import Picture
-from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.framework.plan import Kit
-from rhot_app.ui.wizards.framework.window import WizardWindow
+from rhot_app.ui.wizards.framework.plan import Plan
+from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep
 from rhot_app.ui.wizards.steps.known_step import KnownStep
-from rhot_app.ui.wizards.stereo import make_plan
+from rhot_app.ui.wizards.steps.stereo_steps import ShowStep, StereoSolveStep, known_lenses, stereo_proposal
+from rhot_app.ui.wizards.stereo import KnownPage, make_plan
 
+CAMERAS = ("left", "right")
 TRUE_BASELINE_M = 0.075
-PLACES = [((0.0, 0.0, 0.0), (0.037, 0.0, 0.62)), ((0.5, 0.0, 0.0), (0.037, 0.03, 0.6)),
-          ((-0.5, 0.0, 0.1), (0.04, -0.04, 0.6)), ((0.0, 0.5, 0.0), (-0.02, 0.0, 0.6)),
-          ((0.0, -0.5, 0.0), (0.1, 0.0, 0.6)), ((0.3, 0.3, 0.0), (-0.06, -0.07, 0.62)),
-          ((-0.3, 0.3, 0.0), (0.12, -0.08, 0.62)), ((0.3, -0.3, 0.2), (0.12, 0.08, 0.62)),
-          ((-0.3, -0.3, -0.2), (-0.05, 0.08, 0.62)), ((0.4, 0.4, 0.3), (0.037, 0.0, 0.95)),
-          ((-0.4, 0.4, 0.0), (-0.1, -0.12, 0.95)), ((0.4, -0.4, 0.0), (0.2, 0.12, 0.95)),
-          ((0.0, 0.0, 0.4), (0.2, -0.14, 0.95)), ((0.5, 0.3, 0.0), (-0.12, 0.14, 0.95)),
-          ((0.0, 0.6, 0.2), (0.04, 0.1, 0.75)), ((0.2, -0.6, 0.0), (0.04, -0.1, 0.75)),
-          ((0.6, 0.0, 0.3), (-0.1, 0.0, 0.8)), ((-0.6, 0.2, 0.0), (0.17, 0.0, 0.8))]
+PLACES = [((0.0, 0.0, 0.0), (0.037, 0.0, 0.62)), ((-0.5, 0.0, 0.1), (0.04, -0.04, 0.6)),
+          ((0.0, 0.5, 0.0), (-0.02, 0.0, 0.6)), ((0.0, -0.5, 0.0), (0.1, 0.0, 0.6)),
+          ((0.3, 0.3, 0.0), (-0.06, -0.07, 0.62)), ((-0.3, 0.3, 0.0), (0.12, -0.08, 0.62)),
+          ((0.3, -0.3, 0.2), (0.12, 0.08, 0.62)), ((-0.3, -0.3, -0.2), (-0.05, 0.08, 0.62)),
+          ((0.4, 0.4, 0.3), (0.037, 0.0, 0.95)), ((-0.4, 0.4, 0.0), (-0.1, -0.12, 0.95)),
+          ((0.4, -0.4, 0.0), (0.2, 0.12, 0.95)), ((0.0, 0.0, 0.4), (0.2, -0.14, 0.95)),
+          ((0.5, 0.3, 0.0), (-0.12, 0.14, 0.95)), ((0.0, 0.6, 0.2), (0.04, 0.1, 0.75)),
+          ((0.2, -0.6, 0.0), (0.04, -0.1, 0.75))]
 TABLE = ((-1.15, 0.0, 0.0), (0.037, 0.12, 0.7))
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def wrong_rig():
     """The rig as a beginner has it: the cameras stand 60 mm apart by its file, 75 mm in truth."""
     rig = synthetic_rig()
@@ -55,74 +57,61 @@ def scene():
 
 
 @pytest.fixture
-def hands(themed, wrong_rig, scene, tmp_path):
+def hands(open_wizard, wrong_rig, scene):
     """The wizard on a rig file, before drawn boards."""
-    path = tmp_path / "desk.json"
-    save_rig(path, wrong_rig)
-    asker = FakeRigAsker(wrong_rig, scene.draw)
-    kit = Kit(wrong_rig, path, asker.connect, DARK, FakeMemory())
-    hands = Hands(WizardWindow(make_plan(kit), kit))
-    hands.path, hands.asker = path, asker
-    yield hands
-    hands.window.end().wait(5.0)
-    hands.window.deleteLater()
-
-
-def show_all_places(hands, scene, most=99):
-    """Hold the board wherever the wizard may want it, until it has enough."""
-    for place in PLACES * 2:
-        if hands.sentence == "Enough: press Next." or len(hands.window.step.views.shots) >= most:
-            return
-        kept = len(hands.window.step.views.shots)
-        scene.place(*place)
-        hands.until(lambda kept=kept: len(hands.window.step.views.shots) > kept
-                    or (scene.seen_in(hands.window.step.seen)
-                        and "is there already" in hands.window.frame.hint.text()))
+    return open_wizard(make_plan, FakeRigAsker(wrong_rig, scene.draw))
 
 
 def test_from_the_board_to_a_saved_rig(hands, scene):
     scene.place(*PLACES[0])
     hands.type(hands.window.page.square, "25,0")
-    hands.until(lambda: hands.sentence == "Seen by left and right: this is the board.")
+    hands.until(lambda: hands.window.step.view().done)
+    assert "left and right" in hands.sentence
     hands.next()
-    show_all_places(hands, scene)
-    assert hands.sentence == "Enough: press Next." and hands.window.frame.bars.bars[0].full
+    for count, place in enumerate(PLACES):
+        scene.place(*place)
+        hands.until(lambda count=count: len(hands.window.step.views.shots) > count)
+    hands.until(lambda: "Next" in hands.sentence and hands.frame.bars.bars[0].full)
     hands.next()
-    assert hands.title == "A known length"
-    hands.window.page.baseline.setValue(75.0)
+    page, button = hands.window.page, hands.frame.next_button
+    hands.until(lambda: "Skip" in hands.hint and not button.isEnabled())
+    hands.click(page.skip)
+    hands.until(button.isEnabled)
+    hands.click(page.skip)
+    hands.until(lambda: not button.isEnabled())
+    page.baseline.setValue(75.0)
     hands.next()
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None, timeout_s=120.0)
-    assert hands.window.frame.verdict.verdict.acceptable
+    hands.solved()
+    assert hands.verdict.acceptable
     hands.next()
     scene.place(*TABLE)
-    hands.until(lambda: all(view is not None for view in hands.window.step.seen.values()))
-    hands.run(0.4)
+    hands.until(lambda: scene.seen_in(hands.window.step.seen))
     hands.key(Qt.Key.Key_Space)
-    hands.until(lambda: hands.sentence == "The table is known: press Next.")
+    hands.until(lambda: hands.window.step.view().done)
     hands.next()
     texts = [hands.window.page.table.item(0, column).text() for column in range(3)]
     assert load_rig(hands.path).calibration == EXACT, "nothing is written yet"
     assert texts[0] == "left to right: distance" and texts[1] == "60.00 mm"
     assert float(texts[2].split(" ± ")[0]) == pytest.approx(75.0, abs=0.2)
     assert np.linalg.norm(hands.asker.rig.nodes[1].pose.translation_m) == pytest.approx(0.06)
-    hands.next()
-    hands.until(lambda: hands.window.frame.next_button.text() == "Close")
-    left, right = load_rig(hands.path).nodes
+    hands.use()
+    saved = load_rig(hands.path)
+    left, right = saved.nodes
     baseline = np.linalg.norm(np.subtract(right.pose.translation_m, left.pose.translation_m))
     assert baseline == pytest.approx(TRUE_BASELINE_M, abs=0.0003)
-    record = load_rig(hands.path).calibration
-    assert (record.method, record.lengths) == ("board", "baseline") and 0.0 < record.error_m < 2e-3
+    assert (saved.calibration.method, saved.calibration.lengths) == ("board", "baseline")
+    assert 0.0 < saved.calibration.error_m < 2e-3
     assert left.pose.translation_m[2] > 0.1, "the camera stands above the table"
     assert rotation_from_quaternion(left.pose.rotation_wxyz)[2, 2] < 0.0, "and looks down on it"
 
 
 def test_nobody_gets_past_the_board_without_measuring_it(hands, scene):
     scene.place(*PLACES[0])
-    page, button = hands.window.page, hands.window.frame.next_button
+    page, button = hands.window.page, hands.frame.next_button
     assert page.square.text() == "" and "measure" in page.square.placeholderText()
-    hands.until(lambda: len(hands.window.step._views) == 2)
-    assert not button.isEnabled() and hands.sentence == "Measure the squares and type their size."
-    assert "Next waits for the size" in hands.window.frame.hint.text()
+    hands.until(lambda: len(hands.window.step.view().overlays) == 2)
+    hands.until(lambda: "Measure the squares" in hands.sentence and "Next waits" in hands.hint)
+    assert not button.isEnabled()
     hands.key(Qt.Key.Key_Return)
     QTest.mouseClick(button, Qt.MouseButton.LeftButton)
     assert hands.title == "Your board"
@@ -130,105 +119,102 @@ def test_nobody_gets_past_the_board_without_measuring_it(hands, scene):
     hands.until(button.isEnabled)
     hands.next()
     assert hands.window.step.board == Chessboard(9, 6, 0.0246)
-    hands.click(hands.window.frame.back_button)
+    hands.click(hands.frame.back_button)
     assert page.square.text() == "24.6", "going back loses nothing"
     page.square.clear()
     hands.until(lambda: not button.isEnabled())
 
 
-def test_a_length_check_is_skipped_knowingly_and_the_rig_says_so(hands, scene):
-    hands.type(hands.window.page.square, "25")
-    hands.next()
-    show_all_places(hands, scene)
-    hands.next()
-    page, button = hands.window.page, hands.window.frame.next_button
-    hands.run(0.3)
-    assert hands.title == "A known length" and not button.isEnabled() and "Skip" in hands.window.frame.hint.text()
-    hands.click(page.skip)
-    hands.until(button.isEnabled)
-    hands.click(page.skip)
-    hands.until(lambda: not button.isEnabled(), timeout_s=5.0)
-    hands.click(page.skip)
-    hands.until(button.isEnabled)
-    assert hands.sentence == "Lengths stay unproven: press Next."
-    hands.next()
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None, timeout_s=120.0)
-    assert hands.window.frame.verdict.verdict.codes >= {"lengths_unproven"}
-    hands.next()
-    hands.next()
-    assert any("never checked against a ruler" in hands.window.page.table.item(row, 2).text()
-               for row in range(hands.window.page.table.rowCount()))
-    hands.next()
-    hands.until(lambda: hands.window.frame.next_button.text() == "Close")
-    saved = load_rig(hands.path)
-    assert (saved.calibration.method, saved.calibration.lengths) == ("board", "skipped")
-    assert "lengths_unproven" in check_rig(saved).verdict.codes
+def test_the_ruler_is_clicked_in_held_pictures(open_wizard, wrong_rig):
+    hands = open_wizard(lambda kit: Plan("Ruler", (KnownPage(KnownStep(CAMERAS)),)), FakeRigAsker(wrong_rig))
+    page, step = hands.window.page, hands.window.step
+    assert not page.hold.isEnabled()
+    page.ruler.setValue(240.0)
+    hands.until(page.hold.isEnabled)
+    hands.until(lambda: set(step.frozen) == set(CAMERAS) or page.hold.click())  # once both have a picture
+    for view in hands.frame.wall.views.values():
+        for share in (0.3, 0.7):
+            hands.click(view, QPoint(round(share * view.width()), view.height() // 2))
+    hands.until(lambda: step.view().done and "scale" in hands.sentence)
+    assert step.known.ruler.length_m == pytest.approx(0.24)
 
 
-def test_a_wrong_square_size_is_found_by_the_baseline(hands, scene):
-    scene.board = Chessboard(9, 6, 0.0275)  # printed too large, and not measured
-    hands.type(hands.window.page.square, "25")
-    hands.next()
-    show_all_places(hands, scene)
-    hands.next()
-    hands.window.page.baseline.setValue(75.0)
-    hands.next()
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None, timeout_s=120.0)
-    verdict = hands.window.frame.verdict.verdict
-    assert not verdict.acceptable and "baseline" in verdict.codes
-    assert not hands.window.frame.next_button.isEnabled()
-    assert hands.sentence == "Do what the verdict says, then come back."
+# -- the steps without a window ----------------------------------------------------------------------------------------
+
+@pytest.fixture(scope="module")
+def shown(compiled):
+    """The step of the captures, the board shown to it in every place; Space each time."""
+    scene = BoardScene(synthetic_rig(), STANDARD_BOARD)
+    show = ShowStep(BoardStep(BoardFields(square_mm=25.0), CAMERAS), CAMERAS)
+    show.enter()
+    for place in PLACES:
+        scene.place(*place)
+        show.take(show.see(scene.pictures()))
+        show.capture()
+    assert show.view().done, show.view()
+    return show
 
 
-def test_undo_forgets_the_last_shot_and_another_board_all(hands, scene):
-    hands.type(hands.window.page.square, "25")
-    hands.next()
-    scene.place(*PLACES[0])
-    hands.until(lambda: len(hands.window.step.views.shots) == 1)
-    scene.world_from_board = None
-    hands.until(lambda: not any(hands.window.step.seen.values()))
-    hands.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert not hands.window.step.views.shots
-    hands.click(hands.window.frame.back_button)
-    hands.window.page.cols.setValue(8)
-    hands.next()
-    assert hands.window.step.views.board.cols == 8
+def solved(shown, rig, known, board=STANDARD_BOARD):
+    """The solve's step with its report; `board` is what the person says of the squares."""
+    show = SimpleNamespace(cameras=shown.cameras, views=replace(shown.views, board=board))
+    step = StereoSolveStep(show, known_lenses(rig.nodes), lambda: known.known)
+    step.enter()
+    task = step.task()
+    step.take_result(task.function(*task.arguments, progress=lambda text, fraction: None, **task.options))
+    return step
 
 
-def frozen_pictures():
-    blank = np.zeros((480, 640, 3), np.uint8)
-    return {name: Picture(name, blank, 1, 0, 0) for name in ("left", "right")}
+def test_a_length_check_is_skipped_knowingly_and_the_rig_says_so(shown, wrong_rig, tmp_path):
+    known = KnownStep(CAMERAS)
+    assert not known.view().may_go_on and "Skip" in known.view().hint
+    known.skip(True)
+    assert known.view().passable and not known.view().done and "unproven" in known.view().sentence
+    step = solved(shown, wrong_rig, known)
+    assert "lengths_unproven" in step.view().verdict.codes
+    proposal = stereo_proposal(wrong_rig, tmp_path / "desk.json", step.report, None)
+    assert any("never checked" in row.after for row in proposal.rows)
+    assert (proposal.rig.calibration.method, proposal.rig.calibration.lengths) == ("board", "skipped")
+    assert "lengths_unproven" in check_rig(proposal.rig).verdict.codes
+
+
+def test_a_wrong_square_size_is_found_by_the_baseline(shown, wrong_rig):
+    known = KnownStep(CAMERAS)
+    known.set_lengths(75.0, 0.0)
+    step = solved(shown, wrong_rig, known, Chessboard(9, 6, 0.025 / 1.1))  # printed too large, and not measured
+    view = step.view()
+    assert not view.verdict.acceptable and "baseline" in view.verdict.codes
+    assert not view.may_go_on
+
+
+def test_undo_forgets_the_last_shot_and_another_board_all(scene):
+    board = BoardStep(BoardFields(square_mm=25.0), CAMERAS)
+    show = ShowStep(board, CAMERAS)
+    show.enter()
+    for count, place in enumerate(PLACES[:2], 1):
+        scene.place(*place)
+        show.take(show.see(scene.pictures()))
+        show.capture()
+        assert len(show.views.shots) == count
+    first = show.views.shots[0]
+    assert show.undo() and show.views.shots == (first,)
+    board.change(BoardFields(cols=8, square_mm=25.0))
+    show.enter()
+    assert not show.views.shots and show.views.board.cols == 8
 
 
 def test_a_ruler_needs_both_ends_in_two_pictures():
-    step = KnownStep(("left", "right"))
+    blank = np.zeros((480, 640, 3), np.uint8)
+    step = KnownStep(CAMERAS)
     assert not step.view().may_go_on and step.known.ruler is None
     step.set_lengths(0.0, 200.0)
-    step.take(frozen_pictures())
+    step.take({name: Picture(name, blank, 1, 0, 0) for name in CAMERAS})
     assert step.capture() and not step.view().passable
     for camera, x in (("left", 100.0), ("left", 300.0), ("right", 60.0)):
         step.pick(camera, x, 240.0)
-    assert step.known.ruler is None and "Click both ends" in step.view().sentence
+    assert step.known.ruler is None and "both ends" in step.view().sentence
     step.pick("right", 260.0, 240.0)
     assert step.view().done and step.known.ruler.length_m == pytest.approx(0.2)
     assert np.allclose(step.known.ruler.ends[1], [[60.0, 240.0], [260.0, 240.0]])
     step.undo()
     assert step.known.ruler is None
-
-
-def test_the_ruler_is_clicked_in_held_pictures(hands, scene):
-    hands.type(hands.window.page.square, "25")
-    hands.next()
-    show_all_places(hands, scene, most=5)
-    hands.next()
-    page, wall = hands.window.page, hands.window.frame.wall
-    page.ruler.setValue(240.0)
-    hands.until(lambda: page.hold.isEnabled() and hands.window.step._live)
-    hands.click(page.hold)
-    hands.until(lambda: len(hands.window.step.frozen) == 2)
-    for view in wall.views.values():
-        for share in (0.3, 0.7):
-            QTest.mouseClick(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
-                             QPoint(round(share * view.width()), view.height() // 2))
-    hands.until(lambda: hands.sentence == "The scale will be checked: press Next.")
-    assert hands.window.step.known.ruler.length_m == pytest.approx(0.24)

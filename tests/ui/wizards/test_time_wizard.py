@@ -8,69 +8,58 @@ import msgspec
 import pytest
 from fake_engine import FakeEngine, synthetic_rig
 from log_writing import write_log
+from patience import PATIENCE_S
 from PySide6.QtCore import Qt
 from waving import see, waving
 from wizard_hand import HeldMarker, RecordingAsker
-from wizard_hands import Hands
-from wizard_rig import FakeMemory
 
-from rhot_app.project import load_rig, save_rig
-from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards import time as time_wizard
-from rhot_app.ui.wizards.framework.plan import Kit
-from rhot_app.ui.wizards.framework.window import WizardWindow
+from rhot_app.project import load_rig
+from rhot_app.ui.wizards.time import make_plan
 
 LATE_S = 0.006
 ROW_NS = 48_000
 
 
 @pytest.fixture
-def hands(themed, tmp_path):
-    rig, path = synthetic_rig(), tmp_path / "desk.json"
+def hands(open_wizard):
+    rig = synthetic_rig()
 
     def write(log):
         frames = see(rig, waving(rig, 10.0), 10.0, late_s=(0.0, LATE_S), row_times_ns=(ROW_NS, ROW_NS),
                      said_ns=(ROW_NS, ROW_NS))
         write_log(Path(log), rig, frames)
 
-    asker = RecordingAsker(rig, write=write)
-    save_rig(path, rig)
-    kit = Kit(rig, path, asker.connect, DARK, FakeMemory(), {}, HeldMarker(FakeEngine()).connect)
-    hands = Hands(WizardWindow(time_wizard.make_plan(kit), kit))
-    hands.path, hands.asker = path, asker
-    yield hands
-    hands.window.end().wait(5.0)
-    hands.window.deleteLater()
+    return open_wizard(make_plan, RecordingAsker(rig, write=write), listen=HeldMarker(FakeEngine()).connect)
 
 
 def test_from_waving_to_a_rig_that_knows_the_delay(hands):
     page = hands.window.page
-    page.movement.seconds = 0.5
+    page.movement.seconds = 60.0
     hands.key(Qt.Key.Key_Space)
-    hands.until(lambda: page.movement.phase == "recording")
-    assert "left" in hands.sentence and page.button.text() == "Stop"
+    hands.until(lambda: page.movement.phase == "recording" and page.button.text() == "Stop")
+    assert "60 s left" in hands.sentence
+    hands.click(page.button)
     assert hands.asker.commands.index("start") < hands.asker.commands.index("record"), "a rig at rest sends nothing"
     hands.until(lambda: page.movement.phase == "recorded")
     hands.next()
-    hands.until(lambda: hands.window.step.report is not None, timeout_s=60.0)
+    hands.solved()
     assert len(hands.window.page.charts.plots) == 2
     hands.next()
-    hands.click(hands.window.frame.next_button)
-    hands.until(lambda: hands.window.step.state == "used")
+    hands.use()
     assert load_rig(hands.path).nodes[1].time_offset_s == pytest.approx(LATE_S, abs=2e-4)
 
 
 def test_what_the_engine_refuses_is_said_and_nothing_goes_on(hands):
     hands.asker.refuse = "the disk is full."
     hands.click(hands.window.page.button)
-    hands.until(lambda: "the disk is full" in hands.window.frame.hint.text())
+    hands.until(lambda: "the disk is full" in hands.hint)
     assert not hands.window.frame.next_button.isEnabled()
 
 
 def test_closing_while_it_records_ends_the_recording(hands):
     hands.click(hands.window.page.button)
     hands.until(lambda: hands.window.page.movement.phase == "recording")
-    hands.window.end().wait(5.0)
+    hands.window.end().wait(PATIENCE_S)
     assert hands.asker.commands[-1] == "record_stop"
 
 

@@ -152,6 +152,11 @@ class PickStep(Step):
         return (*self.base.ids, SKIN)
 
     @property
+    def masked(self) -> MaskedPictures:
+        """What the cameras' detectors found last."""
+        return self._masked
+
+    @property
     def markers(self) -> MarkerSet:
         """The set whose mask is shown: new colours where there are samples, the old ones elsewhere."""
         return self._markers

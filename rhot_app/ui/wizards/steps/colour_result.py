@@ -87,6 +87,11 @@ class BoundsStep(Step):
         """Why there are none."""
         self.problem = sentence
 
+    @property
+    def masked(self) -> MaskedPictures:
+        """What the cameras' detectors found last."""
+        return self._masked
+
     def value(self, control: Control) -> float | None:
         """A bound of the chosen marker."""
         if self.report is None:

@@ -88,6 +88,11 @@ class LensShowStep(Step):
         return self._guide.views if self._guide is not None else ()
 
     @property
+    def seen(self) -> BoardView | None:
+        """The board in the last picture."""
+        return self._seen[0]
+
+    @property
     def keeps(self) -> bool:
         """Whether anything was taken."""
         return bool(self.views)

@@ -28,8 +28,8 @@ MakeProposal = Callable[[Answer, Rig, Path | None], Proposal | None]
 class EngineFeed:
     """Asks the engine one `command` again and again. A thread; `start` may be called again, `stop` ends it for good."""
 
-    def __init__(self, connect: Callable[[], Asker], command: str) -> None:
-        self._connect, self._command = connect, command
+    def __init__(self, connect: Callable[[], Asker], command: str, period_s: float = ASK_S) -> None:
+        self._connect, self._command, self._period_s = connect, command, period_s
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
         self.answer: Answer = {"known": False}
@@ -59,7 +59,7 @@ class EngineFeed:
         try:
             while not self._ending.is_set():
                 self.step(asker)
-                self._ending.wait(ASK_S)
+                self._ending.wait(self._period_s)
         finally:
             asker.close()
 
