@@ -87,7 +87,7 @@ def test_an_update_compiles_what_has_changed_only(tmp_path: Path) -> None:
         return [int(word) for word in said.split()]
 
     assert run() == [11, 20, 0, 0]
-    (package / "inner.py").write_text("from numba import njit\n\n@njit(cache=True)\ndef number(): return 2\n")
+    (package / "inner.py").write_text("from numba import njit\n\n@njit(cache=True)\ndef number(): return 2  # longer\n")
     assert run() == [12, 20, 0, 1]
     (package / "markers.py").write_text((package / "markers.py").read_text() + "\n# changed\n")
     assert run() == [12, 20, 1, 1]

@@ -46,6 +46,10 @@ class Page:
         """Go to an address."""
         self.call("Page.navigate", url=url)
 
+    def draw_seldom(self) -> None:
+        """Draw later pages five times a second; drawing takes a processor most of its time."""
+        self.before_each_page("requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 200)")
+
     def before_each_page(self, script: str) -> None:
         """Run this before whatever a page brings."""
         self.call("Page.addScriptToEvaluateOnNewDocument", source=script)

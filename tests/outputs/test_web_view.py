@@ -98,6 +98,7 @@ def test_the_page_says_what_is_lost_and_finds_it_again(rig: Rig, stream: Callabl
     monkeypatch.setenv(SECRET_VARIABLE, "secret-of-the-engine")
     running, url = view_of(stream)
     assert "/secret-of-the-engine/" in url
+    page.draw_seldom()
     page.open(url)
     page.until("window.rhot && rhot.received > 5 && rhot.hands.right?.visible")
     tracked, running.state = running.state, unknown(running.state)
@@ -159,6 +160,7 @@ def test_other_computers_are_served_encrypted(stream: Callable[..., Stream], pag
     assert url.startswith("https://")
     here = url.replace(urlsplit(url).hostname or "", "127.0.0.1")
     assert get(here)[0] == 200
+    page.draw_seldom()
     page.open(here)
     page.until("window.rhot && rhot.received > 5 && isSecureContext")
 
