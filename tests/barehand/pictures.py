@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import cv2
@@ -132,33 +133,50 @@ def _draw(centres, radii, o, rotation, intrinsics, light, colours, out):
             r = 1.1 * intrinsics[0] * radii[k, e] / max(z - radii[k, e], 0.02) + 2.0
             boxes[k, 0], boxes[k, 1] = min(boxes[k, 0], u - r), min(boxes[k, 1], v - r)
             boxes[k, 2], boxes[k, 3] = max(boxes[k, 2], u + r), max(boxes[k, 3], v + r)
+    near, colour, d, n = np.empty(len(centres), np.int64), np.empty(3), np.empty(3), np.empty(3)
     for y in range(out.shape[0]):
         for x in range(out.shape[1]):
-            near = False
+            count = 0
             for k in range(len(centres)):
-                near |= boxes[k, 0] <= x <= boxes[k, 2] and boxes[k, 1] <= y <= boxes[k, 3]
-            if not near:
+                if boxes[k, 0] <= x + 0.25 and x - 0.25 <= boxes[k, 2] and (
+                        boxes[k, 1] <= y + 0.25 and y - 0.25 <= boxes[k, 3]):
+                    near[count] = k
+                    count += 1
+            if not count:
                 continue
-            colour, hits = np.zeros(3), 0
+            colour[:] = 0.0
+            hits = 0
             for sub in range(4):
-                a, b = x - 0.25 + 0.5 * (sub % 2), y - 0.25 + 0.5 * (sub // 2)
-                d = np.array([(a - intrinsics[2]) / intrinsics[0], (b - intrinsics[3]) / intrinsics[1], 1.0])
-                d = rotation.T @ (d / np.sqrt(np.sum(d * d)))
+                a = (x - 0.25 + 0.5 * (sub % 2) - intrinsics[2]) / intrinsics[0]
+                b = (y - 0.25 + 0.5 * (sub // 2) - intrinsics[3]) / intrinsics[1]
+                length = math.sqrt(a * a + b * b + 1.0)
+                for i in range(3):
+                    d[i] = (rotation[0, i] * a + rotation[1, i] * b + rotation[2, i]) / length
                 best, which = 1e9, -1
-                for k in range(len(centres)):
-                    if boxes[k, 0] <= x <= boxes[k, 2] and boxes[k, 1] <= y <= boxes[k, 3]:
-                        t = ray_to_capsule(o[0], o[1], o[2], d[0], d[1], d[2], centres[k, 0], centres[k, 1],
-                                           radii[k, 0], radii[k, 1])
-                        if 0.0 < t < best:
-                            best, which = t, k
-                if which >= 0:
-                    p = o + best * d
-                    ba = centres[which, 1] - centres[which, 0]
-                    h = min(max(np.sum((p - centres[which, 0]) * ba) / np.sum(ba * ba), 0.0), 1.0)
-                    n = p - centres[which, 0] - h * ba
-                    n = n / np.sqrt(np.sum(n * n))
-                    shade = 0.55 + 0.45 * max(-np.sum(n * light), 0.0) - 0.15 * (1.0 + np.sum(n * d))
-                    colour += colours[which] * shade
-                    hits += 1
-            if hits:
-                out[y, x] = colour / 4.0 + out[y, x] * (4 - hits) / 4.0
+                for k in near[:count]:
+                    t = ray_to_capsule(o[0], o[1], o[2], d[0], d[1], d[2], centres[k, 0], centres[k, 1],
+                                       radii[k, 0], radii[k, 1])
+                    if 0.0 < t < best:
+                        best, which = t, k
+                if which < 0:
+                    continue
+                along = squared = 0.0
+                for i in range(3):
+                    axis = centres[which, 1, i] - centres[which, 0, i]
+                    n[i] = o[i] + best * d[i] - centres[which, 0, i]
+                    along += n[i] * axis
+                    squared += axis * axis
+                h = min(max(along / squared, 0.0), 1.0)
+                size = lit = facing = 0.0
+                for i in range(3):
+                    n[i] -= h * (centres[which, 1, i] - centres[which, 0, i])
+                    size += n[i] * n[i]
+                    lit -= n[i] * light[i]
+                    facing += n[i] * d[i]
+                size = math.sqrt(size)
+                shade = 0.55 + 0.45 * max(lit / size, 0.0) - 0.15 * (1.0 + facing / size)
+                for i in range(3):
+                    colour[i] += colours[which, i] * shade
+                hits += 1
+            for i in range(3):
+                out[y, x, i] = colour[i] / 4.0 + out[y, x, i] * (4 - hits) / 4.0

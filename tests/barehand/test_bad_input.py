@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from rhot_app.barehand.follower import HandFollower
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.state import HandState
-from rhot_node.detect.foreground import learn_background, skin_foreground
+from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 
 IMAGES = 3  # two searches that agree are a hand
 FPS = 30.0
@@ -21,13 +22,19 @@ WRONG_M = 0.02  # neighbouring knuckles are so far apart
 Draw = Callable[..., np.ndarray]
 
 
+CAMERAS = two_cameras(distance=DISTANCE_M)
+WALLS = [wall(camera, 10 * k + 1, False) for k, camera in enumerate(CAMERAS)]
+
+
+@cache
+def learnt() -> list[Foreground]:
+    return [learn_background(skin_foreground(), [taken(empty, 90 + k) for k in range(8)]) for empty in WALLS]
+
+
 def states(draw: Draw, known: bool) -> list[HandState]:
     """What the follower says of pictures `draw(camera, wall, number)`, with a learnt background or by skin alone."""
-    cameras = two_cameras(distance=DISTANCE_M)
-    walls = [wall(camera, 10 * k + 1, False) for k, camera in enumerate(cameras)]
-    learnt = [learn_background(skin_foreground(), [taken(empty, 90 + k) for k in range(8)]) for empty in walls]
-    follower = HandFollower(rig_of(cameras, right_hand()), learnt if known else None, known_size=True)
-    return [follower.step([draw(camera, empty, number) for camera, empty in zip(cameras, walls, strict=True)],
+    follower = HandFollower(rig_of(CAMERAS, right_hand()), learnt() if known else None, known_size=True)
+    return [follower.step([draw(camera, empty, number) for camera, empty in zip(CAMERAS, WALLS, strict=True)],
                           [round(1e9 * number / FPS)] * 2) for number in range(IMAGES)]
 
 

@@ -94,7 +94,7 @@ def test_a_track_far_from_the_hand_begins_anew_at_the_hand(film) -> None:
     large = np.zeros(SHAPE)
     large[:2] = 0.3
     tracker.start(HandPose(wrong, pose.angles), 0, size=large)
-    for k in range(40):
+    for k in range(30):
         tracker.step(images, [round(1e9 * k / FPS)] * 2)
     assert np.median(errors_mm(tracker, pose)) < 3.0
     assert np.abs(tracker.filter.newest.state[BIAS:BIAS + 2]).max() < 0.1

@@ -176,8 +176,9 @@ def test_the_slices_of_both_hands_fit_into_a_request(monkeypatch) -> None:
     nodes = nodes_of(two_bare_hands())
     monkeypatch.setattr("rhot_app.tracking.contours.requests.STEP_M", 1e-3)
     given(monkeypatch, near)
+    images = shown(near, 0)
     for number in range(6):
-        nodes.step(number, shown(near, 0))
+        nodes.step(number, images)
     assert all(SLICES_MAX // 2 < len(request.slices) <= SLICES_MAX for request in nodes.asked)
 
 
