@@ -12,6 +12,7 @@ import ctypes
 import gc
 import importlib
 import json
+import multiprocessing
 import os
 import runpy
 import signal
@@ -36,7 +37,11 @@ PRELOADED = {
                   "rhot_node.plugins", "rhot_node.video.recorder", "rhot_node.warm_up"),
 }
 ROOT = Path(__file__).parents[1]
+WORKERS = ("rhot_app.export.batch", "rhot_app.export.process", "rhot_app.simulator.film.film")
+"""What processes of multiprocessing find imported."""
+
 Popen = subprocess.Popen
+get_context = multiprocessing.get_context
 SERVER_ENVIRONMENT = dict(os.environ)
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 MESSAGE_BYTES = 1 << 17
@@ -44,9 +49,10 @@ MESSAGE_BYTES = 1 << 17
 
 @pytest.fixture(scope="module", autouse=True)
 def forked_programs() -> Iterator[None]:
-    """subprocess starts RHOT's programs by forks."""
+    """subprocess starts RHOT's programs by forks, and multiprocessing its processes."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(subprocess, "Popen", ForkingPopen)
+        patch.setattr(multiprocessing, "get_context", forking_context)
         yield
 
 
@@ -54,6 +60,14 @@ def forked_programs() -> Iterator[None]:
 def fresh_programs(monkeypatch: pytest.MonkeyPatch) -> None:
     """subprocess starts all programs from nothing, as it does outside of tests."""
     monkeypatch.setattr(subprocess, "Popen", Popen)
+
+
+def forking_context(method: str | None = None) -> Any:
+    """multiprocessing.get_context, but processes that would be spawned are forked from one that has `WORKERS`."""
+    context: Any = get_context("forkserver" if method == "spawn" else method)
+    if method == "spawn":
+        context.set_forkserver_preload(list(WORKERS))
+    return context
 
 
 class ForkingPopen(Popen):

@@ -80,7 +80,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     folder = tmp_path_factory.mktemp("recorded")
     rig = bare_hand_rig(width=320)
     options = BareHandOptions(forearm=False)
-    there = list(bare_hand_frames(rig, "rest", 10 / FPS, FPS, 1, options))
+    there = list(bare_hand_frames(rig, "rest", 6 / FPS, FPS, 1, options))
     away = list(bare_hand_frames(rig, "rest", EMPTY / FPS, FPS, 1, BareHandOptions(forearm=False, enters_after_s=9.0)))
     frames = away + there
     save_rig(folder / "rig.json", rig)
@@ -163,7 +163,7 @@ def test_videos_without_a_hand_say_so(recorded: Recorded, tmp_path: Path, capsys
     (("--offset-s", "right=100"), "no common time"), (("--out", "hand.bvh"), ".csv, .parquet or .npz"),
     (("--background-seconds", "0.01"), "two pictures without a hand"),
     (("--overlay", "nowhere/pictures"), "does not exist"),
-    (("--background-seconds", "2"), "only 1.07 s together"), (("--background-seconds", "0"), "a number above 0"),
+    (("--background-seconds", "2"), "only 0.80 s together"), (("--background-seconds", "0"), "a number above 0"),
     (("--background-seconds=-1",), "a number above 0"),
     (("--out", "hand.xyz"), ".csv, .parquet or .npz; rhot export"),
     (("--adapt", "hand.csv", "--out", "hand.csv"), "--out and --adapt would both write it"),
@@ -369,11 +369,11 @@ def test_real_videos_run_and_states_without_a_hand_have_no_numbers(tmp_path: Pat
                  str(tmp_path / "hand.csv"), "--overlay", str(tmp_path / "pictures")]
     for c in range(2):
         capture = cv2.VideoCapture(str(FOLDER / f"cam{c}_first120.mp4"))
-        pictures = [np.ascontiguousarray(capture.read()[1][..., ::-1]) for _ in range(20)][14:]
+        pictures = [np.ascontiguousarray(capture.read()[1][..., ::-1]) for _ in range(16)][14:]
         arguments += ["--video", f"c{c}={write_video(tmp_path / f'c{c}.avi', pictures, 30.0)}"]
     assert main(arguments) == 0
-    assert json.loads(capsys.readouterr().out)["frame_sets"] == 6
+    assert json.loads(capsys.readouterr().out)["frame_sets"] == 2
     with (tmp_path / "hand.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             assert (row["condition"] in ("TRACKING", "PARTIAL")) == bool(row["joint_wrist_x_mm"])
-    assert len(list((tmp_path / "pictures").iterdir())) == 6
+    assert len(list((tmp_path / "pictures").iterdir())) == 2

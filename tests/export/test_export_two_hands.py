@@ -17,6 +17,7 @@ from tracked_log import states_of_log
 
 from rhot_app.export.export import export_log
 from rhot_app.export.plan import ExportOptions
+from rhot_app.export.states import HandStates
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.project import OTHER_HAND, TrackerSettings
 
@@ -25,20 +26,25 @@ ASIDE = np.array([-0.14, 0.0, 0.05])  # where the left hand is, m
 
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A second of a right hand and a left one."""
+    """Six tenths of a second of a right hand and a left one."""
     right, left = model_rig("rhot8"), model_rig("rhot8", side="left")
     others = tuple(msgspec.structs.replace(marker, id=f"left.{marker.id}", role=f"{OTHER_HAND}{marker.role}")
                    for marker in left.markers.markers)
     rig = msgspec.structs.replace(
         right, markers=msgspec.structs.replace(right.markers, markers=right.markers.markers + others),
         other_hand=left.hand, tracker=TrackerSettings(kind="estimator"))
-    own, other = moving("grasp", 1.0, "rhot8"), moving("pinch", 1.0, "rhot8", "left")
-    frames = observations_of(rig, lambda times: np.concatenate([own(times), other(times) + ASIDE], axis=1), 1.0)
+    own, other = moving("grasp", 0.6, "rhot8"), moving("pinch", 0.6, "rhot8", "left")
+    frames = observations_of(rig, lambda times: np.concatenate([own(times), other(times) + ASIDE], axis=1), 0.6)
     return write_log(tmp_path_factory.mktemp("both") / "both.rhotlog", rig, frames)
 
 
-def test_both_are_smoothed(both: Path) -> None:
-    states, smoothed = states_of_log(both, "estimator"), states_of_log(both, "estimator", smooth=True)
+@pytest.fixture(scope="module")
+def states(both: Path) -> HandStates:
+    return states_of_log(both, "estimator")
+
+
+def test_both_are_smoothed(both: Path, states: HandStates) -> None:
+    smoothed = states_of_log(both, "estimator", smooth=True)
     assert states.other is not None and smoothed.other is not None
     assert len(smoothed) == pytest.approx(len(states), abs=2)
     assert np.array_equal(smoothed.t_master_ns, smoothed.other.t_master_ns)
@@ -49,8 +55,7 @@ def test_both_are_smoothed(both: Path) -> None:
         assert spread[1] < 0.9 * spread[0]
 
 
-def test_tables_and_points_have_both(both: Path, tmp_path: Path) -> None:
-    states = states_of_log(both, "estimator")
+def test_tables_and_points_have_both(both: Path, states: HandStates, tmp_path: Path) -> None:
     assert states.other is not None and states.other.tracked.mean() > 0.5
     table = pandas.read_csv(export_log(both, tmp_path / "a.csv").path)
     place = states.other.joint_positions[:, JOINTS.index("index_tip")]
