@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "detect"))
 
@@ -25,15 +27,23 @@ def picture(paints: dict[str, Rgb] = PAINTS, *, background: Rgb = WOOD, shift: t
             light: float = 1.0, gains: tuple[float, float, float] = (1.0, 1.0, 1.0), seed: int = 0,
             clutter: list[tuple[float, float, float, Rgb]] | None = None) -> YuvImage:
     """Painted fingertips on fingers before `background`, 320 x 240 px; clutter: discs of (x, y, radius, colour)."""
+    canvas = Canvas(320, 240)
+    canvas.rgb = _drawn(tuple(paints.items()), background, shift, tuple(clutter or ())) * light * np.asarray(gains)
+    return canvas.expose(np.random.default_rng(seed))
+
+
+@lru_cache(maxsize=32)
+def _drawn(paints: tuple[tuple[str, Rgb], ...], background: Rgb, shift: tuple[float, float],
+           clutter: tuple[tuple[float, float, float, Rgb], ...]) -> NDArray[np.float64]:
+    """(H, W, 3) RGB before the lens."""
     canvas = Canvas(320, 240, background)
-    for x, y, radius, rgb in clutter or []:
+    for x, y, radius, rgb in clutter:
         canvas.paint(disc(x, y, radius), rgb, (x, y), radius + 3)
-    for name, rgb in paints.items():
+    for name, rgb in paints:
         x, y = place(name, shift)
         canvas.paint(capsule((x, y), (x, y + 90), RADIUS), SKIN, (x, y + 45), 60, 0.3)
         canvas.paint(disc(x, y, RADIUS), rgb, (x, y), RADIUS + 3, 0.3)
-    canvas.rgb *= light * np.asarray(gains)
-    return canvas.expose(np.random.default_rng(seed))
+    return canvas.rgb
 
 
 def place(name: str, shift: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
