@@ -9,11 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
+from rhot_app.calibration.board.boards import Board, Chessboard
 
 Array = NDArray[np.float64]
 
 PAPER, INK, ROOM = 215.0, 35.0, 120.0
+MARGIN = 1.2  # of the sheet around the outermost squares, in squares
 LENS = np.array([535.0, 535.0, 322.3, 238.1, -0.28, 0.09, 0.001, -0.0005, 0.0])
 
 
@@ -58,7 +59,7 @@ def take(board: Board, camera_from_board: Array, photo: Photo = Photo(), seed: i
     plane = np.linalg.inv(camera_from_board[:, [0, 1, 3]][:3])  # rays to (x, y, 1) on the board
     x, y, w = (part[..., 0] * row[0] + part[..., 1] * row[1] + row[2] for row in plane)
     level = np.where(w > 0, paint(board, x / w, y / w), ROOM)
-    image[v0:v1, u0:u1] = level.reshape(v1 - v0, n, u1 - u0, n).mean(axis=(1, 3))
+    image[v0:v1, u0:u1] = cv2.resize(level, (u1 - u0, v1 - v0), interpolation=cv2.INTER_AREA)
     if photo.blur_px:
         image = cv2.GaussianBlur(image, (0, 0), photo.blur_px)
     image = image + np.random.default_rng(seed).normal(0, photo.noise, image.shape)
@@ -67,13 +68,13 @@ def take(board: Board, camera_from_board: Array, photo: Photo = Photo(), seed: i
 
 @functools.lru_cache(maxsize=2)
 def _rays(width: int, height: int, parameters: tuple[float, ...], n: int) -> Array:
-    """(H n, W n, 2) normalised coordinates of all sub-pixels; slow, and the same for every picture of a camera."""
+    """(H n, W n, 2) normalised coordinates of all sub-pixels: between those of the pixels, as no lens bends more."""
     lens = np.array(parameters)
     matrix = np.array([[lens[0], 0, lens[2]], [0, lens[1], lens[3]], [0, 0, 1]])
-    v, u = np.mgrid[:height * n, :width * n]
-    places = np.stack([(u + 0.5) / n - 0.5, (v + 0.5) / n - 0.5], -1).reshape(-1, 1, 2)
-    rays = cv2.undistortPointsIter(places, matrix, lens[4:], None, None, (cv2.TERM_CRITERIA_COUNT, 12, 0))
-    return rays.reshape(*u.shape, 2)
+    v, u = np.mgrid[-1.0:height + 1, -1.0:width + 1]
+    rays = cv2.undistortPointsIter(np.stack([u, v], -1).reshape(-1, 1, 2), matrix, lens[4:], None, None,
+                                   (cv2.TERM_CRITERIA_COUNT, 12, 0))
+    return cv2.resize(rays.reshape(*u.shape, 2), None, fx=n, fy=n)[n:-n, n:-n]
 
 
 def _sheet_px(board: Board, camera_from_board: Array, photo: Photo) -> tuple[int, int, int, int]:
@@ -91,25 +92,23 @@ def _sheet_px(board: Board, camera_from_board: Array, photo: Photo) -> tuple[int
 
 def paint(board: Board, x: Array, y: Array) -> Array:
     """Grey level of the printed sheet at (x, y) m of the board's frame; the room beyond the sheet's margin."""
-    side = board.square_m
-    col, row = np.floor(x / side) + 1, np.floor(y / side) + 1  # of the square, from the outermost one
-    wide, high = board.cols + 1, board.rows + 1
-    printed = (col >= 0) & (row >= 0) & (col < wide) & (row < high)
-    sheet = (x > -2.2 * side) & (y > -2.2 * side) & (x < (wide + 0.2) * side) & (y < (high + 0.2) * side)
-    chess = isinstance(board, Chessboard)
-    black = (col + row) % 2 == 0 if chess else ink_of_charuco(board, x + side, y + side)
-    return np.where(printed & black, INK, np.where(sheet, PAPER, ROOM))
-
-
-def ink_of_charuco(board: CharucoBoard, x: Array, y: Array) -> NDArray[np.bool_]:
-    """Where OpenCV's own drawing of the board is black, at (x, y) m from its upper left corner."""
-    per_square = 120
-    drawn = _charuco_drawing(board, per_square)
-    row = np.clip((y / board.square_m * per_square).astype(int), 0, drawn.shape[0] - 1)
-    col = np.clip((x / board.square_m * per_square).astype(int), 0, drawn.shape[1] - 1)
-    return drawn[row, col] < 128
+    levels, per_square = _sheet(board)
+    first = per_square * (1.0 + MARGIN) + 1.0  # a square before the first corner, the margin, and the room
+    column, row = (np.clip(one * (per_square / board.square_m) + first, 0, size - 1).astype(np.intp)
+                   for one, size in zip((x, y), levels.shape[::-1], strict=True))
+    return levels[row, column]
 
 
 @functools.lru_cache(maxsize=8)
-def _charuco_drawing(board: CharucoBoard, per_square: int) -> NDArray[np.uint8]:
-    return board.opencv().generateImage((board.squares_x * per_square, board.squares_y * per_square))
+def _sheet(board: Board) -> tuple[Array, int]:
+    """Grey levels of the sheet, a pixel of the room around it, and how many there are to a square: as OpenCV draws a
+    ChArUco board, the squares of a chessboard."""
+    if isinstance(board, Chessboard):
+        per_square = 5
+        black = np.add.outer(np.arange(board.rows + 1), np.arange(board.cols + 1)) % 2 == 0
+        black = np.kron(black, np.ones((per_square, per_square), bool))
+    else:
+        per_square = 120
+        black = board.opencv().generateImage((board.squares_x * per_square, board.squares_y * per_square)) < 128
+    paper = np.pad(np.where(black, INK, PAPER), round(MARGIN * per_square), constant_values=PAPER)
+    return np.pad(paper, 1, constant_values=ROOM), per_square

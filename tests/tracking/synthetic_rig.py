@@ -82,9 +82,8 @@ def observe(rig: Rig, preset: Preset, trajectory: Trajectory, seconds: float,
     for index, node in enumerate(rig.nodes):
         model = CameraModel.from_rig(node.intrinsics, node.pose)
         starts = (np.arange(int(seconds * preset.fps)) + viewing.phases[index]) / preset.fps
-        for start in starts:
-            pixels = _see(model, trajectory, start, preset.row_time_ns * 1e-9)
-            pixels = pixels + rng.normal(0.0, viewing.noise_px, pixels.shape)
+        for start, pixels in zip(starts, _see(model, trajectory, starts, preset.row_time_ns * 1e-9), strict=True):
+            pixels += rng.normal(0.0, viewing.noise_px, pixels.shape)
             lost = rng.random(len(pixels)) < viewing.marker_loss
             arrival = start + 480 * preset.row_time_ns * 1e-9 + 0.004 + rng.uniform(*viewing.delay_s)
             if rng.random() >= viewing.frame_loss:
@@ -93,14 +92,14 @@ def observe(rig: Rig, preset: Preset, trajectory: Trajectory, seconds: float,
     return sorted(frames, key=lambda f: f.t_receive_ns)
 
 
-def _see(model: CameraModel, trajectory: Trajectory, start: float, row_time_s: float) -> np.ndarray:
-    """(M, 2) px, every marker at the time its own row is exposed."""
-    count = trajectory(np.array([start])).shape[1]
-    rows = np.full(count, 240.0)
-    for _ in range(4):  # a contraction: markers move far fewer rows per second than the shutter
-        points = trajectory(start + rows * row_time_s)[np.arange(count), np.arange(count)]
-        pixels = model.project(points)
-        rows = pixels[:, 1]
+def _see(model: CameraModel, trajectory: Trajectory, starts: np.ndarray, row_time_s: float) -> np.ndarray:
+    """(N, M, 2) px in N frames, every marker at the time its own row is exposed."""
+    count = trajectory(starts[:1]).shape[1]
+    pixels = np.full((len(starts), count, 2), 240.0)
+    for marker in range(count):
+        for _ in range(4):  # a contraction: markers move far fewer rows per second than the shutter
+            points = trajectory(starts + pixels[:, marker, 1] * row_time_s)[:, marker]
+            pixels[:, marker] = model.project(points)
     return pixels
 
 
