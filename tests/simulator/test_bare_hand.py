@@ -199,7 +199,7 @@ def test_the_hand_in_the_picture_is_where_the_truth_says() -> None:
 
 
 def test_the_hand_enters_after_the_background_alone() -> None:
-    sequence = filmed(replace(NEAR, enters_after_s=0.2), seconds=1.0)
+    sequence = filmed(replace(NEAR, enters_after_s=0.2), seconds=0.6)
     frames = list(sequence.frames())
     assert not frames[0].truth.in_view and frames[-1].truth.in_view
     early = [np.abs(frames[k].images[0].astype(float) - frames[0].images[0]).mean() for k in (3, 5)]  # type: ignore[union-attr]
@@ -208,7 +208,7 @@ def test_the_hand_enters_after_the_background_alone() -> None:
 
 
 def test_exposure_steps_change_the_whole_picture_and_lost_cameras_deliver_none() -> None:
-    sequence = filmed(replace(NEAR, exposure_steps=True, background="clutter", lost=((1, 0.0, 0.05),)), seconds=1.6)
+    sequence = filmed(replace(NEAR, exposure_steps=True, background="clutter", lost=((1, 0.0, 0.05),)), seconds=0.8)
     frames = list(sequence.frames())
     assert [frame.images[1] is None for frame in frames[:4]] == [True, True, False, False]
     corner = [float(np.mean(frame.images[0][:20, :20])) for frame in frames]  # type: ignore[index]

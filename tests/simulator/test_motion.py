@@ -49,12 +49,12 @@ def test_markers_stay_in_view_of_both_wide_cameras_at_each_distance(name: str, m
 def test_poses_are_smooth_and_within_limits(name: str, model: HandModel) -> None:
     motion = load_motion(name, model, CENTRE, seed=1)
     step = 1e-3
-    times = np.arange(0.0, 2.0 * motion.period_s, step)
+    times = np.arange(0.0, motion.period_s + 0.5, step)
     values = motion.curve(np.mod(times, motion.period_s))
     acceleration = np.diff(values, 2, axis=0) / step**2
     jumps = np.abs(np.diff(acceleration, axis=0)).max(axis=0)
     assert (jumps <= 0.08 * np.abs(acceleration).max(axis=0) + 0.5).all()
-    transforms, angles = motion.sample(times)
+    transforms, angles = motion.sample(times[::10])
     assert (angles >= model.limits[:, 0]).all() and (angles <= model.limits[:, 1]).all()
     rotations = transforms[:, :3, :3]
     assert np.allclose(rotations @ rotations.transpose(0, 2, 1), np.eye(3), atol=1e-12)

@@ -10,7 +10,7 @@ from rhot_app.simulator.render.body import CAPSULE, CYLINDER
 from rhot_app.simulator.render.raycast import NO_HIT, PREPARED, hit, lambert, prepare
 
 
-@njit
+@njit(cache=True)
 def cast(kind, row, sizes, x, y, light):  # type: ignore[no-untyped-def]
     """Depth of entry and cosine to `light`."""
     table = np.empty((1, 1, PREPARED))
@@ -33,7 +33,7 @@ def inside(kind: int, row: np.ndarray, size: np.ndarray, points: np.ndarray) -> 
 def test_entry_is_the_first_point_inside(kind: int) -> None:
     rng = np.random.default_rng(3)
     hits = 0
-    for _ in range(400):
+    for _ in range(200):
         row, centre = np.zeros(12), rng.uniform((-0.05, -0.05, 0.4), (0.05, 0.05, 0.8))
         if kind == CAPSULE:
             row[:3], row[3:6] = centre, centre + rng.normal(0.0, 0.02, 3)
@@ -53,7 +53,7 @@ def test_entry_is_the_first_point_inside(kind: int) -> None:
         hits += 1
         assert abs(inside(kind, row, size, depth * direction[None])[0]) < 1e-6
         assert not (signed[depths < depth - 1e-6] < -1e-9).any()
-    assert hits > 50
+    assert hits > 25
 
 
 def test_light_falls_on_a_ball_as_lambert_says() -> None:

@@ -27,7 +27,7 @@ def model() -> HandModel:
 
 def recording_of_our_own_hand(model: HandModel, missing: float) -> tuple[Landmarks, np.ndarray]:
     """Tip and middle of every finger and a triad on the back, from a known motion."""
-    times = np.arange(0.0, 1.5, 0.01)
+    times = np.arange(0.0, 0.8, 0.01)
     transforms, angles = load_motion("grasp", model, CENTRE, seed=3).sample(times)
     ends = np.array([pair for k in range(5) for pair in ((3 + 4 * k, 4 + 4 * k), (1 + 4 * k, 2 + 4 * k))])
     fraction = np.tile([0.75, 0.5], 5)
