@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QApplication
 
@@ -37,7 +35,7 @@ class DisplayPrediction:
     def shown(self, newest: HandState | None, ahead_s: float) -> HandState | None:
         """What to draw of the `newest` state when it will be seen `ahead_s` from now: the hand predicted to then, else
         that state."""
-        now_ns, rig = time.monotonic_ns(), self._controller.rig
+        now_ns, rig = round(1e9 * self._controller.clock()), self._controller.rig
         if (not self.wanted or newest is None or rig is None or rig.tracker.kind == "classic"
                 or abs(now_ns - newest.t_master_ns) > _FRESH_NS):
             return newest

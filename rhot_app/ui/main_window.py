@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -229,7 +228,7 @@ class MainWindow(QMainWindow):
 
     def tell(self, notice: Notice) -> None:
         """Show a sentence for a while: something was done, or could not be done."""
-        self.passing.show(notice, time.monotonic())
+        self.passing.show(notice, self.controller.clock())
 
     def _act(self, key: str) -> None:
         """The button of a sentence."""
@@ -254,7 +253,7 @@ class MainWindow(QMainWindow):
     def tick(self) -> None:
         """Pull and show."""
         self.controller.step()
-        now = time.monotonic()
+        now = self.controller.clock()
         self.recordings.step()
         self.rig_watch.step(now)
         if self.wizards.wizard is None or now >= self._next_behind:

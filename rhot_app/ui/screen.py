@@ -103,19 +103,20 @@ class Screen:
             self._refresh_panels(live)
         if now_s >= self._next_plots and self.plots.isVisible():
             self._next_plots = now_s + PLOT_S
-            now_ns = time.monotonic_ns()
+            now_ns = round(1e9 * now_s)
             self.jitter.refresh(live.jitter, now_ns)
             self.latency.refresh(live.latency, now_ns)
             self.rate.refresh(live.rates, now_ns)
 
     def _refresh_scene(self, live: Live, now_s: float) -> None:
-        self.pacer.give_up(now_s)
+        drawing_s = time.monotonic()
+        self.pacer.give_up(drawing_s)
         if live.state is not None and live.state_count != self._counted:
             self._counted = live.state_count
             self._state_seen_at = now_s
         if self._state_seen_at > 0.0 and live.state_count != self._drawn_state:
-            if self.scene.isVisible() and self.pacer.due(now_s):
-                self.pacer.begin(now_s)
+            if self.scene.isVisible() and self.pacer.due(drawing_s):
+                self.pacer.begin(drawing_s)
                 self._drawn_state = live.state_count
                 self.scene.show_state(self.shown(live.state, self.pacer.cost_s))
                 self._frame_once(live)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -35,19 +36,36 @@ class Bench(Person):
     """A person in front of the main window on a fake engine."""
 
     def __init__(self, folder: Path, backend: FakeBackend | None = None, scheme: str = "dark",
-                 make_solver: Callable[[], Solver] = InProcessSolver) -> None:
+                 make_solver: Callable[[], Solver] = InProcessSolver, settings: Settings | None = None) -> None:
         self.backend = backend or FakeBackend()
-        settings = Settings(folder / "app.ini")
+        settings = settings or Settings(folder / "app.ini")
         settings.scheme = scheme
-        self.controller = Controller(self.backend, self.backend.client)
+        self._passed_s = 0.0
+        self.backend.engine.clock = self.clock
+        self.controller = Controller(self.backend, self.backend.client, clock=self.clock)
         self.window = MainWindow(self.controller, settings, make_solver)
         if QApplication.palette().color(QPalette.ColorRole.Window).name() != scheme_named(scheme).window:
             self.window.appearance.set_scheme(scheme)
         self.window.screen_parts.pacer = FramePacer(most_hz=4.0)  # software OpenGL is slow, and few tests look at it
         super().__init__(self.window)
 
+    def clock(self) -> float:
+        """Seconds of the window and its engine."""
+        return time.monotonic() + self._passed_s
+
+    def let_pass(self, seconds: float) -> None:
+        """So much time passes at once."""
+        self._passed_s += seconds
+
     def told(self) -> Any:
         return self.window.toolbar.badge.word, self.window.advice.texts
+
+    def see_newer_states(self) -> None:
+        """Two states that come from now on are drawn, and what the engine says now has arrived."""
+        scene, live = self.window.screen_parts.scene, self.controller.live
+        for _ in range(2):
+            shown, status = scene.state, live.status
+            self.until(lambda shown=shown, status=status: scene.state is not shown and live.status is not status)
 
     def said(self, *words: str) -> bool:
         """Whether one of the sentences at the bottom has all these words."""
@@ -99,18 +117,23 @@ def nothing_compiled() -> Iterator[None]:
         yield
 
 
-@pytest.fixture
-def make_bench(themed: Any, tmp_path: Path) -> Iterator[Callable[..., Bench]]:
-    """Makes windows that share one settings file; all are closed in the end."""
-    benches: list[Bench] = []
+def benches(folder: Path) -> Iterator[Callable[..., Bench]]:
+    """Yields what makes windows that share one settings file; all are closed in the end."""
+    opened: list[Bench] = []
 
-    def make(backend: FakeBackend | None = None, scheme: str = "dark") -> Bench:
-        benches.append(Bench(tmp_path, backend, scheme))
-        return benches[-1]
+    def make(backend: FakeBackend | None = None, scheme: str = "dark", **options: Any) -> Bench:
+        opened.append(Bench(folder, backend, scheme, **options))
+        return opened[-1]
 
     yield make
-    for bench in benches:
+    for bench in opened:
         bench.close()
+
+
+@pytest.fixture
+def make_bench(themed: Any, tmp_path: Path) -> Iterator[Callable[..., Bench]]:
+    """Makes windows of one test."""
+    yield from benches(tmp_path)
 
 
 @pytest.fixture
@@ -120,11 +143,15 @@ def bench(make_bench: Callable[..., Bench]) -> Bench:
 
 
 @pytest.fixture(scope="module")
-def shared_bench(themed: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+def make_shared_bench(themed: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Bench]]:
+    """Makes windows that all tests of a module share."""
+    yield from benches(tmp_path_factory.mktemp("window"))
+
+
+@pytest.fixture(scope="module")
+def shared_bench(make_shared_bench: Callable[..., Bench]) -> Bench:
     """One window for all tests of a module; making one takes a second with software OpenGL."""
-    bench = Bench(tmp_path_factory.mktemp("window"))
-    yield bench
-    bench.close()
+    return make_shared_bench()
 
 
 @pytest.fixture

@@ -245,13 +245,16 @@ class FakeClient:
         if engine.dead:
             self._next_state = self._next_status = self._next_preview = now
             return messages
+        self._next_state = max(self._next_state, now - 1.0)  # of a longer absence the last second is told
         while self._next_state <= now:
             if engine.running and engine.condition() is not Condition.LOST:
                 messages.append(engine.state(self._next_state))
             self._next_state += 1.0 / engine.rate_hz
+        self._next_status = max(self._next_status, now - 1.0)
         while self._next_status <= now:
             messages.append(engine.status(self._next_status))
             self._next_status += 0.1
+        self._next_preview = max(self._next_preview, now - 0.25)
         while self._next_preview <= now:
             messages += [engine.preview(camera, self._next_preview) for camera in range(len(engine.rig.nodes))]
             self._next_preview += 0.25

@@ -8,8 +8,10 @@ from typing import Any
 
 from patience import PATIENCE_S
 from PySide6.QtCore import QEventLoop, QPoint, Qt, QTimer
+from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
+from screen_pictures import UPDATE, check, colours_in, picture_of
 
 LEFT, NONE = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
 
@@ -54,6 +56,15 @@ class Person:
         """Click the middle of a widget, or another place of it."""
         assert widget.isVisible() and widget.isEnabled()
         QTest.mouseClick(widget, LEFT, NONE, at or widget.rect().center())
+
+    def keep(self, name: str, least_colours: int, take: Callable[[], QImage] | None = None,
+             settle_s: float = 1.0) -> None:
+        """Take a picture for the guide, of the screen where the window stands or by `take`, once it shows enough."""
+        take = take or (lambda: picture_of(self.window))
+        if UPDATE:
+            self.run(settle_s)
+        self.until(lambda: colours_in(take()) >= least_colours)
+        check(name, take(), least_colours)
 
     def drag(self, widget: QWidget, *places: QPoint) -> None:
         """Press at the first place, move over the others, let go at the last."""

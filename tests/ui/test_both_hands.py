@@ -19,7 +19,6 @@ from rhot_app.ui.models.words import hand_names
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
 from rhot_app.ui.scene.frames import camera_like_state, to_display
 from rhot_app.ui.scene.hands import hands_of
-from rhot_app.ui.scene.labels import pixels_of
 from rhot_app.ui.scene.view import SceneView
 
 T_S = 3.0
@@ -48,8 +47,8 @@ def scene(themed, qtbot):
 
 def drawn(scene, hand, part):
     """(N, 3) m, scene frame: the vertices of one part of the first (0) or other (1) hand; none when it is hidden."""
-    item = scene._actors._hands[hand].items[part]
-    return np.asarray(item._arrays[0], float) if item.visible() else np.empty((0, 3))
+    item = scene.actors.hands[hand].items[part]
+    return item.vertices if item.visible() else np.empty((0, 3))
 
 
 def extent(vertices):
@@ -59,7 +58,7 @@ def extent(vertices):
 
 def looks(scene, hand, part):
     """(N, 4) colours of one part."""
-    return scene._actors._hands[hand].items[part]._arrays[2]
+    return scene.actors.hands[hand].items[part].colours
 
 
 def test_each_hand_has_its_own_markers_and_none_has_them_twice():
@@ -126,16 +125,16 @@ def test_a_rig_of_one_hand_takes_the_other_one_away_and_back(scene, state):
     scene.show_state(state)
     alone = FakeEngine(one_hand_rig(), clock=lambda: 0.0).state(T_S)
     scene.show_state(alone)  # the engine has changed over already, the window has not
-    assert scene._in_rig is None and extent(drawn(scene, 0, SKIN)) == extent(drawn(scene, 1, SKIN)) == 0.0
+    assert scene.state is None and extent(drawn(scene, 0, SKIN)) == extent(drawn(scene, 1, SKIN)) == 0.0
     scene.show_rig(one_hand_rig())
     scene.show_state(state)  # one that was still on its way
-    assert scene._in_rig is None
+    assert scene.state is None
     scene.show_state(alone)
-    assert len(scene._actors.items) == 5 and extent(drawn(scene, 0, SKIN)) > 0.05
-    assert sum(item in scene._actors.items for item in scene.items) == 5
+    assert len(scene.actors.items) == 5 and extent(drawn(scene, 0, SKIN)) > 0.05
+    assert sum(item in scene.actors.items for item in scene.items) == 5
     scene.show_rig(two_hand_rig())
     scene.show_state(state)
-    assert len(scene._actors.items) == 10 and extent(drawn(scene, 1, SKIN)) > 0.05
+    assert len(scene.actors.items) == 10 and extent(drawn(scene, 1, SKIN)) > 0.05
 
 
 def test_uncertainty_is_chosen_for_both(scene, state):
@@ -149,16 +148,15 @@ def test_uncertainty_is_chosen_for_both(scene, state):
     far = replace(state.other, joint_covariances=np.tile(np.eye(3), (21, 1, 1)))
     scene.show_ellipsoids(EllipsoidChoice())
     scene.show_state(state)
-    before = scene._actors.cut
+    before = scene.actors.cut
     scene.show_state(replace(state, other=far))
-    assert scene._actors.cut and not before, "the key says so whichever hand's ellipsoid was cut"
+    assert scene.actors.cut and not before, "the key says so whichever hand's ellipsoid was cut"
 
 
 def test_framing_shows_every_finger_of_both_hands(scene, engine, state):
     scene.show_state(state)
     scene.frame_hand()
-    places = to_display(np.concatenate([state.joint_positions, state.other.joint_positions]))
-    pixels = pixels_of(places, scene._projection(), (scene.width(), scene.height()))
+    pixels = scene.to_widget(np.concatenate([state.joint_positions, state.other.joint_positions]))
     assert (pixels > 0).all() and (pixels < [scene.width(), scene.height()]).all()
     both = scene.cameraParams()["distance"]
     engine.gone = {"right"}
@@ -174,20 +172,14 @@ def test_framing_shows_every_finger_of_both_hands(scene, engine, state):
 def test_the_mouse_tells_which_hand_a_joint_is_of(scene, state):
     scene.show_state(state)
     scene.frame_hand()
-    places = to_display(np.stack([state.joint_positions[14], state.other.joint_positions[14]]))
-    pixels = pixels_of(places, scene._projection(), (scene.width(), scene.height()))
+    pixels = scene.to_widget(np.stack([state.joint_positions[14], state.other.joint_positions[14]]))
     told = [scene.tool_tip_at(QPoint(round(x), round(y))) for x, y in pixels]
     assert told[0].startswith("right ring PIP joint") and told[1].startswith("left ring PIP joint")
 
 
-def test_every_marker_has_one_label(scene, state, monkeypatch):
-    painted = []
-    monkeypatch.setattr(scene._labels, "paint_apart", lambda *args: painted.append(args[3:5]))
-    monkeypatch.setattr(scene._labels, "paint", lambda *args, **more: None)
-    monkeypatch.setattr(scene._legend, "paint", lambda *args: None)
+def test_every_marker_has_one_label(scene, state):
     scene.show_state(state)
-    scene._paint_labels(None)
-    ((places, texts),) = painted
+    places, texts = scene.marker_labels()
     assert sorted(texts) == sorted(two_hand_rig().markers.ids)
     assert np.asarray(places) == pytest.approx(to_display(state.marker_positions))
 
@@ -208,12 +200,17 @@ def test_hands_are_called_by_their_sides():
     assert hand_names(msgspec.structs.replace(rig, other_hand=rig.hand)) == ("first right", "other right")
 
 
+@pytest.fixture(scope="module")
+def two_hands_window(make_shared_bench):
+    return make_shared_bench(FakeBackend(TwoHandsEngine(running=False)))
+
+
 @pytest.fixture
-def two_hands(make_bench):
+def two_hands(two_hands_window):
     """The window on a rig with two hands, tracking."""
-    bench = make_bench(FakeBackend(TwoHandsEngine(running=False)))
-    bench.track()
-    return bench
+    two_hands_window.backend.engine.gone = set()
+    two_hands_window.track()
+    return two_hands_window
 
 
 def test_the_panel_shows_the_angles_of_the_hand_that_is_chosen(two_hands):
@@ -242,14 +239,11 @@ def test_the_panel_shows_the_angles_of_the_hand_that_is_chosen(two_hands):
 def test_the_choice_of_hands_goes_with_the_rig(two_hands):
     parts, engine = two_hands.window.screen_parts, two_hands.backend.engine
     two_hands.click(parts.hand.choice.buttons[1])
-    two_hands.backend.engine.rig = one_hand_rig()
-    two_hands.window.screen_parts.show_rig(one_hand_rig())
+    parts.show_rig(one_hand_rig())
     assert not parts.hand.choice.isVisible() and parts.hand.choice.buttons[0].isChecked()
     parts.hand.show_state(FakeEngine(one_hand_rig()).state(T_S))
     assert parts.hand.cells[5].text() != "–"
     parts.show_rig(engine.rig)
-    assert not parts.hand.choice.isVisible()
-    parts.show_rig(two_hand_rig())
     assert parts.hand.choice.isVisible()
 
 
@@ -260,7 +254,7 @@ def test_the_view_goes_near_once_both_are_there_and_the_word_counts_both(two_han
     two_hands.until(lambda: two_hands.window.toolbar.badge.word == "PARTIAL")
     scene.reset_view()
     engine.session += 1
-    two_hands.run(0.8)
+    two_hands.see_newer_states()
     far = scene.cameraParams()["distance"]
     assert far > 1.0
     engine.gone = set()

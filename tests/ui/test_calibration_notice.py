@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import msgspec
 import pytest
-from fake_backend import FakeBackend
-from fake_engine import FakeEngine, synthetic_rig
-from PySide6.QtWidgets import QPushButton
+from fake_engine import synthetic_rig
 from test_tracker_dialog import FLOATING
 
 from rhot_app.calibration.check.camera_calibration import calibration_error
@@ -15,10 +13,10 @@ from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, load_rig
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.panels.advice_bar import SHOWN, chosen_of
 from rhot_app.ui.scene.hands import spots
+from rhot_app.ui.wizards.framework.plan import wizard_named
 from rhot_node.files import resource_path
 
-HEADLINE = "Not calibrated: millimetres are not reliable."
-TRACKED = "The hand is tracked and every marker is seen."
+HEADLINE = "Not calibrated"
 
 
 def calibrated_rig(lengths="ruler"):
@@ -31,28 +29,28 @@ def calibrated_rig(lengths="ruler"):
 
 
 @pytest.fixture
-def tracked(make_bench):
-    """Opens a window on a rig and starts tracking, as a person does."""
+def tracked(shared_bench):
+    """Has the window's engine track on another rig."""
+    bench = shared_bench
+    bench.track()
 
     def track(rig):
-        bench = make_bench(FakeBackend(FakeEngine(rig, running=False)))
-        bench.until(lambda: bench.window.welcome.twin_button.isVisible())
-        bench.click(bench.window.welcome.twin_button)
-        bench.until(lambda: bench.window.toolbar.badge.word == "TRACKING" and any(bench.window.screen_parts.markers
-                                                                                  .spreads))
+        bench.backend.engine.rig = rig
+        bench.window.rig_watch.look_soon()
+        bench.until(lambda: bench.controller.rig == rig and bench.window.toolbar.badge.word == "TRACKING")
+        bench.until(lambda: any(bench.window.screen_parts.markers.spreads))
         return bench
 
-    return track
-
-
-def buttons(bench):
-    """The buttons at the bottom of the window that can be clicked."""
-    return [button for button in bench.window.advice.findChildren(QPushButton) if button.isVisible()]
+    yield track
+    if bench.window.wizards.wizard is not None:
+        bench.window.wizards.wizard.reject()
+        bench.until(lambda: bench.window.wizards.wizard is None)
+    track(synthetic_rig())
 
 
 def place_of_button(bench):
     """How far the only button's lower left corner is from the window's, px."""
-    (button,) = buttons(bench)
+    (button,) = bench.window.advice.buttons.values()
     at = button.mapTo(bench.window, button.rect().bottomLeft())
     return at.x(), bench.window.height() - at.y()
 
@@ -65,61 +63,57 @@ def laid_out(bench):
 def test_an_uncalibrated_rig_says_so_and_its_button_opens_the_lens_wizard(tracked):
     rig = load_rig(resource_path("rigs", "two_pis.json"))
     bench = tracked(rig)
-    bench.until(lambda: len(bench.window.advice.texts) == 2 and len(buttons(bench)) == 1)
-    operational, lasting = bench.window.advice.texts
-    assert operational == TRACKED and lasting.startswith(HEADLINE)
-    assert "Everything is in order." not in bench.window.advice.texts
+    advice = bench.window.advice
+    bench.until(lambda: len(advice.texts) == 2 and list(advice.buttons) == ["Calibrate …"])
+    operational, lasting = advice.texts
+    assert "hand is tracked" in operational and HEADLINE in lasting and not bench.calm
     assert set(bench.window.screen_parts.markers.spreads) == {"?"}
-    (button,) = buttons(bench)
-    assert button.text() == "Calibrate …"
-    bench.click(button)
+    bench.click(advice.buttons["Calibrate …"])
     bench.until(lambda: bench.window.wizards.wizard is not None)
-    assert bench.window.wizards.wizard.plan.title == "Find the lens of a camera"
-    bench.window.wizards.wizard.reject()
+    assert bench.window.wizards.wizard.plan.title == wizard_named("lens").title
 
 
 def test_the_notice_stays_where_it_is_while_other_sentences_come_and_go(tracked):
     bench = tracked(synthetic_rig(calibration=None))
-    bench.until(lambda: len(bench.window.advice.texts) == 2 and len(buttons(bench)) == 1)
-    bench.until(lambda: laid_out(bench))
+    advice = bench.window.advice
+    bench.until(lambda: len(advice.texts) == 2 and len(advice.buttons) == 1 and laid_out(bench))
     place = place_of_button(bench)
     bench.backend.engine.advice = (Advice("error", "Node left does not answer."), Advice("warning", "It is dark."),
                                    Advice("warning", "Camera right has seen no marker for 5 s."))
-    bench.until(lambda: bench.window.advice.texts[0] == "Node left does not answer.")
-    assert len(bench.window.advice.texts) == SHOWN and bench.window.advice.texts[-1].startswith(HEADLINE)
+    bench.until(lambda: bench.said("left does not answer"))
+    assert len(advice.texts) == SHOWN and HEADLINE in advice.texts[-1]
     bench.until(lambda: laid_out(bench) and place_of_button(bench) == place)
 
 
 def test_a_simulated_rig_is_exact_and_needs_no_notice(tracked):
     bench = tracked(synthetic_rig())
-    bench.until(lambda: bench.window.advice.texts == ["Everything is in order."])
+    bench.until(lambda: bench.calm)
     assert bench.window.screen_parts.markers.spreads == ["1.8"] * 6
 
 
 def test_what_the_calibration_does_not_know_is_in_what_is_stated(tracked):
     bench = tracked(calibrated_rig())
-    bench.until(lambda: bench.window.advice.texts == ["Everything is in order."])
+    bench.until(lambda: bench.calm)
     spreads = [float(text) for text in bench.window.screen_parts.markers.spreads]
     assert all(1.85 < spread < 2.6 for spread in spreads), "1.8 mm by noise, 0.8 to 1 mm by the calibration at 0.55 m"
 
 
 def test_the_notice_is_gone_and_figures_are_back_once_the_rig_is_calibrated(tracked):
     bench = tracked(synthetic_rig(calibration=None))
-    bench.until(lambda: bench.window.advice.texts[-1].startswith(HEADLINE))
-    bench.backend.engine.rig = calibrated_rig()
-    bench.window.rig_watch.look_soon()
-    bench.until(lambda: bench.window.advice.texts == ["Everything is in order."])
+    bench.until(lambda: bench.said(HEADLINE))
+    tracked(calibrated_rig())
+    bench.until(lambda: bench.calm)
     bench.until(lambda: any(text not in ("", "?") for text in bench.window.screen_parts.markers.spreads))
 
 
 def test_lengths_that_were_never_checked_are_said_with_the_stereo_wizard(tracked):
     bench = tracked(calibrated_rig("skipped"))
-    bench.until(lambda: len(bench.window.advice.texts) == 2 and len(buttons(bench)) == 1)
-    assert bench.window.advice.texts[-1].startswith("Lengths were never checked against a ruler.")
-    bench.click(buttons(bench)[0])
+    advice = bench.window.advice
+    bench.until(lambda: len(advice.texts) == 2 and len(advice.buttons) == 1)
+    assert "never checked" in advice.texts[-1]
+    bench.click(*advice.buttons.values())
     bench.until(lambda: bench.window.wizards.wizard is not None)
-    assert bench.window.wizards.wizard.plan.title == "Put the cameras together"
-    bench.window.wizards.wizard.reject()
+    assert bench.window.wizards.wizard.plan.title == wizard_named("stereo").title
 
 
 def test_the_hand_and_the_scene_state_no_precision_that_nobody_knows(tracked):

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtTest import QTest
-from screen_pictures import check
 
 from rhot_app.articulated.bodies import hand_bodies
 from rhot_app.barehand.surface import surface_of
@@ -15,14 +13,18 @@ from rhot_app.ui.models.layers import LayerPictures
 
 
 @pytest.fixture
-def layers(make_bench):
-    """The dialog of a window that tracks; the first drawing is done."""
-    bench = make_bench()
-    bench.track()
+def layers(tracking):
+    """The dialog of a window that tracks, and a drawing in it; nothing is drawn between the tests."""
+    bench = tracking
     bench.window.actions_.layers.trigger()
     dialog = bench.window.dialogs.layers
-    bench.until(lambda: dialog.shown is not None, 120.0)
-    return bench, dialog
+    dialog.pause_button.setChecked(False)
+    dialog.over_check.setChecked(True)
+    dialog.camera_box.setCurrentIndex(0)
+    bench.until(lambda: dialog.shown_of is not None and dialog.shown_of[0] == "left")
+    yield bench, dialog
+    if bench.window.dialogs.layers is not None:
+        dialog.pause_button.setChecked(True)
 
 
 def test_every_layer_is_listed_from_the_front_on(layers):
@@ -40,13 +42,13 @@ def test_the_masks_follow_the_hand_until_they_are_paused(layers):
     bench, dialog = layers
     first = dialog.shown
     bench.until(lambda: dialog.shown is not first and not np.array_equal(dialog.shown.image, first.image))
-    QTest.keyClick(dialog, Qt.Key.Key_Space)
+    bench.press(Qt.Key.Key_Space, dialog)
     assert dialog.pause_button.isChecked()
-    bench.until(lambda: dialog._job is None)
+    bench.until(lambda: not dialog.drawing)
     held = dialog.shown
-    bench.run(0.4)
+    bench.run(0.2)
     assert dialog.shown is held
-    QTest.keyClick(dialog, Qt.Key.Key_F1)
+    bench.press(Qt.Key.Key_F1, dialog)
     assert bench.window.guide_page == "scene"
 
 
@@ -54,12 +56,10 @@ def test_each_camera_has_its_own_picture(layers):
     bench, dialog = layers
     assert [dialog.camera_box.itemText(k) for k in range(2)] == ["left", "right"]
     dialog.over_check.setChecked(False)
-    bench.until(lambda: dialog.shown is not None and (dialog.shown.image[0, 0] == 60).all())
-    first = dialog.shown
+    bench.until(lambda: (dialog.shown.image[0, 0] == 60).all())
     dialog.camera_box.setCurrentIndex(1)
-    bench.until(lambda: dialog._drawn[0] == "right" and dialog.shown is not first and dialog._job is None)
-    moment = dialog._drawn[1]  # the hand moves
-    left = LayerPictures(bench.controller.rig).draw("left", moment, None)
+    bench.until(lambda: dialog.shown_of[0] == "right")
+    left = LayerPictures(bench.controller.rig).draw("left", dialog.shown_of[1], None)  # the hand moves
     columns = [np.flatnonzero((one.image != 60).any(axis=(0, 2))).mean() for one in (left, dialog.shown)]
     assert columns[0] - columns[1] > 20.0, "the right camera sees the hand farther left"
 
@@ -67,7 +67,7 @@ def test_each_camera_has_its_own_picture(layers):
 def test_without_a_hand_it_says_so_and_closing_forgets_it(layers):
     bench, dialog = layers
     bench.controller.start_or_stop()
-    bench.until(lambda: "No hand is tracked" in dialog.sentence.text())
+    bench.until(lambda: "No hand" in dialog.sentence.text())
     assert dialog.list.count() == 0 and dialog.shown is None
     dialog.close()
     bench.until(lambda: bench.window.dialogs.layers is None)
@@ -76,7 +76,4 @@ def test_without_a_hand_it_says_so_and_closing_forgets_it(layers):
 def test_picture(layers):
     bench, dialog = layers
     dialog.move(0, 0)
-    dialog.over_check.setChecked(True)
-    bench.until(lambda: dialog._drawn and dialog._drawn[-1] is not None and dialog._job is None)
-    bench.run(0.3)
-    check("layers", dialog.grab().toImage(), 60)
+    bench.keep("layers", 60, lambda: dialog.grab().toImage())

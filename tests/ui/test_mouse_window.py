@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from fake_engine import synthetic_rig
 from mouse_states import REST, SPREAD, hand_state, lost
+from person import Person
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from screen_pictures import check, colours_in, picture_of
+from screen_pictures import colours_in, picture_of
 
+from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.mouse.scene import shadow_of
 from rhot_app.ui.mouse.window import MouseWindow
 
@@ -19,6 +22,7 @@ class Hand:
         self.number = 0
         self.waiting: list = []
         self.closed = False
+        self.clock_s = 0.0
 
     def poll(self) -> list:
         sent, self.waiting = self.waiting, []
@@ -39,15 +43,12 @@ def hand() -> Hand:
 
 
 @pytest.fixture
-def window(themed, qtbot, hand, bench):
-    rig = bench.backend.engine.rig
-    opened: list[str] = []
-    window = MouseWindow(hand, lambda: rig, bench.window.appearance.scheme, lambda: opened.append("guide"))
+def window(themed, qtbot, hand):
+    rig, opened = synthetic_rig(), []
+    window = MouseWindow(hand, lambda: rig, DARK, lambda: opened.append("guide"), clock=lambda: hand.clock_s)
     window.opened = opened
     qtbot.addWidget(window)
-    window.show()
-    window.activateWindow()
-    assert QTest.qWaitForWindowActive(window)
+    Person(window)
     hand.be(states=REST)
     window.step()
     yield window
@@ -73,7 +74,7 @@ def test_a_ball_is_picked_moved_and_brought_back_by_undo(window, hand):
     before = window.pick.balls[1].centre
     hand.be(*to(window, 1))
     window.step()
-    assert "Spread the thumb to pick the blue ball" in window.sentence.text()
+    assert all(word in window.sentence.text() for word in ("thumb", "pick", "blue"))
     hand.be(*to(window, 1), **SPREAD["thumb"])
     window.step()
     assert window.words["thumb"].text() == "Thumb DOWN"
@@ -93,13 +94,13 @@ def test_undo_without_a_move_is_a_sentence(window):
     assert "nothing to undo" in window.sentence.text()
 
 
-def test_a_lost_hand_and_a_silent_engine_are_said_and_nothing_is_lost(window, hand, monkeypatch):
+def test_a_lost_hand_and_a_silent_engine_are_said_and_nothing_is_lost(window, hand):
     carry(window, hand, 1, 0.0, 0.0, 0.0)
     hand.waiting.append(lost(hand.number))
     window.step()
     assert "No hand is tracked" in window.sentence.text() and window.badge.word == "LOST"
     moved = list(window.pick.balls)
-    window._heard_s -= 100.0
+    hand.clock_s += 100.0
     window.step()
     assert "No engine is heard" in window.sentence.text() and window.badge.word == "NO RIG"
     assert window.pick.balls == moved
@@ -186,17 +187,13 @@ def test_the_menu_opens_it_without_a_rig_and_with_one(bench):
     bench.until(lambda: bench.window.dialogs.mouse is None)
 
 
-def test_picture(window, hand, bench):
+def test_picture(window, hand):
+    person = Person(window)
     window.move(0, 0)
     carry(window, hand, 1, -0.01, 0.02, 0.0)
     start = to(window, 0)
     hand.be(*start)
     hand.be(*start, **SPREAD["thumb"])
     hand.be(0.015, -0.01, 0.0, index_mcp_flexion=2.0, **SPREAD["thumb"])
-    for _ in range(30):
-        hand.be(0.015, -0.01, 0.0, index_mcp_flexion=2.0, **SPREAD["thumb"])
-        bench.run(0.03)
-    picture = picture_of(window)
-    view = window.view.geometry()
-    assert colours_in(picture.copy(view)) > 20, "the scene is blank"
-    check("mouse", picture.copy(0, 0, window.width(), window.height()), 30)
+    person.until(lambda: colours_in(picture_of(window).copy(window.view.geometry())) > 20)  # the scene is drawn
+    person.keep("mouse", 30, lambda: picture_of(window).copy(0, 0, window.width(), window.height()))

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 from fake_backend import FakeBackend
 from fake_engine import FakeEngine, synthetic_rig
-from screen_pictures import SIZE, UPDATE, check, colours_in, picture_of
+from screen_pictures import SIZE, colours_in, picture_of
 from two_hands_engine import TwoHandsEngine
 
 from rhot_app.engine.status import Advice
@@ -35,7 +35,6 @@ def shown(tracking):
     tracking.window.screen_parts.scene.reset_view()
     tracking.window.docks.arrange()
     tracking.backend.engine.session += 1
-    tracking.run(0.4)
     return tracking
 
 
@@ -49,8 +48,7 @@ def scene_colours(bench) -> int:
 
 def test_first_page(bench):
     bench.window.resize(SIZE)
-    bench.run(0.5)
-    check("welcome", picture_of(bench.window), 20)
+    bench.keep("welcome", 20)
 
 
 def test_progress_page(bench):
@@ -58,40 +56,36 @@ def test_progress_page(bench):
     bench.backend.gate.clear()
     bench.window.welcome.twin_button.click()
     bench.until(lambda: bench.window.welcome.progress_bar.value() == 40)
-    check("starting", picture_of(bench.window), 12)
+    bench.keep("starting", 12)
 
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_tracking(shown, scheme):
     if scheme != "dark":
         shown.window.appearance.set_scheme(scheme)
-    shown.run(20.0 if UPDATE else 0.5)
-    assert scene_colours(shown) > 40
-    check("tracking" if scheme == "dark" else "tracking-light", picture_of(shown.window), 80)
+    shown.until(lambda: scene_colours(shown) > 40)
+    shown.keep("tracking" if scheme == "dark" else "tracking-light", 80, settle_s=20.0)
 
 
 def test_something_is_hidden(shown):
     shown.backend.engine.hidden = {"wrist": "right", "ring": "both"}
     shown.backend.engine.advice = (Advice("warning", WRIST),)
-    shown.until(lambda: shown.window.advice.texts == [WRIST])
+    shown.until(lambda: shown.said(WRIST))
     shown.window.screen_parts.scene.frame_hand()
-    shown.run(0.7)
-    check("partial", picture_of(shown.window), 80)
+    shown.keep("partial", 80)
 
 
 def test_the_engine_is_gone(shown):
     shown.backend.gate.clear()
     shown.backend.engine.dead = True
     shown.until(lambda: shown.window.toolbar.badge.word == "NO ENGINE")
-    shown.run(0.8)
-    check("no-engine", picture_of(shown.window), 40)
+    shown.keep("no-engine", 40)
 
 
 def test_scene_alone(shown):
     shown.window.actions_.alone.trigger()
     shown.window.screen_parts.scene.frame_hand()
-    shown.run(0.7)
-    check("scene", picture_of(shown.window), 60)
+    shown.keep("scene", 60)
 
 
 def test_what_is_real(make_bench):
@@ -101,12 +95,11 @@ def test_what_is_real(make_bench):
     bench.track()
     bench.window.actions_.cloud_sizes[1].trigger()
     bench.window.screen_parts.scene.frame_hand()
-    bench.run(0.7)
-    check("uncertainty", picture_of(bench.window), 80)
+    bench.keep("uncertainty", 80)
     bench.window.actions_.tracker.trigger()
     dialog = bench.window.dialogs.tracker
     bench.until(dialog.size_button.isEnabled)
-    check("tracker", dialog.grab().toImage(), 12)
+    bench.keep("tracker", 12, lambda: dialog.grab().toImage())
 
 
 def test_not_calibrated(make_bench):
@@ -116,20 +109,16 @@ def test_not_calibrated(make_bench):
     bench.until(lambda: bench.window.welcome.twin_button.isVisible())
     bench.click(bench.window.welcome.twin_button)
     bench.until(lambda: bench.window.toolbar.badge.word == "TRACKING" and len(bench.window.advice.texts) == 2)
-    bench.run(8.0 if UPDATE else 0.5)
     bench.window.screen_parts.scene.frame_hand()
-    bench.run(0.7)
-    check("not-calibrated", picture_of(bench.window), 80)
+    bench.keep("not-calibrated", 80, settle_s=8.0)
 
 
 def test_two_hands(make_bench):
     bench = make_bench(FakeBackend(TwoHandsEngine(running=False)))
     bench.window.resize(SIZE)
     bench.track()
-    bench.run(8.0 if UPDATE else 0.5)
     bench.window.screen_parts.scene.frame_hand()
-    bench.run(0.7)
-    check("two-hands", picture_of(bench.window), 80)
+    bench.keep("two-hands", 80, settle_s=8.0)
 
 
 def connecting() -> NodesDialog:
@@ -156,8 +145,6 @@ def test_dialogs(qtbot, bench):
         qtbot.addWidget(dialog)
         dialog.show()
         qtbot.waitExposed(dialog)
-        bench.run(0.2)
-        check(name, dialog.grab().toImage(), 10)
+        bench.keep(name, 10, lambda dialog=dialog: dialog.grab().toImage(), settle_s=0.2)
     bench.window.open_guide("window")
-    bench.run(0.3)
-    check("guide", bench.window.dialogs.guide.grab().toImage(), 12)
+    bench.keep("guide", 12, lambda: bench.window.dialogs.guide.grab().toImage())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -50,7 +51,9 @@ class Live:
     (a replayed log's states carry the times of their recording): `jitter` mm, `latency` ms, `rates` per second.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """`clock` gives seconds."""
+        self._clock = clock
         self._jitter_window = JitterWindow()
         self._latency_window = LatencyWindow()
         self._losses = LossMeter()
@@ -64,7 +67,7 @@ class Live:
         self.previews: dict[str, Preview] = {}
         self.state_count = 0
         self.preview_count = 0
-        self.heard_at_s = time.monotonic()
+        self.heard_at_s = self._clock()
         self.observations: deque[tuple[int, Array, NDArray[np.uint16]]] = deque(maxlen=256)
         self.contours: deque[SeenContour] = deque(maxlen=128)
         self.jitter = Series(())
@@ -91,23 +94,24 @@ class Live:
 
     def silent_for_s(self) -> float:
         """Seconds since the engine last said anything about itself."""
-        return time.monotonic() - self.heard_at_s
+        return self._clock() - self.heard_at_s
 
     def _take_state(self, state: HandState) -> None:
         self.state = state
         self.state_count += 1
-        self._state_at_ns = time.monotonic_ns()
+        self._state_at_ns = round(1e9 * self._clock())
         self._jitter_window.add(state)
         self._latency_window.add(state)
         self.observations.append((state.t_master_ns, state.camera_pixels, state.camera_flags))
 
     def _take_status(self, status: EngineStatus) -> None:
         self.status = status
-        self.heard_at_s = time.monotonic()
+        self.heard_at_s = self._clock()
         names = (*rate_names(status), LOST)
         if names != self.rates.names:
             self.rates = Series(names)
-        self.rates.append(time.monotonic_ns(), np.append(self._rates.row(status), self._losses.per_second(status)))
+        row = np.append(self._rates.row(status), self._losses.per_second(status))
+        self.rates.append(round(1e9 * self.heard_at_s), row)
 
     def sample(self, now_ns: int) -> None:
         """Add the windows' figures of this moment to the series of jitter and latency; a gap when nothing came."""

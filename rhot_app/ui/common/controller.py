@@ -93,10 +93,13 @@ class Controller(QObject):
     busy_changed = Signal()
     failed = Signal(str)
 
-    def __init__(self, backend: Backend, connect: Callable[[], ClosableClient], parent: QObject | None = None) -> None:
+    def __init__(self, backend: Backend, connect: Callable[[], ClosableClient], parent: QObject | None = None,
+                 clock: Callable[[], float] = time.monotonic) -> None:
+        """`clock` gives the seconds of the engine's clock, by which everything in the window is timed."""
         super().__init__(parent)
         self.backend = backend
-        self.live = Live()
+        self.clock = clock
+        self.live = Live(clock)
         self.opened: Opened | None = None
         self.twin_choice = TwinChoice()
         self.link = EngineLink(connect, self._on_command_failed, self)
@@ -288,17 +291,17 @@ class Controller(QObject):
     def step(self) -> None:
         """Pull what arrived, sample the windows ten times a second, watch over engine and simulated nodes."""
         if self.opened is None:
-            self._look_for_engine(time.monotonic())
+            self._look_for_engine(self.clock())
         if self.link.client is None or self.opened is None:
             return
         try:
             self.live.step(self.link.client)
         except RhotError as exc:
             self.problem = str(exc)
-        now = time.monotonic()
+        now = self.clock()
         if now >= self._next_sample:
             self._next_sample = max(self._next_sample + SAMPLE_S, now)
-            self.live.sample(time.monotonic_ns())
+            self.live.sample(round(1e9 * now))
         if now >= self._next_twin_check:
             self._next_twin_check = now + TWIN_CHECK_S
             self.twin_gone = self.opened.simulated and not self.backend.twin_alive()

@@ -133,7 +133,7 @@ class Dialogs:
         """The 3-D mouse beside the window; with or without a rig."""
         if self.mouse is None:
             self.mouse = MouseWindow(controller.backend.client(), lambda: controller.rig, scheme,
-                                     lambda: self.open_guide("mouse"), self._parent)
+                                     lambda: self.open_guide("mouse"), self._parent, controller.clock)
             self.mouse.finished.connect(self._forget_mouse)
         self.mouse.show()
         self.mouse.raise_()

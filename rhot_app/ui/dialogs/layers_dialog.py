@@ -44,7 +44,7 @@ _LEGEND = ("1 is the link that nothing hides. A line is white beside the backgro
 
 
 class LayersDialog(QDialog):
-    """`step` is one turn of the timer."""
+    """`step` is one turn of the timer. `shown` is the drawing, `shown_of` its camera and state; None for none."""
 
     def __init__(self, controller: Controller, scheme: Scheme, open_guide: Callable[[], None],
                  parent: QWidget | None = None) -> None:
@@ -59,6 +59,7 @@ class LayersDialog(QDialog):
         self._job: Job | None = None
         self._drawn: tuple[object, ...] = ()
         self.shown: LayerPicture | None = None
+        self.shown_of: tuple[str, HandState] | None = None
         self.camera_box = QComboBox()
         self.camera_box.setToolTip("Whose picture is shown. Each camera has an order of its own.")
         self.camera_box.setAccessibleName("Camera")
@@ -121,8 +122,13 @@ class LayersDialog(QDialog):
             drawer, (state, preview) = self._drawer, wanted
             if self.shown is None:
                 self.sentence.setText(FIRST)
-            self._job = Job(lambda progress: drawer.draw(camera, state, preview), self._show, self._failed, None,
-                            self).start()
+            self._job = Job(lambda progress: drawer.draw(camera, state, preview),
+                            lambda drawn: self._show(drawn, (camera, state)), self._failed, None, self).start()
+
+    @property
+    def drawing(self) -> bool:
+        """Whether a drawing is under way."""
+        return self._job is not None
 
     def _wanted(self, preview: Preview | None) -> tuple[HandState, Preview | None] | None:
         """The newest picture with the state of its time; None without a hand."""
@@ -147,9 +153,9 @@ class LayersDialog(QDialog):
             self.camera_box.addItems([node.name for node in rig.nodes])
             self.camera_box.setCurrentIndex(max(self.camera_box.findText(before), 0))
 
-    def _show(self, drawn: LayerPicture | None) -> None:
+    def _show(self, drawn: LayerPicture | None, of: tuple[str, HandState] | None = None) -> None:
         self._job = None
-        self.shown = drawn
+        self.shown, self.shown_of = drawn, of
         self.picture.show_image(drawn)
         self.sentence.setText(NO_HAND if drawn is None else _LEGEND)
         lines = () if drawn is None else drawn.lines

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -78,7 +77,7 @@ class Recordings:
             return
         if self.dialog is not None:
             return
-        at_ns = time.monotonic_ns()  # the engine's clock too: it runs on this computer
+        at_ns = round(1e9 * self._controller.clock())
         self.dialog = BookmarkDialog(lambda text: self._set_bookmark(text, at_ns), window)
         self.dialog.finished.connect(self._forget_dialog)
 

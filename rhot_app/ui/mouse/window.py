@@ -46,15 +46,18 @@ class MouseWindow(QDialog):
     """`listener` is this window's own; `rig` gives the rig that is open. `step` is one turn of the timer."""
 
     def __init__(self, listener: Listener, rig: Callable[[], Rig | None], scheme: Scheme,
-                 open_guide: Callable[[], None], parent: QWidget | None = None) -> None:
+                 open_guide: Callable[[], None], parent: QWidget | None = None,
+                 clock: Callable[[], float] = time.monotonic) -> None:
+        """`clock` gives seconds."""
         super().__init__(parent)
+        self._clock = clock
         self.setWindowTitle("3-D mouse")
         self.setProperty("guide", "mouse")
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
         self.resize(*_SIZE)
         self._listener, self._rig, self._scheme = listener, rig, scheme
         self._followed: Rig | None = None
-        self._heard_s = time.monotonic()
+        self._heard_s = clock()
         self._told, self._told_s = "", -TOLD_S
         self.mouse = Mouse()
         self.state: MouseState | None = None
@@ -152,7 +155,7 @@ class MouseWindow(QDialog):
         if self._rig() is not self._followed:
             self._followed = self._rig()
             self.mouse = self._new_mouse()
-        now = time.monotonic()
+        now, drawing_s = self._clock(), time.monotonic()
         try:
             messages = self._listener.poll()
         except RhotError as exc:
@@ -166,9 +169,9 @@ class MouseWindow(QDialog):
         if self._rig() is None or now - self._heard_s > SILENCE_S:
             self.state = None
         self._show_words(now)
-        self.pacer.give_up(now)
-        if self.pacer.due(now) and self.view.isVisible():
-            self.pacer.begin(now)
+        self.pacer.give_up(drawing_s)
+        if self.pacer.due(drawing_s) and self.view.isVisible():
+            self.pacer.begin(drawing_s)
             self.view.show_mouse(self.state, self.pick, self.test)
 
     def _feed(self, hand: HandState) -> None:
@@ -180,7 +183,7 @@ class MouseWindow(QDialog):
             self.test.feed(self.state)
 
     def _tell(self, sentence: str) -> None:
-        self._told, self._told_s = sentence, time.monotonic()
+        self._told, self._told_s = sentence, self._clock()
 
     def _show_words(self, now: float) -> None:
         state = self.state

@@ -49,7 +49,7 @@ class JitterPlot(PlotPanel):
             entries.append(LegendEntry(short_name(marker.id), colour, dash))
         self.legend.set_entries(entries)
 
-    def _draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
+    def draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
         if rows.shape[1] != len(self._curves):
             rows = np.full((len(seconds), len(self._curves)), np.nan)
         for k, curve in enumerate(self._curves):
@@ -75,7 +75,7 @@ def _dotted(colour: str) -> QPen:
 
 
 class LatencyPlot(PlotPanel):
-    """One band per stage from the bottom up in the order of the way."""
+    """One of `bands` per stage from the bottom up in the order of the way."""
 
     term = "latency"
     title = "Latency by stage"
@@ -85,11 +85,11 @@ class LatencyPlot(PlotPanel):
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(scheme, ("p50 —", "p99 ┄"), "00.00", parent)
         self._edges = [pg.PlotCurveItem(connect="finite") for _ in range(len(STACKED) + 1)]
-        self._bands = [pg.FillBetweenItem(lower, upper) for lower, upper in zip(self._edges, self._edges[1:],
+        self.bands = [pg.FillBetweenItem(lower, upper) for lower, upper in zip(self._edges, self._edges[1:],
                                                                                 strict=False)]
         self._whole = (pg.PlotDataItem(connect="finite"), pg.PlotDataItem(connect="finite"))
         self._budget = pg.InfiniteLine(1e3 * BUDGET_S, angle=0)
-        for item in (*self._edges, *self._bands, *self._whole, self._budget):
+        for item in (*self._edges, *self.bands, *self._whole, self._budget):
             self.plot.addItem(item)
         self.legend.setToolTip("\n".join([f"{STAGES[stage]}: {tip(stage)}" for stage in STACKED] + [tip("budget")]))
         self._colour()
@@ -97,7 +97,7 @@ class LatencyPlot(PlotPanel):
     def _colour(self) -> None:
         for edge in self._edges:
             edge.setPen(None)
-        for band, colour in zip(self._bands, STAGE_COLOURS, strict=False):
+        for band, colour in zip(self.bands, STAGE_COLOURS, strict=False):
             fill = QColor(colour)
             fill.setAlpha(170)
             band.setBrush(fill)
@@ -110,7 +110,7 @@ class LatencyPlot(PlotPanel):
             *(LegendEntry(STAGES[stage], colour, band=True)
               for stage, colour in reversed(list(zip(STACKED, STAGE_COLOURS, strict=False))))])
 
-    def _draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
+    def draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
         stages = len(STACKED)
         if rows.shape[1] != len(LATENCY_COLUMNS):
             rows = np.full((len(seconds), len(LATENCY_COLUMNS)), np.nan)
@@ -164,7 +164,7 @@ class RatePlot(PlotPanel):
         self._bars.setOpts(brush=self._scheme.bad, pen=pg.mkPen(self._scheme.bad))
         self.legend.set_entries(entries)
 
-    def _draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
+    def draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
         if names != self._names and names:
             self._make_curves(names)
         if rows.shape[1] != len(self._names):

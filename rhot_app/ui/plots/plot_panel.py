@@ -48,6 +48,11 @@ class OverflowMarks:
         self._item.setData([{"pos": (peak.second, top), "brush": line.colour, "pen": line.colour,
                              "data": (line.name, peak.value)} for line, peak in found])
 
+    @property
+    def marks(self) -> list[tuple[float, float, str]]:
+        """Each triangle's place and colour."""
+        return [(point.pos().x(), point.pos().y(), point.brush().color().name()) for point in self._item.points()]
+
     def _words(self, x: float, y: float, data: tuple[str, float]) -> str:
         return f"{data[0]}: {data[1]:.3g} {self._unit}, above the axis"
 
@@ -202,7 +207,7 @@ class PlotHead(QWidget):
 
 
 class PlotPanel(QWidget):
-    """Base of the plots. A subclass draws in `_draw(seconds, rows)`; `refresh` gives it the window to show.
+    """Base of the plots. A subclass draws in `draw(seconds, rows)`; `refresh` gives it the window to show.
 
     While paused the window stands still; the data go on and are there again when the pause ends. `copied` confirms a
     copy with a sentence.
@@ -290,6 +295,11 @@ class PlotPanel(QWidget):
         self._redraw()
 
     @property
+    def seconds(self) -> Array:
+        """(n,) s, before now: the times of what the plot shows."""
+        return self._window[0]
+
+    @property
     def paused(self) -> bool:
         """Whether the plot stands still."""
         return self.pause_button.isChecked()
@@ -306,13 +316,13 @@ class PlotPanel(QWidget):
 
     def _redraw(self) -> None:
         seconds, rows, names = self._window
-        self._draw(seconds, rows, names)
+        self.draw(seconds, rows, names)
 
     def _colour(self) -> None:
         """Give the lines the scheme's colours."""
         raise TypeError(f"{type(self).__name__} has no colours")
 
-    def _draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
+    def draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
         """Draw `rows` (n, columns) over `seconds` (n,)."""
         raise TypeError(f"{type(self).__name__} does not draw")
 

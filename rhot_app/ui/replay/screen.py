@@ -175,7 +175,7 @@ class DifferencePlot(PlotPanel):
             entries.append(LegendEntry(finger, colour, dash))
         self.legend.set_entries(entries)
 
-    def _draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
+    def draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
         if rows.shape[1] != len(self._curves):
             rows = np.full((len(seconds), len(self._curves)), np.nan)
         for k, curve in enumerate(self._curves):

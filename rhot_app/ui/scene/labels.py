@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtCore import QLineF, QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QMatrix4x4, QPainter, QPen, QPixmap
 
 from rhot_app.state import Knowledge
@@ -141,6 +141,11 @@ class Legend:
         self._picture = QPixmap()
         self.rows: tuple[str, ...] = ()
 
+    @property
+    def size(self) -> QSizeF:
+        """Of the key as it was painted last, px."""
+        return self._picture.deviceIndependentSize()
+
     def paint(self, painter: QPainter, size: tuple[int, int], scheme: Scheme, text: str, tracker: str) -> None:
         """Into the lower left corner of a widget of that size, px; `text` is about the ellipsoids, "" for none;
         `tracker` is the name of what makes a hand of the markers."""
@@ -152,7 +157,7 @@ class Legend:
                          *_wrapped(text, QFontMetricsF(painter.font()), widest))
             self._key = key
             self._picture = _draw_key(scheme, self.rows, tracker, painter.font(), ratio)
-        painter.drawPixmap(QPointF(_PAD_PX, size[1] - self._picture.deviceIndependentSize().height() - _PAD_PX),
+        painter.drawPixmap(QPointF(_PAD_PX, size[1] - self.size.height() - _PAD_PX),
                            self._picture)
 
 

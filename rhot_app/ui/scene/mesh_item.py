@@ -125,6 +125,16 @@ class MeshItem(GLGraphicsItem):
         self._dirty = True
         self._see_through = bool((colours[:, 3] < 255).any())
 
+    @property
+    def vertices(self) -> Array:
+        """(N, 3) as they were set last; none before."""
+        return np.empty((0, 3)) if self._arrays is None else self._arrays[0].astype(np.float64)
+
+    @property
+    def colours(self) -> Colours:
+        """(N, 4) bytes as they were set last; none before."""
+        return np.empty((0, 4), np.uint8) if self._arrays is None else self._arrays[2].astype(np.uint8)
+
     def initializeGL(self) -> None:  # noqa: N802 (Qt's name)
         """Make program and buffers in the current context, which may be a new one after the window moved."""
         self._program = _build_program()

@@ -54,7 +54,8 @@ class SceneView(GLViewWidget):
     """`show_rig` sets what does not move, `show_state` poses the rest.
 
     Left drag turns, middle drag or Ctrl + left drag moves, the wheel zooms, the arrow keys turn. The mouse held still
-    over a marker or joint tells how well it is known.
+    over a marker or joint tells how well it is known. `actors` move; `second` are those of the second rig; None for
+    none. `legend` is the key of colours and ellipsoids.
     """
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
@@ -68,12 +69,12 @@ class SceneView(GLViewWidget):
         self._by_calibration = KNOWN_EXACTLY
         self._state: HandState | None = None
         self._in_rig: HandState | None = None
-        self._actors: Actors | None = None
+        self.actors: Actors | None = None
         self._second_rig: Rig | None = None
         self._second_state: HandState | None = None
-        self._second: Actors | None = None
+        self.second: Actors | None = None
         self._labels = LabelPainter()
-        self._legend = Legend()
+        self.legend = Legend()
         self._show_labels = True
         self._ellipsoids: EllipsoidChoice | None = EllipsoidChoice()
         self._cameras: list[tuple[str, Array]] = []
@@ -114,6 +115,21 @@ class SceneView(GLViewWidget):
         self._pose()
         self.update()
 
+    @property
+    def state(self) -> HandState | None:
+        """The state shown, in the rig's frame; None for none."""
+        return self._in_rig
+
+    @property
+    def scheme(self) -> Scheme:
+        """The colours."""
+        return self._scheme
+
+    @property
+    def ellipsoids(self) -> EllipsoidChoice | None:
+        """Which ellipsoids of uncertainty are drawn, None for none."""
+        return self._ellipsoids
+
     def show_names(self, visible: bool) -> None:
         """Marker names beside the markers, or not."""
         self._show_labels = visible
@@ -122,8 +138,8 @@ class SceneView(GLViewWidget):
     def show_ellipsoids(self, choice: EllipsoidChoice | None) -> None:
         """Which ellipsoids of uncertainty are drawn, None for none."""
         self._ellipsoids = choice
-        if self._actors is not None:
-            self._actors.ellipsoids = choice
+        if self.actors is not None:
+            self.actors.ellipsoids = choice
         self._pose()
         self.update()
 
@@ -191,10 +207,18 @@ class SceneView(GLViewWidget):
         found = spots(self._in_rig, hand_names(self._rig)) if self._in_rig is not None else []
         if not found:
             return ""
-        places = to_display(camera_like(np.array([spot.place for spot in found]), self._up))
-        pixels = pixels_of(places, self._projection(), (self.width(), self.height()))
-        number = nearest(pixels, (at.x(), at.y()))
+        number = nearest(self.to_widget(np.array([spot.place for spot in found])), (at.x(), at.y()))
         return "" if number is None else found[number].text(self._by_calibration)
+
+    def to_widget(self, places: Array) -> Array:
+        """(N, 2) px of the widget, NaN behind the viewer, of places (N, 3) m in the rig's frame."""
+        return pixels_of(to_display(camera_like(places, self._up)), self._projection(), (self.width(), self.height()))
+
+    def marker_labels(self) -> tuple[Array, list[str]]:
+        """Where the markers' names stand, (N, 3) m in the scene's frame, and these names; none without a state."""
+        if self._state is None or not self._show_labels:
+            return np.empty((0, 3)), []
+        return to_display(self._state.marker_positions), [short_name(name) for name in self._state.marker_ids]
 
     def _projection(self) -> QMatrix4x4:
         return self.projectionMatrix(self.getViewport(), self.getViewport()) * self.viewMatrix()
@@ -214,15 +238,15 @@ class SceneView(GLViewWidget):
         self.setBackgroundColor(pg.mkColor(self._scheme.scene))
         self._cameras = []
         self._add_stage()
-        self._actors = None
+        self.actors = None
         if self._rig is not None:
             self._add_cameras(self._rig)
-            self._actors = Actors(self._rig, self._scheme)
-            self._actors.ellipsoids = self._ellipsoids
-            for item in self._actors.items:
+            self.actors = Actors(self._rig, self._scheme)
+            self.actors.ellipsoids = self._ellipsoids
+            for item in self.actors.items:
                 self.addItem(item)
-        self._second = second_actors(self._second_rig, self._scheme) if self._second_rig is not None else None
-        for item in self._second.items if self._second is not None else ():
+        self.second = second_actors(self._second_rig, self._scheme) if self._second_rig is not None else None
+        for item in self.second.items if self.second is not None else ():
             self.addItem(item)
         self._pose()
         self.update()
@@ -237,7 +261,7 @@ class SceneView(GLViewWidget):
         return "-y" if self._rig is None else self._rig.up
 
     def _pose(self) -> None:
-        for actors, state in ((self._actors, self._state), (self._second, self._second_state)):
+        for actors, state in ((self.actors, self._state), (self.second, self._second_state)):
             if actors is not None and state is not None:
                 actors.pose(state)
             elif actors is not None:
@@ -273,14 +297,14 @@ class SceneView(GLViewWidget):
             self._labels.paint(painter, matrix, size, places, texts, style)
         self._labels.paint(painter, matrix, size, np.array([place for _, place in self._cameras]),
                            [name for name, _ in self._cameras], muted, lift=10.0)
-        if self._state is not None and self._show_labels:
+        places, names = self.marker_labels()
+        if names:
             style = TextStyle(self._scheme.text, small=False, plate=self._scheme.scene)
-            self._labels.paint_apart(painter, matrix, size, to_display(self._state.marker_positions),
-                                     [short_name(name) for name in self._state.marker_ids], style)
-        if self._actors is not None:
-            text = ellipsoid_text(self._ellipsoids, cut=self._state is not None and self._actors.cut,
+            self._labels.paint_apart(painter, matrix, size, places, names, style)
+        if self.actors is not None:
+            text = ellipsoid_text(self._ellipsoids, cut=self._state is not None and self.actors.cut,
                                   pictures_alone=self._by_calibration.sd_m != 0.0)
-            self._legend.paint(painter, size, self._scheme, text, self.tracker_word)
+            self.legend.paint(painter, size, self._scheme, text, self.tracker_word)
 
 
 def _of_rig(state: HandState | None, rig: Rig | None) -> HandState | None:
@@ -291,31 +315,36 @@ def _of_rig(state: HandState | None, rig: Rig | None) -> HandState | None:
 # -- what moves in the scene -------------------------------------------------------------------------------------------
 
 class Actors:
-    """The moving items of one rig in one colour scheme. `items` are to be added to the view.
+    """The moving items of one rig in one colour scheme, by its `hands`. `items` are to be added to the view.
 
     `ellipsoids` chooses what is drawn of the uncertainty, None for nothing. `opacity` 0..1 is of everything.
     """
 
     def __init__(self, rig: Rig, scheme: Scheme, opacity: float = 1.0) -> None:
-        self._hands = tuple(HandActors(hand, scheme, opacity) for hand in hands_of(rig))
+        self.hands = tuple(HandActors(hand, scheme, opacity) for hand in hands_of(rig))
         self._objects = ObjectActors(rig, scheme, opacity)
         self.ellipsoids: EllipsoidChoice | None = EllipsoidChoice()
-        self.items = (*(item for hand in self._hands for item in hand.items), *self._objects.items)
+        self.items = (*(item for hand in self.hands for item in hand.items), *self._objects.items)
+
+    @property
+    def visible(self) -> bool:
+        """Whether anything is shown."""
+        return any(item.visible() for item in self.items)
 
     @property
     def cut(self) -> bool:
         """Whether an ellipsoid is drawn smaller than it is."""
-        return self.ellipsoids is not None and any(hand.cut for hand in self._hands)
+        return self.ellipsoids is not None and any(hand.cut for hand in self.hands)
 
     def hide(self) -> None:
         """Show nothing until the next pose."""
-        for hand in self._hands:
+        for hand in self.hands:
             hand.hide()
         self._objects.hide()
 
     def pose(self, state: HandState) -> None:
         """Show everything at a state of this rig."""
-        for hand in self._hands:
+        for hand in self.hands:
             hand.pose(state, self.ellipsoids)
         self._objects.pose(state.objects)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from person import NONE, Person, wait
 from PySide6.QtCore import Qt
-from screen_pictures import SIZE, check
+from screen_pictures import SIZE
 
 
 class Hands(Person):
@@ -30,7 +30,7 @@ class Hands(Person):
 
     def keep(self, name, least_colours=20):
         """Take the picture of the page as it is now, for the guide."""
-        check(name, self.window.grab().toImage(), least_colours)
+        super().keep(name, least_colours, lambda: self.window.grab().toImage(), settle_s=0.4)
 
     def next(self):
         """Click Next once it can be clicked."""
