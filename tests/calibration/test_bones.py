@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,16 +55,16 @@ def rich(hand: HandAnatomy) -> MarkerTracks:
     return record(hand, RICH, 2, rate_hz=40.0, sloppiness=CAPTURED)
 
 
-@pytest.fixture(scope="module")
-def few_instants() -> pytest.MonkeyPatch:
+@pytest.fixture(scope="module", autouse=True)
+def few_instants() -> Iterator[None]:
     """Solve from a part of the instants: less exact, and quick."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(hand_fit, "INSTANTS", 100)
-        yield patch
+        patch.setattr(hand_fit, "INSTANTS", 50)
+        yield
 
 
 @pytest.fixture(scope="module")
-def rich_report(rich: MarkerTracks, few_instants: pytest.MonkeyPatch) -> BonesReport:
+def rich_report(rich: MarkerTracks) -> BonesReport:
     return solve_bones(rich, base_hand("left"))
 
 
@@ -85,16 +86,14 @@ def test_the_truth_lies_within_what_is_stated(hand: HandAnatomy, rich_report: Bo
     assert len(rich_report.rigid) == 3 and spots["palm_1"].place == "palm"
 
 
-def test_a_right_hand_is_not_taken_for_a_left_one(rich: MarkerTracks, few_instants: pytest.MonkeyPatch) -> None:
+def test_a_right_hand_is_not_taken_for_a_left_one(rich: MarkerTracks) -> None:
     short = left_out_of_right(rich).within(0.0, 25.0)
-    few_instants.setattr(hand_fit, "INSTANTS", 40)
     report = solve_bones(short, base_hand("left"))
-    few_instants.setattr(hand_fit, "INSTANTS", 100)
     assert "wrong_side" in report.verdict.codes and not report.verdict.acceptable
     assert "--side right" in report.verdict.findings[0].sentence
 
 
-def test_two_halves_of_a_real_hand_agree(few_instants: pytest.MonkeyPatch) -> None:
+def test_two_halves_of_a_real_hand_agree() -> None:
     if not QUALISYS.exists():
         pytest.skip(f"{QUALISYS} is not there")
     points = read_qualisys(QUALISYS)
@@ -120,13 +119,11 @@ def test_six_markers_show_the_size_and_no_single_bone() -> None:
     assert 0.0 < report.size_std < 0.05
 
 
-def test_a_hand_that_holds_still_is_told_to_move(few_instants: pytest.MonkeyPatch) -> None:
+def test_a_hand_that_holds_still_is_told_to_move() -> None:
     moving = record(person(3), RICH, 3, seconds=30.0, rate_hz=20.0)
     rng = np.random.default_rng(1)
     still = replace(moving, positions=moving.positions[200] + rng.normal(0, 0.4e-3, moving.positions.shape))
-    few_instants.setattr(hand_fit, "INSTANTS", 40)
     report = solve_bones(still, base_hand())
-    few_instants.setattr(hand_fit, "INSTANTS", 100)
     told = [finding.sentence for finding in report.verdict.findings if finding.code == "finger_still"]
     assert len(told) == 5 and all("bend it further" in sentence for sentence in told)
     assert sum(bone.known is Known.PRIOR for bone in report.bones) >= 10
@@ -142,16 +139,14 @@ def test_a_few_seconds_are_too_short() -> None:
         solve_bones(record(person(3), RICH, 3, seconds=1.0).within(5.0, 6.0), base_hand())
 
 
-def test_markers_with_swapped_names_are_found_out(few_instants: pytest.MonkeyPatch) -> None:
+def test_markers_with_swapped_names_are_found_out() -> None:
     tracks = record(person(4), RICH, 4, seconds=30.0, rate_hz=20.0)
     order = list(range(len(RICH)))
     names = [place.name for place in RICH]
     for one, other in (("index_proximal", "little_proximal"), ("ring_proximal", "ring_medial")):
         a, b = names.index(one), names.index(other)
         order[a], order[b] = b, a
-    few_instants.setattr(hand_fit, "INSTANTS", 40)
     report = solve_bones(replace(tracks, positions=tracks.positions[:, order]), base_hand())
-    few_instants.setattr(hand_fit, "INSTANTS", 100)
     assert not report.verdict.acceptable
     told = {finding.code: finding.sentence for finding in report.verdict.findings}
     assert "index_proximal" in told["misplaced"] and "little_proximal" in told["misplaced"]
