@@ -53,7 +53,7 @@ class FakeBackend:
     def __init__(self, engine: FakeEngine | None = None) -> None:
         self.engine = engine or FakeEngine(running=False)
         self.calls: list[str] = []
-        self.already_running = False
+        self.already_running, self.looks = False, 0
         self.ours = True
         self.alive = True
         self.pace: TwinPace | None = None
@@ -78,6 +78,7 @@ class FakeBackend:
         return FakeClient(self.engine)
 
     def found(self) -> bool:
+        self.looks += 1
         return self.already_running
 
     def attach(self, report: Report) -> Opened:

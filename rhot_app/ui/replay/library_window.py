@@ -134,6 +134,11 @@ class LibraryWindow(QDialog):
 
         self._listing = Job(lambda progress: self.library.entries(), show, fail, None, self).start()
 
+    @property
+    def listing(self) -> bool:
+        """Whether the folder is being listed."""
+        return self._listing is not None
+
     def _fill(self, entries: list[Entry]) -> None:
         chosen = self.table.chosen
         self.table.show_entries(entries)

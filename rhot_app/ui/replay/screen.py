@@ -114,7 +114,7 @@ class ReplayScreen(QWidget):
             self._stale_scene = self._stale_panels = self._stale_plots = True
             self.timeline.update()
             self.transport.show_replay(replay)
-        self._refresh_scene(replay, now_s)
+        self._refresh_scene(replay)
         if self._stale_panels and now_s >= self._next_panels:
             self._stale_panels, self._next_panels = False, now_s + PANEL_S
             self.state, _ = replay.shown()
@@ -127,7 +127,8 @@ class ReplayScreen(QWidget):
                 self.difference.refresh(replay.differences, replay.position_ns)
         return moved
 
-    def _refresh_scene(self, replay: Replay, now_s: float) -> None:
+    def _refresh_scene(self, replay: Replay) -> None:
+        now_s = time.monotonic()
         self.pacer.give_up(now_s)
         if not self._stale_scene or not self.pacer.due(now_s):
             return

@@ -46,9 +46,11 @@ class ReplayWindow(QMainWindow):
     """`open` tracks a recording and shows it. `tick` is one turn of the timer, so that tests can turn by hand."""
 
     def __init__(self, settings: Settings, scheme: Scheme, states: Path | None = None,
-                 parent: QWidget | None = None, make_solver: Callable[[], Solver] = Solver) -> None:
-        """`states`: the folder for the states of open recordings; `make_solver`: what tracks them."""
+                 parent: QWidget | None = None, make_solver: Callable[[], Solver] = Solver,
+                 clock: Callable[[], float] = time.monotonic) -> None:
+        """`states`: the folder for the states of open recordings; `make_solver`: what tracks them; `clock`: seconds."""
         super().__init__(parent)
+        self._clock = clock
         self.setObjectName("replay window")
         self.setWindowTitle("RHOT replay")
         self.setProperty("guide", "recording")
@@ -200,7 +202,7 @@ class ReplayWindow(QMainWindow):
     def toggle(self) -> None:
         """Play or pause."""
         if self.replay is not None:
-            self.replay.player.toggle(time.monotonic())
+            self.replay.player.toggle(self._clock())
 
     def step(self, count: int) -> None:
         """So many states on, or back when negative."""
@@ -220,7 +222,7 @@ class ReplayWindow(QMainWindow):
     def set_speed(self, speed: float) -> None:
         """Times real time."""
         if self.replay is not None:
-            self.replay.player.set_speed(speed, time.monotonic())
+            self.replay.player.set_speed(speed, self._clock())
 
     def _loop(self, what: str) -> None:
         if self.replay is not None:
@@ -253,7 +255,7 @@ class ReplayWindow(QMainWindow):
 
     def tick(self) -> None:
         """Play on, and show what is due."""
-        now = time.monotonic()
+        now = self._clock()
         self.advice.show_notices(self._notices(now))
         if self.replay is None:
             return
@@ -266,7 +268,7 @@ class ReplayWindow(QMainWindow):
 
     def tell(self, level: Level, sentence: str) -> None:
         """Show a sentence for a while."""
-        self.passing.show(Notice(level, sentence), time.monotonic())
+        self.passing.show(Notice(level, sentence), self._clock())
 
     def _notices(self, now: float) -> list[Notice]:
         return [*self.passing.current(now), *lasting_notices(self.replay, working=self.work.running)]

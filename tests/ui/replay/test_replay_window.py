@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from patience import PATIENCE_S
+from fake_backend import InProcessSolver
+from person import Person
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
+from PySide6.QtWidgets import QFileDialog, QLineEdit
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark, read_bookmarks
@@ -25,42 +26,36 @@ from rhot_app.ui.replay.window import ReplayWindow
 from rhot_node.files import resource_path
 
 
-class Desk:
-    """A replay window and a person's hands."""
+class Desk(Person):
+    """A person in front of a replay's window, and time that passes at once."""
 
     def __init__(self, folder: Path) -> None:
         self.states = folder / "states"
-        self.window = ReplayWindow(Settings(folder / "app.ini"), DARK, self.states)
+        self._passed_s = 0.0
+        super().__init__(ReplayWindow(Settings(folder / "app.ini"), DARK, self.states, make_solver=InProcessSolver,
+                                      clock=lambda: time.monotonic() + self._passed_s))
         self.window.parts.pacer = FramePacer(most_hz=8.0)
-        self.window.show()
-        self.window.activateWindow()
-        assert QTest.qWaitForWindowActive(self.window)
 
-    def until(self, condition: Callable[[], Any]) -> None:
-        end = time.monotonic() + PATIENCE_S
-        while time.monotonic() < end and not condition():
-            QTest.qWait(10)
-        assert condition()
+    def let_pass(self, seconds: float) -> None:
+        self._passed_s += seconds
+        self.window.tick()
+
+    def told(self) -> Any:
+        return self.window.advice.texts
+
+    def said(self, *words: str) -> bool:
+        """Whether one of the sentences at the bottom has all these words."""
+        return any(all(word in text for word in words) for text in self.window.advice.texts)
 
     def open(self, path: Path) -> None:
         self.window.open(path)
-        self.until(lambda: self.window.replay is not None and not self.window.work.running)
-
-    def press(self, key: Qt.Key) -> None:
-        QTest.keyClick(self.window, key)
-
-    def click(self, widget: QWidget, at: QPoint | None = None) -> None:
-        assert widget.isVisible()
-        QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=at or widget.rect().center())
+        self.until(lambda: not self.window.work.running)
+        assert self.window.replay is not None and self.window.replay.path == path
 
     def scrub(self, begin_s: float, *ends_s: float) -> None:
         """Drag over the timeline."""
         line = self.window.parts.timeline
-        at = [QPoint(round(line.x_of(s)), FLAG_PX + 10) for s in (begin_s, *ends_s)]
-        QTest.mousePress(line, Qt.MouseButton.LeftButton, pos=at[0])
-        for place in at[1:]:
-            QTest.mouseMove(line, place)
-        QTest.mouseRelease(line, Qt.MouseButton.LeftButton, pos=at[-1])
+        self.drag(line, *(QPoint(round(line.x_of(s)), FLAG_PX + 10) for s in (begin_s, *ends_s)))
 
     @property
     def position_s(self) -> float:
@@ -69,7 +64,7 @@ class Desk:
     @property
     def drawn_ns(self) -> int | None:
         """The moment of the hand in the scene."""
-        state = self.window.parts.scene._in_rig
+        state = self.window.parts.scene.state
         return None if state is None else state.t_master_ns
 
     def number(self) -> int:
@@ -79,7 +74,7 @@ class Desk:
 
 @pytest.fixture(scope="module")
 def one_desk(themed: Any, tmp_path_factory: pytest.TempPathFactory, grasp_log: Path) -> Iterator[Desk]:
-    """One window for all tests; the process that tracks starts once."""
+    """One window for all tests."""
     folder = tmp_path_factory.mktemp("desk")
     desk = Desk(folder)
     log = folder / "grasp.rhotlog"
@@ -119,11 +114,11 @@ def test_a_recording_is_shown_with_its_name(desk):
 
 def test_space_plays_and_pauses(desk):
     desk.press(Qt.Key.Key_Space)
-    desk.until(lambda: desk.position_s > 0.3)
-    desk.until(lambda: desk.window.toolbar.badge.word in ("TRACKING", "PARTIAL"))
+    desk.let_pass(0.5)
+    desk.until(lambda: desk.position_s > 0.5 and desk.window.toolbar.badge.word in ("TRACKING", "PARTIAL"))
     desk.press(Qt.Key.Key_Space)
     stood = desk.position_s
-    QTest.qWait(80)
+    desk.let_pass(0.5)
     assert desk.position_s == stood
     desk.until(lambda: desk.drawn_ns == desk.window.replay.run.tracked.times_ns[desk.window.replay.player.number])
 
@@ -133,6 +128,9 @@ def test_it_plays_to_the_end_and_begins_again(desk):
     box.setCurrentIndex(box.findData(4.0))
     box.activated.emit(box.currentIndex())
     desk.click(desk.window.parts.transport.play_button)
+    desk.let_pass(0.5)
+    assert 2.0 < desk.position_s < 3.9, "four times as fast"
+    desk.let_pass(0.6)
     desk.until(lambda: desk.window.replay.player.at_end)
     desk.until(lambda: not desk.window.parts.transport.is_playing)
     desk.click(desk.window.parts.transport.play_button)
@@ -176,9 +174,10 @@ def test_scrubbing_goes_there_at_once(desk):
     assert abs(desk.position_s - 3.0) < 0.02
     number = desk.window.replay.player.number
     desk.until(lambda: desk.drawn_ns == desk.window.replay.run.tracked.times_ns[number])
-    desk.until(lambda: desk.window.parts.jitter._window[0].size and desk.window.parts.jitter._window[0][0] > -3.2)
+    jitter = desk.window.parts.jitter
+    desk.until(lambda: jitter.seconds.size and jitter.seconds[0] > -3.2)
     desk.scrub(0.5)
-    desk.until(lambda: desk.window.parts.jitter._window[0].size and desk.window.parts.jitter._window[0][0] > -0.6)
+    desk.until(lambda: jitter.seconds.size and jitter.seconds[0] > -0.6)
 
 
 def test_a_range_is_repeated(desk):
@@ -190,11 +189,15 @@ def test_a_range_is_repeated(desk):
     assert abs(begin - 1.0) < 0.02 and abs(end - 1.4) < 0.02
     desk.press(Qt.Key.Key_Space)
     seen = []
-    desk.until(lambda: seen.append(desk.position_s) or any(b < a for a, b in itertools.pairwise(seen)))
+    for _ in range(10):
+        desk.let_pass(0.1)
+        seen.append(desk.position_s)
+    assert any(b < a for a, b in itertools.pairwise(seen))
     assert min(seen) >= begin - 1e-9 and max(seen) <= end + 1e-9
     desk.until(desk.window.parts.transport.loop_clear_button.isEnabled)
     desk.click(desk.window.parts.transport.loop_clear_button)
-    desk.until(lambda: desk.position_s > end + 0.05)
+    desk.let_pass(0.5)
+    assert desk.position_s > end + 0.05
 
 
 def test_a_bookmark_is_set_found_and_removed(desk):
@@ -232,7 +235,7 @@ def test_a_bookmark_that_cannot_be_written_is_said(desk, monkeypatch):
     edit = desk.window.bookmarks.dialog.findChild(QLineEdit)
     QTest.keyClicks(edit, "x")
     QTest.keyClick(edit, Qt.Key.Key_Return)
-    desk.until(lambda: "the disk is full" in desk.window.advice.texts)
+    desk.until(lambda: desk.said("disk is full"))
     assert desk.window.replay.bookmarks == []
 
 
@@ -246,15 +249,15 @@ def test_two_runs_are_compared_side_by_side(desk):
     assert window.replay.run.rig.tracker.kind == "classic" and window.replay.second.rig.tracker.kind == "estimator"
     desk.scrub(2.5)
     desk.until(lambda: desk.drawn_ns == window.replay.run.tracked.times_ns[window.replay.player.number])
-    first, second = (actors._hands[0].items[3] for actors in (window.parts.scene._actors, window.parts.scene._second))
+    first, second = (actors.hands[0].items[3] for actors in (window.parts.scene.actors, window.parts.scene.second))
     assert first.visible() and second.visible()
-    assert 0 < second._arrays[2][:, 3].max() < first._arrays[2][:, 3].max()
-    assert abs(np.mean(first._arrays[0] - second._arrays[0])) < 0.02
+    assert 0 < second.colours[:, 3].max() < first.colours[:, 3].max()
+    assert abs(np.mean(first.vertices - second.vertices)) < 0.02
     desk.until(window.parts.difference.isVisible)
     desk.until(lambda: [values[0] != "–" for values in window.parts.difference.legend.values] == [True] * 5)
-    desk.until(lambda: "Solid: as recorded. Blue and translucent: estimator." in window.advice.texts)
+    desk.until(lambda: desk.said("Solid: as recorded", "translucent: estimator"))
     window.toolbar.alone.trigger()
-    assert window.parts.scene._second is None and window.replay.second is None
+    assert window.parts.scene.second is None and window.replay.second is None
     assert not window.parts.difference.isVisible()
 
 
@@ -270,7 +273,7 @@ def test_it_is_tracked_again_with_another_hand_at_the_same_moment(desk, tmp_path
     desk.click(window.dialog.start_button)
     desk.until(lambda: window.replay.choice.hand is not None)
     assert window.replay.run.rig.hand == load_hand(path) and abs(window.replay.position_ns - at_ns) < 2
-    desk.until(lambda: "Tracked left.json." in window.advice.texts[0])
+    desk.until(lambda: desk.said("Tracked", "left.json"))
     window.toolbar.again.trigger()
     desk.click(window.dialog.start_button)
     desk.until(lambda: window.replay.choice.hand is None)
@@ -284,7 +287,7 @@ def test_a_rig_file_that_is_none_is_said_and_the_run_stays(desk, tmp_path, monke
     window.toolbar.again.trigger()
     desk.click(window.dialog.rig_choice.choose_button)
     desk.click(window.dialog.start_button)
-    desk.until(lambda: any(str(path) in text for text in window.advice.texts))
+    desk.until(lambda: desk.said(str(path)))
     assert window.replay.run is before
 
 
@@ -294,8 +297,8 @@ def test_tracking_can_be_cancelled(desk):
     desk.click(window.dialog.start_button)
     desk.click(window.strip.cancel_button)
     desk.until(lambda: not window.strip.isVisible())
-    QTest.qWait(100)
-    assert window.replay.run is before and not list(desk.states.iterdir())
+    desk.until(lambda: not list(desk.states.iterdir()))
+    assert window.replay.run is before
 
 
 def test_files_that_are_no_recordings_are_said(desk, tmp_path):
@@ -303,46 +306,34 @@ def test_files_that_are_no_recordings_are_said(desk, tmp_path):
     foreign = tmp_path / "notes.txt"
     foreign.write_text("shopping")
     window.open(foreign)
-    desk.until(lambda: any("notes.txt: this is not a raw log" in text for text in window.advice.texts))
+    desk.until(lambda: desk.said("notes.txt", "raw log"))
     assert window.replay.path == before
 
 
 def test_a_torn_recording_is_played_and_said(desk, log):
     before = desk.window.replay.path
     log.write_bytes(log.read_bytes()[:-9])
-    desk.window.open(log)
-    desk.until(lambda: desk.window.replay.path == log)
-    desk.until(lambda: any("are torn" in text for text in desk.window.advice.texts))
+    desk.open(log)
+    desk.until(lambda: desk.said("torn"))
     desk.press(Qt.Key.Key_End)
     desk.until(lambda: desk.drawn_ns is not None)
-    desk.window.open(before)
-    desk.until(lambda: desk.window.replay.path == before)
+    desk.open(before)
 
 
 def test_bookmarks_of_the_recording_are_there(desk, log):
     before, first_ns = desk.window.replay.path, int(desk.window.replay.run.tracked.times_ns[0])
     append_bookmark(log, Bookmark(first_ns + 1_500_000_000, "set while recording"))
-    desk.window.open(log)
-    desk.until(lambda: desk.window.replay.path == log)
-    assert desk.window.toolbar.menu.actions()[0].text() == "0:01.50  set while recording"
-    desk.window.open(before)
-    desk.until(lambda: desk.window.replay.path == before)
+    desk.open(log)
+    assert desk.window.toolbar.menu.actions()[0].text().split("  ") == ["0:01.50", "set while recording"]
+    desk.open(before)
 
 
 def test_the_window_stays_quick(desk):
     """No tick may hold the window for long; other programs may hold it."""
-    costs, window = [], desk.window
-    tick = window.tick
-
-    def timed():
-        begin = time.thread_time()
-        tick()
-        costs.append(time.thread_time() - begin)
-
+    costs = []
     desk.press(Qt.Key.Key_Space)
-    window._timer.timeout.disconnect()
-    window._timer.timeout.connect(timed)
-    desk.until(lambda: len(costs) >= 30)
-    window._timer.timeout.disconnect()
-    window._timer.timeout.connect(tick)
+    for _ in range(30):
+        begin = time.thread_time()
+        desk.let_pass(0.1)
+        costs.append(time.thread_time() - begin)
     assert sorted(costs)[len(costs) // 2] < 0.05
