@@ -18,32 +18,37 @@ QUICK = ("evaluate", "--compare", "--sketched", "--trackers", "classic", "--moti
          "--seconds", "1.6")
 
 
-def test_a_comparison_prints_tables_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*QUICK, "--logs", str(tmp_path / "logs")]) == 0
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return str(tmp_path_factory.mktemp("logs") / "logs")
+
+
+def test_a_comparison_prints_tables_and_json(logs: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*QUICK, "--logs", logs]) == 0
     printed = capsys.readouterr()
     table, legend, honesty = printed.out.split("\n\n")
     assert [line.split()[0] for line in table.splitlines()[2:]] == ["rest"] * 3 + ["pinch"] * 3
     assert legend.startswith("Root mean squares") and honesty.startswith("NEES")
     assert "comparing: done in" in printed.err
-    assert main([*QUICK, "--logs", str(tmp_path / "logs"), "--json"]) == 0
+    assert main([*QUICK, "--logs", logs, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["outdated"] == 0 and len(found["runs"]) == 4
     assert 0.0 < found["motions"]["rest"]["classic"]["tip_visible_mm"] < 2.0
     assert found["honesty"]["rest"]["classic"]["tips"]["average"] is None
 
 
-def test_ratios_to_a_baseline_are_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*QUICK, "--logs", str(tmp_path / "logs"), "--json"]) == 0
+def test_ratios_to_a_baseline_are_printed(logs: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*QUICK, "--logs", logs, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     kept = {motion: trackers[list(trackers)[-1]] for motion, trackers in found["motions"].items()}
     baseline = tmp_path / "baseline.json"
     baseline.write_text(json.dumps({"tracker": "the same", "motions": kept}))
-    assert main([*QUICK, "--logs", str(tmp_path / "logs"), "--baseline", str(baseline)]) == 0
+    assert main([*QUICK, "--logs", logs, "--baseline", str(baseline)]) == 0
     rest = next(line for line in capsys.readouterr().out.split("over the baseline")[1].splitlines()
                 if line.startswith("rest"))
     assert rest.split()[1] == "1.00"
     baseline.write_text("[]")
-    assert main([*QUICK, "--logs", str(tmp_path / "logs"), "--baseline", str(baseline)]) == 2
+    assert main([*QUICK, "--logs", logs, "--baseline", str(baseline)]) == 2
     assert "not a baseline" in capsys.readouterr().err
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
+import runpy
 import sys
 from pathlib import Path
+
+import pytest
 
 from rhot_app.evaluation.compare import legend, run_table
 
@@ -26,10 +28,14 @@ def test_the_legend_tells_of_the_columns_that_were_shown_once() -> None:
     assert legend([{"estimator": {"starts": 3.0}}]) == ""
 
 
-def test_the_command_says_seeds_motion_and_markers(tmp_path: Path) -> None:
-    done = subprocess.run([sys.executable, str(BENCHMARK), "--only", "blind", "wrist", "--sketched", "--seeds", "2",
-                           "--seed", "7", "--motion", "wave", "--seconds", "5", "--logs", str(tmp_path)],
-                          capture_output=True, text=True, timeout=240, check=True)
-    assert "blind: wave, 5 s, seeds 7 to 8, rhot6, sketched" in done.stdout
-    assert "wrist: wave, 5 s, seeds 7 to 8, rhot6, sketched" in done.stdout
-    assert "back_after_s" in done.stdout and "palm turned off the truth" in done.stdout
+def test_the_command_says_seeds_motion_and_markers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                   capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "argv", [str(BENCHMARK), "--only", "blind", "wrist", "--sketched", "--seeds", "2",
+                                      "--seed", "7", "--motion", "wave", "--seconds", "3.5", "--logs", str(tmp_path)])
+    with pytest.raises(SystemExit) as end:
+        runpy.run_path(str(BENCHMARK), run_name="__main__")
+    printed = capsys.readouterr().out
+    assert end.value.code == 0
+    assert "blind: wave, 3.5 s, seeds 7 to 8, rhot6, sketched" in printed
+    assert "wrist: wave, 3.5 s, seeds 7 to 8, rhot6, sketched" in printed
+    assert "back_after_s" in printed and "palm turned off the truth" in printed
