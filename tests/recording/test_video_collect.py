@@ -35,7 +35,7 @@ from rhot_node.wire.messages import Observations
 pytestmark = pytest.mark.timeout(READY_S + 100.0)
 
 NAME = "20261124T231500Z-5f3a9c01"
-FRAMES = 60
+FRAMES = 30
 
 
 class Setup:
@@ -104,7 +104,7 @@ def test_a_video_comes_whole_though_its_node_dies_on_the_way(setup: Setup, capsy
             setup.node.end(signal.SIGKILL)
             setup.node = None
     with pytest.raises(RecordingError, match="goes on where it was cut off"):
-        setup.collect(patience_s=1.0, progress=kill)
+        setup.collect(patience_s=0.3, progress=kill)
     original = (setup.folder / f"{NAME}.avi").read_bytes()
     came = part.read_bytes()
     assert 0.3 * len(original) < len(came) < len(original) and original.startswith(came) and not target.exists()
