@@ -22,6 +22,7 @@ from PySide6.QtWidgets import QApplication  # noqa: E402
 
 QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
 
+from rhot_app.ui.backend import session  # noqa: E402
 from rhot_app.ui.backend.solver import Solver  # noqa: E402
 from rhot_app.ui.common.controller import Controller  # noqa: E402
 from rhot_app.ui.common.settings import Settings  # noqa: E402
@@ -59,6 +60,11 @@ class Bench(Person):
 
     def told(self) -> Any:
         return self.window.toolbar.badge.word, self.window.advice.texts
+
+    def close_rig(self) -> None:
+        """Back to the first page."""
+        self.window.actions_.close_rig.trigger()
+        self.until(lambda: self.window.welcome.twin_button.isVisible() and not self.controller.working)
 
     def see_newer_states(self) -> None:
         """Two states that come from now on are drawn, and what the engine says now has arrived."""
@@ -111,9 +117,10 @@ def own_documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def nothing_compiled() -> Iterator[None]:
-    """A fake engine goes on with any rig at once: no process compiles a tracker for it."""
+    """No process compiles a tracker before an engine uses it: fake ones need none, and real ones do it themselves."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(proposal, "compile_part", lambda *args: None)
+        for module in (proposal, session):
+            patch.setattr(module, "compile_part", lambda *args: None)
         yield
 
 

@@ -40,7 +40,7 @@ def test_f1_opens_the_page_of_the_panel_in_use(bench):
     bench.until(parts.scene.hasFocus)
     bench.press(Qt.Key.Key_F1)
     assert bench.window.guide_page == "scene"
-    bench.window.dialogs.guide._follow(QUrl("troubles.md"))
+    bench.window.dialogs.guide.browser.anchorClicked.emit(QUrl("troubles.md"))
     assert bench.window.guide_page == "troubles"
     assert "wrong" in bench.window.dialogs.guide.browser.toPlainText()
 
@@ -50,7 +50,7 @@ def test_a_link_to_a_section_leads_there(bench):
     guide = bench.window.dialogs.guide
     bench.until(lambda: guide.browser.verticalScrollBar().maximum() > 0)
     assert guide.list.horizontalScrollBar().maximum() == 0, "every title fits"
-    guide._follow(QUrl("tracker.md#when-a-camera-sees-nothing"))
+    guide.browser.anchorClicked.emit(QUrl("tracker.md#when-a-camera-sees-nothing"))
     bench.until(lambda: guide.browser.verticalScrollBar().value() > 0)
     bench.until(lambda: "When a camera sees nothing" in guide.browser.cursorForPosition(QPoint(40, 2)).block().text())
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 import zmq
-from patience import PATIENCE_MS
+from patience import PATIENCE_MS, PATIENCE_S
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
@@ -82,7 +82,7 @@ def test_both_nodes_are_asked_paired_and_written_into_a_rig(nodes, qtbot, themed
     fill(dialog, nodes, qtbot)
     qtbot.mouseClick(dialog.ask_button, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(dialog.pair_buttons[0].isEnabled, timeout=PATIENCE_MS)
-    assert "left (id 7) answers; it is ready. Not paired" in dialog.replies[0].text()
+    assert all(words in dialog.replies[0].text() for words in ("left (id 7)", "ready", "Not paired"))
     assert not dialog.save_button.isEnabled()
 
     tried: list[str] = []
@@ -133,7 +133,7 @@ def test_silence_and_nonsense_are_sentences():
     socket.close(0)
     with_nobody.destroy(0)
     answers = ask_nodes([NodeAddress("127.0.0.1", port), NodeAddress("no such address", 1)], timeout_s=0.3)
-    assert "Is rhot-node running there" in answers[0].error
+    assert "rhot-node" in answers[0].error
     assert not answers[1].found
 
 
@@ -191,7 +191,7 @@ def test_nodes_called_left_and_right_are_found_and_asked_by_themselves(qtbot, th
     qtbot.waitUntil(dialog.save_button.isEnabled, timeout=PATIENCE_MS)
     assert row_of(dialog, 0) == ["left", "11", "10.0.0.11", "not paired yet", "ready"]
     assert network.asked == [["10.0.0.11:40011", "10.0.0.12:40012"]]
-    assert "answers; it is ready. Paired with this computer" in dialog.replies[1].text()
+    assert all(words in dialog.replies[1].text() for words in ("ready", "Paired"))
 
 
 def test_what_was_typed_stays_and_a_node_is_chosen_from_the_list(qtbot, themed):
@@ -211,28 +211,29 @@ def test_what_was_typed_stays_and_a_node_is_chosen_from_the_list(qtbot, themed):
 
 
 def test_an_answer_to_what_is_not_entered_any_more_does_not_count(qtbot, themed):
-    network = Network(("left", 11), ("right", 12), ("spare", 13))
-    dialog = open_dialog(network, qtbot)
     begun, go_on = threading.Event(), threading.Event()
 
-    def slow(addresses: list[NodeAddress]) -> list[NodeAnswer]:
-        begun.set()
-        go_on.wait(5.0)
-        return network.ask(addresses)
-    dialog._ask = slow
+    class Slow(Network):
+        def ask(self, addresses: list[NodeAddress]) -> list[NodeAnswer]:
+            begun.set()
+            go_on.wait(PATIENCE_S)
+            return super().ask(addresses)
+
+    network = Slow(("left", 11), ("right", 12), ("spare", 13))
+    dialog = open_dialog(network, qtbot)
     qtbot.waitUntil(begun.is_set, timeout=PATIENCE_MS)
     dialog.choose(1, dialog.found.nodes[2])
     go_on.set()
     qtbot.waitUntil(dialog.save_button.isEnabled, timeout=PATIENCE_MS)
     assert network.asked == [["10.0.0.11:40011", "10.0.0.12:40012"], ["10.0.0.11:40011", "10.0.0.13:40013"]]
-    assert [answer.address.host for answer in dialog._answers] == ["10.0.0.11", "10.0.0.13"]
+    assert all("ready" in reply.text() for reply in dialog.replies), "only the last answer is shown"
 
 
 def test_conflicts_and_an_empty_network_are_told(qtbot, themed):
     network = Network(("left", 11), ("left", 12))
     dialog = open_dialog(network, qtbot)
     qtbot.waitUntil(lambda: dialog.found.table.rowCount() == 2, timeout=PATIENCE_MS)
-    assert "Two nodes are called left" in dialog.found.message.text()
+    assert "called left" in dialog.found.message.text()
     assert dialog.hosts[0].text() == "", "nobody can know which is meant"
     network.who = ()
     dialog.found.search()
@@ -244,7 +245,7 @@ def test_a_search_ends_with_the_dialog(qtbot, themed):
     stopped, go_on = threading.Event(), threading.Event()
 
     def find(progress) -> Search:
-        go_on.wait(5.0)
+        go_on.wait(PATIENCE_S)
         try:
             progress("looking for nodes", 0.5)
         except CancelledError:
@@ -256,4 +257,4 @@ def test_a_search_ends_with_the_dialog(qtbot, themed):
     dialog.show()
     dialog.reject()
     go_on.set()
-    assert stopped.wait(5.0)
+    assert stopped.wait(PATIENCE_S)

@@ -53,8 +53,8 @@ class Page:
     def until(self, condition):
         self.qtbot.waitUntil(condition, timeout=PATIENCE_MS)
 
-    def says(self, words):
-        self.until(lambda: words in self.dialog.sentence.text())
+    def says(self, *words):
+        self.until(lambda: all(word in self.dialog.sentence.text() for word in words))
 
     def press(self, button):
         assert button.isEnabled() and button.isVisible()
@@ -98,20 +98,19 @@ def test_the_first_one_is_added_by_two_keys_and_removed_and_taken_back(page):
     assert desk.dialog.target_edit.text() == "127.0.0.1:9000" and not desk.dialog.undo_button.isEnabled()
     desk.dialog.target_edit.setFocus()
     QTest.keyClick(desk.dialog.target_edit, Qt.Key.Key_Return)
-    desk.says("Added OSC to 127.0.0.1:9000. Save rig (Ctrl+S) keeps it in desk.json.")
+    desk.says("Added OSC to 127.0.0.1:9000", "desk.json")
     assert desk.engine.rig.outputs == (OSC,) and not desk.dialog.empty_label.isVisible()
     desk.press(desk.dialog.cards[0].remove_button)
-    desk.says("Removed OSC to 127.0.0.1:9000.")
+    desk.says("Removed OSC to 127.0.0.1:9000")
     assert desk.engine.rig.outputs == () and desk.dialog.empty_label.isVisible()
     QTest.keyClick(desk.dialog, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    desk.says("Taken back.")
+    desk.says("Taken back")
     assert desk.engine.rig.outputs == (OSC,) and desk.titles == ["OSC to 127.0.0.1:9000"]
 
 
 @pytest.mark.parametrize(("kind", "target", "sentence"), [
-    ("osc", "127.0.0.1:99999", "Output 'osc:127.0.0.1:99999': there is no port 99999; ports are 1 to 65535."),
-    ("osc", "9000", "is not HOST:PORT, such as osc:192.168.1.20:9000."),
-    ("ws", "here", "is not [HOST:]PORT"), ("web", "127.0.0.1:0", "not [HOST:]PORT with a port of 1 to 65535"),
+    ("osc", "127.0.0.1:99999", "no port 99999"), ("osc", "9000", "is not HOST:PORT"),
+    ("ws", "here", "is not [HOST:]PORT"), ("web", "127.0.0.1:0", "not [HOST:]PORT"),
     ("zenoh", "router", "is not HOST:PORT"), ("ws", "127.0.0.1:9001", "is in the list already")])
 def test_what_cannot_be_is_refused_with_a_sentence(page, kind, target, sentence):
     desk = page(msgspec.structs.replace(WS, joints="own", rate_hz=None))
@@ -136,7 +135,7 @@ def test_one_is_switched_off_and_keeps_focus_and_place(page):
     card = desk.dialog.cards[0]
     card.switch.setFocus()
     QTest.keyClick(card.switch, Qt.Key.Key_Space)
-    desk.says("OSC to 127.0.0.1:9000 is off.")
+    desk.says("OSC to 127.0.0.1:9000", "off")
     assert desk.engine.rig.outputs == (msgspec.structs.replace(OSC, enabled=False), WS)
     assert desk.dialog.cards[0] is card and card.switch.hasFocus() and card.status_label.text() == "off"
     QTest.keyClick(card.switch, Qt.Key.Key_Space)
@@ -156,10 +155,10 @@ def test_one_is_changed_in_the_form(page):
     desk.type_target("9002")
     desk.dialog.rate_box.setValue(0.0)
     desk.press(desk.dialog.add_button)
-    desk.says("Changed to JSON over WebSocket on 9002.")
+    desk.says("Changed", "WebSocket", "9002")
     assert desk.engine.rig.outputs == (OSC, OutputSettings("ws", "9002", "openxr"))
     desk.press(desk.dialog.undo_button)
-    desk.says("Taken back.")
+    desk.says("Taken back")
     assert desk.engine.rig.outputs == (OSC, WS)
 
 
@@ -188,7 +187,7 @@ def test_how_each_goes_is_said(page):
         assert desk.dialog.cards[1].url_edit.isVisible() == bool(status.url)
     fixed = replace(base, spec="lsl:LAB", kind="lsl", fixed=True)
     desk.engine.outputs = {WS.spec: fixed}  # in place of the other: one of the command line
-    desk.until(lambda: desk.titles[-1] == "Lab Streaming Layer as LAB")
+    desk.until(lambda: desk.titles[-1].endswith("as LAB"))
     assert not desk.dialog.cards[-1].remove_button.isEnabled()
 
 
@@ -287,12 +286,11 @@ def arrives(sock: socket.socket, *, all_of_it: bool = False) -> bool:
     return False
 
 
-def test_picture_of_the_page(page, qtbot):
+def test_picture_of_the_page(page):
     off = OutputSettings("vmc", "127.0.0.1:39539", enabled=False)
     desk = page(OSC, WS, off, WEB, path="/rigs/desk.json", outputs={
         WS.spec: OutputStatus(WS.spec, "ws", "failed", "port 9001 is in use by another program; choose another one."),
         WEB_RUN: OutputStatus(WEB_RUN, "web", "running", clients=0, url=ADDRESS)})
     desk.until(lambda: desk.dialog.cards[0].status_label.text().startswith("sending"))
     desk.dialog.resize(720, 740)
-    qtbot.wait(400)
     check("outputs", desk.dialog.grab().toImage(), 12)

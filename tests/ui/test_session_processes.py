@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 from fake_engine import synthetic_rig
-from patience import eventually
+from patience import PATIENCE_S, eventually
 
-from rhot_app.engine.process import running_engine, start_ticks, started_processes
+from rhot_app.engine.process import running_engine, start_ticks
 from rhot_app.errors import EngineError, RigError, SimulatorError
-from rhot_app.project import save_rig
+from rhot_app.project import save_rig, with_tracker
 from rhot_app.ui.backend import session as session_module
 from rhot_app.ui.backend.contract import TwinChoice, TwinPace
 from rhot_app.ui.backend.session import Session
@@ -29,7 +29,7 @@ def session(tmp_path):
     session = Session(tmp_path / "e")
     yield session
     session.close()
-    assert started_processes(session._place) == []
+    assert session.processes == []
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def test_an_engine_started_by_hand_is_left_running(session, rig_path):
         assert process.poll() is None
     finally:
         process.terminate()
-        process.wait(10)
+        process.wait(PATIENCE_S)
 
 
 def test_a_missing_rig_starts_nothing(session, tmp_path):
@@ -88,20 +88,21 @@ time.sleep(600)
 
 
 @pytest.fixture
-def stand_in(tmp_path, rig_path, monkeypatch):
+def stand_in(tmp_path, monkeypatch):
     """A program in the twin's place that does nothing but be there; the real one has its own end-to-end test."""
-    script = tmp_path / "twin.py"
+    script, rig_path = tmp_path / "twin.py", tmp_path / "twin.json"
     script.write_text(STAND_IN)
+    save_rig(rig_path, with_tracker(synthetic_rig(), "estimator"))
     monkeypatch.setattr(session_module, "TWIN_COMMAND", (sys.executable, str(script), str(rig_path)))
 
 
 def test_simulated_nodes_are_started_watched_and_ended(session, stand_in):
-    opened = session.open_twin(TwinChoice(motion="rest", tracker="estimator"), quiet)
-    assert opened.rig.tracker.kind == "estimator"
+    opened = session.open_twin(TwinChoice(motion="rest", tracker="classic"), quiet)
+    assert opened.rig.tracker.kind == "classic", "the twin's own rig has the other one"
     assert opened.simulated and opened.ours and session.twin_alive()
     eventually(lambda: session.twin_pace() == TwinPace(11.25, 40.0))
-    assert {process.role for process in started_processes(session._place)} == {"engine", session_module.TWIN_ROLE}
-    twin = next(process for process in started_processes(session._place) if process.role == session_module.TWIN_ROLE)
+    assert {process.role for process in session.processes} == {"engine", session_module.TWIN_ROLE}
+    twin = next(process for process in session.processes if process.role == session_module.TWIN_ROLE)
     os.kill(twin.pid, signal.SIGKILL)
     eventually(lambda: not session.twin_alive())
 
@@ -110,9 +111,9 @@ def test_the_twin_may_catch_up(tmp_path):
     output = tmp_path / "twin.out"
     slow, in_time = (f'{{"event": "{word}", "achieved_hz": 20.0, "preset_hz": 40.0}}\n' for word in ("slow", "in_time"))
     output.write_text(slow + in_time)
-    assert session_module._pace_in(output) is None
+    assert session_module.pace_in(output) is None
     output.write_text(slow + in_time + slow)
-    assert session_module._pace_in(output) == TwinPace(20.0, 40.0)
+    assert session_module.pace_in(output) == TwinPace(20.0, 40.0)
 
 
 def test_a_twin_that_cannot_start_says_why(session, stand_in):
@@ -128,4 +129,4 @@ def test_a_cancelled_start_leaves_nothing(session, stand_in):
 
     with pytest.raises(RigError):
         session.open_twin(TwinChoice(motion="slow"), stop_soon)
-    assert started_processes(session._place) == [] and not Path(session.directory / "session.json").exists()
+    assert session.processes == [] and not Path(session.directory / "session.json").exists()

@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from fake_engine import FakeClient, FakeEngine, synthetic_rig
-from patience import PATIENCE_MS
+from patience import PATIENCE_MS, PATIENCE_S
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
@@ -43,18 +43,18 @@ class Desk:
         """Let time pass until it holds."""
         self.qtbot.waitUntil(condition, timeout=PATIENCE_MS)
 
-    def settled(self, sentence):
+    def settled(self, words):
         """Wait until a change is through, and see what is said of it."""
-        self.until(lambda: self.dialog.sentence.text() == sentence)
+        self.until(lambda: words in self.dialog.sentence.text())
 
 
 @pytest.fixture
 def opened(qtbot, themed, tmp_path):
     """A function that opens the dialog on a rig."""
-    def open_on(rig):
+    def open_on(rig, wait=lambda: None):
         engine, path = FakeEngine(rig), tmp_path / "desk.json"
         save_rig(path, rig)
-        dialog = TrackerDialog(rig, path, lambda: FakeClient(engine),
+        dialog = TrackerDialog(rig, path, lambda: wait() or FakeClient(engine),
                                lambda: engine.state(1.0) if engine.running else None)
         qtbot.addWidget(dialog)
         dialog.show()
@@ -76,28 +76,27 @@ def test_the_estimator_is_one_click_away_and_taken_back_with_one_key(opened):
     assert dialog.kinds["classic"].isChecked() and not dialog.details.isVisible()
     assert not dialog.undo_button.isEnabled()
     click_on_word(dialog.kinds["estimator"])
-    desk.settled("In force.")
+    desk.settled("In force")
     assert desk.engine.rig.tracker == MODEL and load_rig(path).tracker == MODEL
-    assert [version.replaced_by for version in versions(path)] == [
-        "choosing the tracker estimator full anatomical limits"]
+    (version,) = versions(path)
+    assert "estimator" in version.replaced_by and "full" in version.replaced_by
     assert dialog.details.isVisible()
     QTest.keyClick(dialog, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    desk.settled("Taken back.")
+    desk.settled("Taken back")
     assert load_rig(path).tracker.kind == "classic" and desk.engine.rig.tracker.kind == "classic"
     assert dialog.kinds["classic"].isChecked() and not dialog.undo_button.isEnabled()
 
 
 def test_it_stays_open_until_the_engine_has_changed_over(opened, qtbot):
-    desk, go_on = opened(synthetic_rig()), threading.Event()
-    connect = desk.dialog._connect
-    desk.dialog._connect = lambda: connect() if go_on.wait(PATIENCE_MS / 1e3) else None
+    go_on = threading.Event()
+    desk = opened(synthetic_rig(), wait=lambda: None if go_on.wait(PATIENCE_S) else pytest.fail("never went on"))
     click_on_word(desk.dialog.kinds["estimator"])
     assert not desk.dialog.close_button.isEnabled()
     desk.dialog.close()
     QTest.keyClick(desk.dialog, Qt.Key.Key_Escape)
     assert desk.dialog.isVisible()
     go_on.set()
-    desk.settled("In force.")
+    desk.settled("In force")
     assert load_rig(desk.path).tracker == MODEL
     qtbot.mouseClick(desk.dialog.close_button, Qt.MouseButton.LeftButton)
     assert not desk.dialog.isVisible()
@@ -114,7 +113,7 @@ def test_fingers_and_limits_are_chosen_from_lists(opened):
     assert load_rig(desk.path).tracker == TrackerSettings(kind="estimator", variant="coupled", limits="thesis")
     assert "DIP = 2/3 PIP" in dialog.variant_words.text()
     QTest.mouseClick(dialog.undo_button, Qt.MouseButton.LeftButton)
-    desk.settled("Taken back.")
+    desk.settled("Taken back")
     assert load_rig(desk.path).tracker == TrackerSettings(kind="estimator", variant="coupled")
     assert dialog.limits_box.currentData() == "anatomical"
 
@@ -145,7 +144,7 @@ def test_the_classic_trackers_solver_is_chosen_from_a_list(opened):
     desk.until(lambda: load_rig(desk.path).tracker.ik == "transpose" and dialog.solver.isEnabled())
     assert "2.13" in dialog.ik_words.text()
     QTest.mouseClick(dialog.undo_button, Qt.MouseButton.LeftButton)
-    desk.settled("Taken back.")
+    desk.settled("Taken back")
     assert load_rig(desk.path).tracker == TrackerSettings()
 
 
@@ -163,15 +162,15 @@ def test_the_estimated_size_is_shown_and_put_into_the_hand(opened):
     dialog, path, before = desk.dialog, desk.path, load_rig(desk.path)
     assert not dialog.size_button.isVisible()
     click_on_word(dialog.size_check)
-    desk.until(lambda: dialog.size_label.text().startswith("1.03 ± 0.02 of the rig's hand"))
+    desk.until(lambda: dialog.size_label.text().startswith("1.03 ± 0.02"))
     assert load_rig(path).tracker.float_scale
     desk.until(dialog.size_button.isEnabled)
     QTest.mouseClick(dialog.size_button, Qt.MouseButton.LeftButton)
     desk.until(lambda: load_rig(path).hand != before.hand and dialog.undo_button.isEnabled())
     assert hand_length(load_rig(path).hand) == pytest.approx(1.03 * hand_length(before.hand), rel=1e-6)
-    assert versions(path)[0].replaced_by == "hand 1 030 times as large"
+    assert "1 030" in versions(path)[0].replaced_by
     QTest.mouseClick(dialog.undo_button, Qt.MouseButton.LeftButton)
-    desk.settled("Taken back.")
+    desk.settled("Taken back")
     assert load_rig(path).hand == before.hand and load_rig(path).tracker.float_scale
 
 
@@ -182,7 +181,7 @@ def test_a_size_that_is_not_certain_cannot_be_used(opened):
     desk.until(lambda: not desk.dialog.size_button.isEnabled())
     assert "not certain yet" in desk.dialog.size_label.text()
     desk.engine.running = False
-    desk.until(lambda: desk.dialog.size_label.text() == "No size yet: start, and show the hand.")
+    desk.until(lambda: "No size yet" in desk.dialog.size_label.text())
 
 
 def test_what_stands_in_the_way_is_said(opened):
@@ -251,7 +250,7 @@ def test_landmarks_are_a_choice_of_their_own_that_needs_a_set_with_landmarks(ope
     dialog = desk.dialog
     dialog.observe_box.setFocus()
     QTest.keyClicks(dialog.observe_box, "Landm")
-    desk.until(lambda: "has none. Give the rig a set with landmarks" in dialog.sentence.text())
+    desk.until(lambda: "a set with landmarks" in dialog.sentence.text())
     assert dialog.observe_box.currentText() == "Paint" and load_rig(desk.path).tracker.observe == "markers"
 
 
@@ -264,7 +263,7 @@ def test_an_old_rig_with_landmarks_says_what_it_tracks(opened):
     QTest.keyClicks(dialog.observe_box, "Landm")
     desk.until(lambda: load_rig(desk.path).tracker.observe == "landmarks" and dialog.close_button.isEnabled())
     assert "detector" in dialog.observe_words.text()
-    assert settings_text(desk.dialog.chosen) == "estimator, landmarks, full, anatomical limits"
+    assert settings_text(desk.dialog.chosen).split(", ")[:3] == ["estimator", "landmarks", "full"]
 
 
 def test_two_bare_hands_come_back_from_the_classic_tracker(opened):

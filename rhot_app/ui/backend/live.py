@@ -82,15 +82,19 @@ class Live:
     def step(self, client: Client) -> None:
         """Take in what arrived. Every state counts for the windows; only the newest is kept for drawing."""
         for message in client.poll():
-            if isinstance(message, HandState):
-                self._take_state(message)
-            elif isinstance(message, EngineStatus):
-                self._take_status(message)
-            elif isinstance(message, Preview):
-                self.previews[message.camera] = message
-                self.preview_count += 1
-            elif isinstance(message, SeenContour):
-                self.contours.append(message)
+            self.take(message)
+
+    def take(self, message: Published) -> None:
+        """Take in one message."""
+        if isinstance(message, HandState):
+            self._take_state(message)
+        elif isinstance(message, EngineStatus):
+            self._take_status(message)
+        elif isinstance(message, Preview):
+            self.previews[message.camera] = message
+            self.preview_count += 1
+        elif isinstance(message, SeenContour):
+            self.contours.append(message)
 
     def silent_for_s(self) -> float:
         """Seconds since the engine last said anything about itself."""

@@ -19,6 +19,7 @@ from rhot_app.engine.client import EngineClient
 from rhot_app.engine.compilation import compile_part, part_of
 from rhot_app.engine.directory import EngineDirectory, open_directory
 from rhot_app.engine.process import (
+    StartedProcess,
     end_started,
     ensure_engine,
     remember_process,
@@ -56,6 +57,11 @@ class Session:
     def directory(self) -> Path:
         """The engine's directory."""
         return self._place.path
+
+    @property
+    def processes(self) -> list[StartedProcess]:
+        """What the app has started here and runs."""
+        return started_processes(self._place)
 
     def client(self) -> EngineClient:
         """A client for this directory; it outlives restarts of the engine."""
@@ -116,7 +122,7 @@ class Session:
 
     def twin_pace(self) -> TwinPace | None:
         """What the simulated nodes said last about falling short of their preset; None when nothing."""
-        return _pace_in(self._place.path / TWIN_OUTPUT) if self._twin_started else None
+        return pace_in(self._place.path / TWIN_OUTPUT) if self._twin_started else None
 
     def covered_cameras(self) -> tuple[str, ...]:
         """Which simulated cameras have a cap on their lens; raises SimulatorError when the twin gives no answer."""
@@ -131,13 +137,13 @@ class Session:
     def shown_in_twin(self) -> str:
         """What stands before the simulated cameras; raises SimulatorError when the twin gives no answer."""
         with self._twin() as twin:
-            return _key_of(twin.state().show)
+            return key_of(twin.state().show)
 
     def show_in_twin(self, what: str) -> str:
         """Show something else, from its beginning (`contract.Backend`); raises SimulatorError."""
-        show = _show_named(what)
+        show = show_named(what)
         with self._twin() as twin:
-            return _key_of(twin.show(show).show)
+            return key_of(twin.show(show).show)
 
     def give_up(self) -> None:
         """End everything that the app started; what waits for it then fails and is forgotten."""
@@ -211,7 +217,7 @@ class Session:
         raise SimulatorError(f"The simulated cameras were not ready within {START_TIMEOUT_S:.0f} s; see {errors}.")
 
 
-def _show_named(what: str) -> Show:
+def show_named(what: str) -> Show:
     """The show of a key; raises SimulatorError for a key that is none."""
     from rhot_app.simulator.scene.scene_description import (
         BareHandShow,
@@ -242,7 +248,7 @@ def _show_named(what: str) -> Show:
     raise SimulatorError(f"The simulated rig has no {what!r} to show.")
 
 
-def _key_of(show: Show) -> str:
+def key_of(show: Show) -> str:
     """The key of a show; "" for one that has none."""
     from rhot_app.simulator.scene.scene_description import (
         BareHandShow,
@@ -263,7 +269,7 @@ def _key_of(show: Show) -> str:
             EmptyShow(): "empty"}.get(show, "")
 
 
-def _pace_in(output: Path) -> TwinPace | None:
+def pace_in(output: Path) -> TwinPace | None:
     """The newest whole line about the pace: ``{"event": "slow", "achieved_hz": …, "preset_hz": …}``, or "in_time"."""
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
         whole_lines, _, _ = output.read_text().rpartition("\n")

@@ -51,7 +51,7 @@ class CameraView(QWidget):
         self._scheme = scheme
         self._image = QImage()
         self._frame = (4, 3)
-        self._marks: list[Mark] = []
+        self.marks: list[Mark] = []
         self.contour: SeenContour | None = None
         self._pointed_at = False
         self.setMinimumSize(120, 90)
@@ -78,15 +78,15 @@ class CameraView(QWidget):
     def show_marks(self, pixels: Array, flags: NDArray[np.uint16], names: tuple[str, ...], colours: list[str]) -> None:
         """Markers at `pixels` (M, 2) px of the full frame; NaN ones are left out."""
         doubtful = int(MarkerFlag.PARTIAL | MarkerFlag.AMBIGUOUS)
-        self._marks = [Mark(QPointF(float(x), float(y)), short_name(name), colour, not int(flag) & doubtful)
+        self.marks = [Mark(QPointF(float(x), float(y)), short_name(name), colour, not int(flag) & doubtful)
                        for (x, y), flag, name, colour in zip(pixels, flags, names, colours, strict=True)
                        if np.isfinite(x) and np.isfinite(y)]
         self.update()
 
     def clear_marks(self) -> None:
         """No marks: no state belongs to this picture."""
-        if self._marks:
-            self._marks = []
+        if self.marks:
+            self.marks = []
             self.update()
 
     def show_contour(self, seen: SeenContour | None) -> None:
@@ -98,7 +98,7 @@ class CameraView(QWidget):
     @property
     def marked(self) -> list[str]:
         """Names of the markers drawn."""
-        return [mark.name for mark in self._marks]
+        return [mark.name for mark in self.marks]
 
     @property
     def named(self) -> bool:
@@ -134,7 +134,7 @@ class CameraView(QWidget):
         painter.setClipRect(target)
         painter.translate(target.topLeft())
         scale = target.width() / self._frame[0]
-        places = [(mark.place + QPointF(0.5, 0.5)) * scale for mark in self._marks]
+        places = [(mark.place + QPointF(0.5, 0.5)) * scale for mark in self.marks]
         if self.contour is not None:
             paint_contour(painter, self.contour, scale)
         self._paint_rings(painter, places, target.width())
@@ -151,7 +151,7 @@ class CameraView(QWidget):
     def _paint_rings(self, painter: QPainter, places: list[QPointF], width: float) -> None:
         radius = _RING_PX[0] + (_RING_PX[1] - _RING_PX[0]) * min(1.0, width / _ROOM_FOR_NAMES_PX)
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        for at, mark in zip(places, self._marks, strict=True):
+        for at, mark in zip(places, self.marks, strict=True):
             style = Qt.PenStyle.SolidLine if mark.whole else Qt.PenStyle.DotLine
             for colour, line_width in (("#000000", 4.0), (mark.colour, 2.0)):
                 painter.setPen(QPen(QColor(colour), line_width, style))
@@ -160,14 +160,14 @@ class CameraView(QWidget):
     def _paint_names(self, painter: QPainter, places: list[QPointF], picture: QSizeF) -> None:
         """Names at the sides, each with a line to its marker."""
         metrics = QFontMetricsF(painter.font())
-        sizes = [(metrics.horizontalAdvance(mark.name) + 8, metrics.height() + 2) for mark in self._marks]
+        sizes = [(metrics.horizontalAdvance(mark.name) + 8, metrics.height() + 2) for mark in self.marks]
         anchors = [(at.x(), at.y()) for at in places]
         boxes = place_at_sides(anchors, sizes, (picture.width(), picture.height()), 4.0)
         for colour, width in (("#000000", 3.0), ("#ffffff", 1.0)):
             painter.setPen(QPen(QColor(colour), width))
             for anchor, box in zip(anchors, boxes, strict=True):
                 painter.drawLine(QPointF(*anchor), QPointF(*box.nearest(anchor)))
-        for mark, box in zip(self._marks, boxes, strict=True):
+        for mark, box in zip(self.marks, boxes, strict=True):
             paint_tag(painter, QPointF(box.x, box.y), mark.name)
 
 
@@ -187,7 +187,7 @@ def paint_contour(painter: QPainter, seen: SeenContour, scale: float) -> None:
 
 
 class CameraPanel(QWidget):
-    """The cameras of the rig, one above the other."""
+    """The cameras of the rig, one above the other. `unmarked` are those whose pictures still wait for their marks."""
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -197,7 +197,7 @@ class CameraPanel(QWidget):
         self._scheme = scheme
         self._rig: Rig | None = None
         self._shown: dict[str, int] = {}
-        self._unmarked: set[str] = set()
+        self.unmarked: set[str] = set()
         self.views: dict[str, CameraView] = {}
         self.empty = EmptyState("Pictures appear here once a rig is open and its nodes answer.")
         self._layout = QBoxLayout(QBoxLayout.Direction.TopToBottom, self)
@@ -218,7 +218,7 @@ class CameraPanel(QWidget):
             view.deleteLater()
         self.views = {node.name: CameraView(node.name, self._scheme) for node in (rig.nodes if rig else ())}
         self._shown = {}
-        self._unmarked = set()
+        self.unmarked = set()
         for view in self.views.values():
             self._layout.addWidget(view, 1)
         self.empty.setVisible(rig is None)
@@ -242,11 +242,11 @@ class CameraPanel(QWidget):
                 continue
             if self._shown.get(name) != preview.t_master_ns:
                 self._shown[name] = preview.t_master_ns
-                self._unmarked.add(name)
+                self.unmarked.add(name)
                 view.show_preview(preview)
                 view.clear_marks()
             view.show_contour(live.contour_at(name, preview.t_master_ns))
-            if name in self._unmarked:
+            if name in self.unmarked:
                 self._mark(view, camera, preview, live)
 
     def _mark(self, view: CameraView, camera: int, preview: Preview, live: Live) -> None:
@@ -258,4 +258,4 @@ class CameraPanel(QWidget):
         colours = [visible_on(hex_of(marker.display_rgb), "#000000", 3.0) for marker in markers.markers]
         view.show_marks(observation[0][camera], observation[1][camera], markers.ids, colours)
         if live.state is not None and live.state.t_master_ns >= preview.t_master_ns:
-            self._unmarked.discard(view.name)
+            self.unmarked.discard(view.name)

@@ -42,7 +42,6 @@ class FakeRigAsker:
         self.rig = rig
         self.draw = draw
         self.refuse = ""
-        self.delay_s = 0.0
         self.commands: list[str] = []
         self.settings = {node.node_id: NodeSettings(node.node_id, node.name, rig.markers) for node in rig.nodes}
         self.path = ""
@@ -83,7 +82,6 @@ class FakeRigAsker:
         return {}
 
     def _still(self, node_id: int, number: int) -> dict[str, Any]:
-        time.sleep(self.delay_s)
         now_s = time.monotonic()
         picture = self.draw(node_id, now_s)
         before, jpeg = self._sent.get(node_id, (None, b""))
