@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import msgspec
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.anatomy import load_hand
+from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.model import build_model
 from rhot_app.project import CameraPose, FilterSettings, Intrinsics, Rig, RigNode
 from rhot_app.simulator.render.body import build_body
@@ -18,7 +19,7 @@ from rhot_app.simulator.scene.motion import load_motion
 from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations, Tracker
 from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
+from rhot_node.markers import MarkerSet, load_markers
 from rhot_node.wire.messages import MarkerFlag
 
 Trajectory = Callable[[np.ndarray], np.ndarray]  # (N,) s -> (N, M, 3) m
@@ -51,8 +52,14 @@ def make_rig(preset: Preset = WIDE, *, cameras: int = 2, filters: FilterSettings
 
 
 def hand_trajectory(rig: Rig, motion: str, seconds: float, distance_m: float = 0.6, seed: int = 1) -> Trajectory:
-    model = build_model(rig.hand)
-    body = build_body(model, rig.markers)
+    hand, markers = msgspec.json.encode(rig.hand), msgspec.json.encode(rig.markers)
+    return _trajectory(hand, markers, motion, seconds, distance_m, seed)
+
+
+@cache
+def _trajectory(hand: bytes, markers: bytes, motion: str, seconds: float, distance_m: float, seed: int) -> Trajectory:
+    model = build_model(msgspec.json.decode(hand, type=HandAnatomy))
+    body = build_body(model, msgspec.json.decode(markers, type=MarkerSet))
     moving = load_motion(motion, model, np.array([0.0375, 0.0, distance_m]), seed)
     times = np.arange(-0.5, seconds + 0.5, 1e-3)
     return CubicSpline(times, body.marker_positions(*moving.sample(times)))

@@ -323,7 +323,7 @@ def bending(begin_s, lasts_s):
 @pytest.mark.parametrize(("lasts_s", "most_mm"), [(0.12, 2.0), (0.35, 0.9)])
 def test_a_thumb_that_bends_the_other_way_stays_where_both_cameras_see_it(lasts_s, most_mm):
     off_mm = []
-    for begin_s in np.arange(1.0, 1.05, 0.01):  # cameras take their turns otherwise
+    for begin_s in (1.0, 1.03):  # cameras take their turns otherwise
         truth = bending(begin_s, lasts_s)
         states = states_of(RIG, observations_of(RIG, truth, begin_s + 1.2))
         off_mm.append(deviations(after_s(states, 1.0), truth).mm[:, 0])
