@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rhot_app.__main__ import main
-from rhot_app.export.layers_command import FILM_FRAMES
+from rhot_app.export import layers_command
 from rhot_node.files import resource_path
 
 FINGERS = str(resource_path("articulated", "two_fingers.json"))
@@ -34,12 +34,13 @@ def test_from_the_back_the_palm_hides_the_bent_finger(tmp_path, capsys):
     assert order.index("palm") < order.index("index_distal")
 
 
-def test_a_film_turns_about_the_object(tmp_path, capsys):
+def test_a_film_turns_about_the_object(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(layers_command, "FILM_FRAMES", 12)
     film = tmp_path / "turn.avi"
     assert main(["layers", FINGERS, "--out", str(film)]) == 0
     assert "1  " in capsys.readouterr().out
     video = cv2.VideoCapture(str(film))
-    assert video.get(cv2.CAP_PROP_FRAME_COUNT) == FILM_FRAMES
+    assert video.get(cv2.CAP_PROP_FRAME_COUNT) == 12
     assert [path.name for path in tmp_path.iterdir()] == ["turn.avi"]
 
 

@@ -23,7 +23,7 @@ from rhot_app.articulated.visibility import (
     visibility,
 )
 
-CAMERA = look_at(np.zeros(3), np.array([0.0, 0.0, 0.5]), focal=150.0, width=160, height=120)
+CAMERA = look_at(np.zeros(3), np.array([0.0, 0.0, 0.5]), focal=100.0, width=107, height=80)
 RAYS = camera_rays(CAMERA)
 POSE = np.ascontiguousarray(CAMERA.camera_from_world[:3])
 SAME_M = 1e-6
@@ -75,7 +75,7 @@ def test_the_order_of_planar_chains_and_a_box_is_that_of_a_depth_buffer(name):
         labels = segment(bodies, placed, seen.order, POSE, CAMERA.intrinsics, RAYS)
         _, depth = depth_labels(bodies, placed, CAMERA, RAYS)
         wrong, total = wrong + np.sum(differing(labels, depth)), total + np.sum(labels != NONE)
-    assert total > 2000
+    assert total > 900
     assert wrong <= 0.002 * total
 
 
