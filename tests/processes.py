@@ -14,6 +14,7 @@ import importlib
 import json
 import multiprocessing
 import os
+import pkgutil
 import runpy
 import signal
 import socket
@@ -26,17 +27,10 @@ from typing import Any
 
 import pytest
 
-PRELOADED = {
-    "rhot_app": ("rhot_app.engine.command", "rhot_app.engine.serve", "rhot_app.engine.offline.replay_command",
-                 "rhot_app.calibration.check.checks", "rhot_app.outputs.outputs", "rhot_app.outputs.web_view",
-                 "rhot_app.simulator.nodes.synthetic_node", "rhot_app.sources.links",
-                 "rhot_app.sources.poses.poses_command", "rhot_app.tracking.trackers"),
-    "rhot_node": ("rhot_node.capture.open", "rhot_node.commands", "rhot_node.daemon", "rhot_node.detect.fast",
-                  "rhot_node.foreground_store", "rhot_node.health.checks", "rhot_node.network.control",
-                  "rhot_node.network.link", "rhot_node.network.pairing", "rhot_node.network.requests",
-                  "rhot_node.plugins", "rhot_node.video.recorder", "rhot_node.warm_up"),
-}
-ROOT = Path(__file__).parents[1]
+PRELOADED = {"rhot_app": ("rhot_app.engine", "rhot_app.outputs", "rhot_app.sources", "rhot_app.tracking"),
+             "rhot_node": ("rhot_node",)}
+"""The packages whose modules a server imports, by the package of its programs."""
+
 WORKERS = ("rhot_app.export.batch", "rhot_app.export.process", "rhot_app.simulator.film.film")
 """What processes of multiprocessing find imported."""
 
@@ -71,7 +65,7 @@ def forking_context(method: str | None = None) -> Any:
 
 
 class ForkingPopen(Popen):
-    """subprocess.Popen that has ``python -m MODULE ...`` of these packages forked by a server that has imported them.
+    """subprocess.Popen that has ``python -m MODULE ...`` of RHOT forked by a server that has imported it.
 
     The program is a child of this process all the same. What its modules read of the environment at their import, they
     keep. So a program with another cache of compiled code starts from nothing.
@@ -157,21 +151,20 @@ def preload(package: str) -> None:
     """Import what the package's programs do, and load its compiled code."""
     if package == "rhot_node":
         sys.modules["scipy"] = None  # as the program does first of all
-    for module in PRELOADED[package]:
-        importlib.import_module(module)
+    for name in PRELOADED[package]:
+        for module in pkgutil.walk_packages(importlib.import_module(name).__path__, f"{name}."):
+            importlib.import_module(module.name)
     if package == "rhot_node":
-        from rhot_node.detect.fast import FastDetector
+        from rhot_node.__main__ import make_detector
+        from rhot_node.config import load_settings
         from rhot_node.files import resource_path
-        from rhot_node.markers import load_markers
-        from rhot_node.warm_up import warm_up
-        markers = load_markers(resource_path("markers", "rhot6.json"))
-        warm_up(FastDetector(markers), markers, (640, 480))
+        make_detector(load_settings(resource_path("nodes", "left.json")))
     else:
-        from rhot_app.engine.pipeline import warm_up as warm_up_tracker
+        from rhot_app.engine.pipeline import warm_up
         from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
         from rhot_app.tracking.trackers import make_tracker
         rig = synthetic_rig()
-        warm_up_tracker(make_tracker(rig), rig)
+        warm_up(make_tracker(rig), rig)
 
 
 def main() -> None:
@@ -185,7 +178,7 @@ def main() -> None:
 
     atexit.register(leave)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    sys.path[0] = str(ROOT)
+    sys.path[0] = str(Path(__file__).parents[1])
     package, descriptor = sys.argv[1:]
     preload(package)
     gc.collect()
@@ -206,9 +199,8 @@ def main() -> None:
         runpy.run_module(module, run_name="__main__", alter_sys=True)
         code = 0
     except SystemExit as exit:
-        code = exit.code or 0
-        if isinstance(code, str):
-            raise
+        code = exit.code if isinstance(exit.code, int) else int(exit.code is not None)
+        raise  # a sentence in place of a code is printed
 
 
 if __name__ == "__main__":

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 from patience import PATIENCE_S
 
-from rhot_app.project import save_rig
-from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
+from rhot_app.project import Rig, save_rig
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -31,12 +30,9 @@ def environment(tmp_path: Path) -> dict[str, str]:
     return {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "PYTHONUNBUFFERED": "1"}
 
 
-def test_programs_read_states_of_an_engine_and_of_its_log(tmp_path: Path, environment: dict[str, str]) -> None:
-    rig = synthetic_rig()
-    save_rig(tmp_path / "my_rig.json", rig)
-    nodes = [SyntheticNode(rig, camera) for camera in (0, 1)]
-    for node in nodes:
-        node.start()
+def test_programs_read_states_of_an_engine_and_of_its_log(tmp_path: Path, environment: dict[str, str],
+                                                          streaming_rig: Rig) -> None:
+    save_rig(tmp_path / "my_rig.json", streaming_rig)
     command = [sys.executable, "-m", "rhot_app", "engine", "--rig", "my_rig.json", "--start", "--log", "take.rhotlog"]
     with subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True) as engine:
         assert engine.stderr is not None and any("serves clients" in line for line in engine.stderr)
@@ -47,8 +43,6 @@ def test_programs_read_states_of_an_engine_and_of_its_log(tmp_path: Path, enviro
             reader.kill()
         engine.send_signal(signal.SIGTERM)
         assert engine.wait(PATIENCE_S) == 0
-    for node in nodes:
-        node.close()
     done = subprocess.run([sys.executable, "-c", program("tracking.md")], cwd=tmp_path, env=environment, text=True,
                           capture_output=True, timeout=60)
     assert done.returncode == 0, done.stderr

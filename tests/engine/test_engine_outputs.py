@@ -13,7 +13,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from fake_tracker import FakeTracker
-from patience import eventually
+from patience import PATIENCE_S, eventually
 from websockets.sync.client import connect
 
 from rhot_app.engine import output_process
@@ -21,8 +21,8 @@ from rhot_app.engine.client import EngineClient
 from rhot_app.engine.core import Engine
 from rhot_app.engine.output_process import OutputProcess
 from rhot_app.errors import OutputError
-from rhot_app.project import OutputSettings, save_rig
-from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
+from rhot_app.project import OutputSettings, Rig, save_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.links import UdpNodes
 
 
@@ -49,18 +49,15 @@ def test_what_cannot_be_is_refused(tmp_path: Path, arguments: list[str], sentenc
     outputs = () if arguments else (OutputSettings("pager", "x"),)
     save_rig(tmp_path / "rig.json", msgspec.structs.replace(rig, outputs=outputs))
     with engine(tmp_path, *arguments) as process:
-        said = process.communicate(timeout=60)[1]
+        said = process.communicate(timeout=PATIENCE_S)[1]
     assert process.returncode == 2 and sentence in said and len(said.splitlines()) == 1
 
 
-def test_the_command_line_and_the_rig_both_stream(tmp_path: Path) -> None:
+def test_the_command_line_and_the_rig_both_stream(tmp_path: Path, streaming_rig: Rig) -> None:
     ports = [free_port(), free_port()]
     taken = socket.create_server(("127.0.0.1", 0))
-    rig = msgspec.structs.replace(synthetic_rig(), outputs=(OutputSettings("ws", str(ports[0]), "openxr"),))
+    rig = msgspec.structs.replace(streaming_rig, outputs=(OutputSettings("ws", str(ports[0]), "openxr"),))
     save_rig(tmp_path / "rig.json", rig)
-    nodes = [SyntheticNode(rig, camera) for camera in (0, 1)]
-    for node in nodes:
-        node.start()
     with engine(tmp_path, "--start", "--json", "--web", f"127.0.0.1:{ports[1]}", "--output",
                 f"ws:{taken.getsockname()[1]}") as process:
         try:
@@ -69,7 +66,7 @@ def test_the_command_line_and_the_rig_both_stream(tmp_path: Path) -> None:
             web = next(url for spec, url in urls.items() if spec.startswith("web:"))
             for url, joints in ((urls[f"ws:{ports[0]}?joints=openxr"], 26), (f"{web.replace('http', 'ws')}states", 26)):
                 with connect(url) as client:
-                    hand = json.loads(client.recv(30))["hands"][0]
+                    hand = json.loads(client.recv(PATIENCE_S))["hands"][0]
                     assert len(hand["positions"]) == joints
             with EngineClient(tmp_path / "engine") as client:
                 eventually(lambda: client.poll(0.1) and client.status is not None and client.status.state_rate_hz > 0)
@@ -84,11 +81,9 @@ def test_the_command_line_and_the_rig_both_stream(tmp_path: Path) -> None:
                 eventually(lambda: client.poll(0.1) and client.status is not None and len(client.status.outputs) == 2)
         finally:
             process.send_signal(signal.SIGTERM)
-        process.communicate(timeout=60)
+        process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0
     taken.close()
-    for node in nodes:
-        node.close()
 
 
 def test_an_engine_that_cannot_have_its_outputs_opens_nothing() -> None:
@@ -155,7 +150,7 @@ def test_outputs_are_opened_and_closed_while_others_go_on(tmp_path: Path) -> Non
             assert use(one, msgspec.structs.replace(other, enabled=False)) == [one.spec]
             eventually(lambda: not listens(ports[1]))
             assert [status.spec for status in outputs.status()] == ["osc:127.0.0.1:9", one.spec]
-            client.ping().wait(10.0)
+            client.ping().wait(PATIENCE_S)
         assert use() == []
         eventually(lambda: not listens(ports[0]))
     finally:

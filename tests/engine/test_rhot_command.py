@@ -14,9 +14,9 @@ from patience import PATIENCE_S, eventually
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.process import ensure_engine, running_engine, started_processes, stop_engine
 from rhot_app.errors import EngineError
-from rhot_app.project import save_rig
+from rhot_app.project import Rig, save_rig
 from rhot_app.recording.raw_log import LogReader
-from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
+from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.state import HandState
 
 IMPORTED = """
@@ -59,20 +59,17 @@ def test_mistakes_end_with_a_sentence_and_2(tmp_path: Path) -> None:
         (("--motoin", "wave"), "there is no option '--motoin' here"),
         (("--frobnicate",), "there is no option '--frobnicate' here"),
         (("exprt", "no.log"), "there is no command 'exprt'; did you mean export?"),
-        (("dance",), "there is no command 'dance'"),
+        (("dance",), "there is no command 'dance'"), (("engine",), "--rig"), (("engine", "--rig"), "--rig"),
+        (("replay",), "LOG"),
     ]:
         done = rhot(*arguments)
         assert done.returncode == 2, done
         assert words in done.stderr and "Traceback" not in done.stderr
 
 
-def test_engine_process_from_start_to_end(tmp_path: Path) -> None:
-    rig = synthetic_rig()
+def test_engine_process_from_start_to_end(tmp_path: Path, streaming_rig: Rig) -> None:
     rig_path, log_path, place = tmp_path / "rig.json", tmp_path / "a.log", tmp_path / "e"
-    save_rig(rig_path, rig)
-    nodes = [SyntheticNode(rig, camera) for camera in (0, 1)]
-    for node in nodes:
-        node.start()
+    save_rig(rig_path, streaming_rig)
     command = [sys.executable, "-m", "rhot_app", "engine", "--rig", str(rig_path), "--log", str(log_path),
                "--directory", str(place), "--start", "--json"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as engine:
@@ -89,8 +86,6 @@ def test_engine_process_from_start_to_end(tmp_path: Path) -> None:
         engine.send_signal(signal.SIGTERM)
         assert engine.wait(PATIENCE_S) == 0
         assert engine.stderr.read() == ""
-    for node in nodes:
-        node.close()
     assert running_engine(place) is None
     assert len(list(LogReader(log_path))) > 100
     by_model = json.loads(rhot("replay", str(log_path), "--json", "--tracker", "estimator").stdout)

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Sequence
 
 import pytest
+from patience import PATIENCE_S
 
 from rhot_node.network import announce
 from rhot_node.network.announce import Announcer
@@ -105,7 +106,7 @@ def test_the_thread_announces_and_says_goodbye() -> None:
     network.said = said.set
     announcer = Announcer(lambda: LEFT, "10.0.0.4", network)
     announcer.start()
-    assert said.wait(2.0)
+    assert said.wait(PATIENCE_S)
     announcer.close()
     announcer.close()
     assert network.goodbyes == 1

@@ -56,7 +56,7 @@ class Served:
         self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self.client = self.context.socket(zmq.REQ)
         self.client.connect(f"tcp://127.0.0.1:{self.server.control_port}")
-        self.client.rcvtimeo = 3000
+        self.client.rcvtimeo = PATIENCE_MS
 
     def ask_raw(self, *parts: bytes) -> list[bytes]:
         self.client.send_multipart(parts)
@@ -181,7 +181,7 @@ def test_previews_are_small_and_only_for_those_who_look(served: Served) -> None:
     pictures = served.server.pictures
     assert not pictures.wanted
     viewer = served.context.socket(zmq.SUB)
-    viewer.rcvtimeo = 3000
+    viewer.rcvtimeo = PATIENCE_MS
     viewer.connect(f"tcp://127.0.0.1:{served.server.preview_port}")
     viewer.subscribe(b"")
     eventually(lambda: pictures.wanted)

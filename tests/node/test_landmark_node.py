@@ -13,6 +13,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from patience import PATIENCE_S
 from test_plugins import install
 
 from rhot_node.config import NodeSettings
@@ -54,11 +55,11 @@ def test_the_example_speaks_the_wire(example: ModuleType) -> None:
     node = example.LandmarkNode(NODE, 0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as master:
         master.bind(("127.0.0.1", 0))
-        master.settimeout(5.0)
+        master.settimeout(PATIENCE_S)
 
         def say(message: ClockRequest | Start | Stop) -> None:
             master.sendto(encode(message), ("127.0.0.1", node.socket.getsockname()[1]))
-            select.select([node.socket], [], [], 5.0)
+            select.select([node.socket], [], [], PATIENCE_S)
             node.poll()
 
         points = [(100.0 + k, 200.5) for k in range(21)]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from patience import eventually, settled
+from patience import PATIENCE_MS, eventually, settled
 from trusted_node import TrustedNode
 
 from rhot_node.errors import TrustError
@@ -152,7 +152,7 @@ def test_whatever_a_stranger_says_costs_no_try(node: TrustedNode, request_data: 
     node.offers.renew()
     sock = node.connect(node.server.pairing_port, None)
     sock.send(request_data)
-    assert sock.poll(3000)
+    assert sock.poll(PATIENCE_MS)
     assert json.loads(sock.recv())["ok"] in (True, False)
     offer = node.offers.current()
     assert offer is not None and offer.tries_left == 5

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from patience import PATIENCE_S
 from pythonosc.osc_bundle import OscBundle
 from pythonosc.osc_message import OscMessage
 from streams import palm_before_cameras, state_of, unknown
@@ -25,7 +26,7 @@ from rhot_app.project import OutputSettings, Rig
 def receiver() -> Iterator[socket.socket]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.bind(("127.0.0.1", 0))
-        sock.settimeout(10.0)
+        sock.settimeout(PATIENCE_S)
         yield sock
 
 

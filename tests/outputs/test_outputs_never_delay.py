@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import msgspec
 import pytest
-from patience import eventually, quickest, settled
+from patience import PATIENCE_S, eventually, quickest, settled
 from streams import Stream, free_port, state_of
 from websockets.sync.client import connect
 
@@ -136,10 +136,10 @@ def test_a_client_that_never_reads_is_let_go_and_others_go_on(stream: Callable[.
             got: list[int] = []
 
             def none_missing() -> bool:
-                got.append(json.loads(client.recv(10))["sequence"])
+                got.append(json.loads(client.recv(PATIENCE_S))["sequence"])
                 return len(got) >= 40 and got[-1] - got[-40] == 39
             eventually(none_missing)
-            eventually(lambda: running.outputs.status()[0].clients == 1 or client.recv(10) is None)
+            eventually(lambda: running.outputs.status()[0].clients == 1 or client.recv(PATIENCE_S) is None)
     assert running.outputs.status()[0].dropped == 0
 
 
@@ -181,6 +181,6 @@ def test_a_rigs_outputs_come_and_go_and_others_stay(rig: Rig) -> None:
             ask(first)
             assert len(outputs.status()) == 1
             outputs.send(state_of(rig, neutral_pose()))
-            assert client.recv(10)  # the connection was never closed
+            assert client.recv(PATIENCE_S)  # the connection was never closed
     finally:
         outputs.close()

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 import pytest
 from chromium import Browser, Page, chromium, saved
-from patience import eventually
+from patience import PATIENCE_S, eventually
 from streams import Stream, free_port, unknown
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
@@ -53,9 +53,9 @@ def get(url: str, method: str = "GET", path: str | None = None) -> tuple[int, di
     if parts.scheme == "https":
         context = ssl.create_default_context()
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
-        connection = http.client.HTTPSConnection(parts.netloc, timeout=10, context=context)
+        connection = http.client.HTTPSConnection(parts.netloc, timeout=PATIENCE_S, context=context)
     else:
-        connection = http.client.HTTPConnection(parts.netloc, timeout=10)
+        connection = http.client.HTTPConnection(parts.netloc, timeout=PATIENCE_S)
     connection.request(method, parts.path if path is None else path)
     answer = connection.getresponse()
     return answer.status, dict(answer.getheaders()), answer.read()
@@ -142,10 +142,10 @@ def test_whoever_says_anything_is_turned_away(stream: Callable[..., Stream], sai
     with connect(f"{_ws(url)}states") as client, pytest.raises(ConnectionClosed) as closed:
         client.send(said)
         while True:
-            client.recv(10)
+            client.recv(PATIENCE_S)
     assert closed.value.rcvd is not None and closed.value.rcvd.code in (1008, 1009)  # read only, too big
     with connect(f"{_ws(url)}states") as client:
-        assert client.recv(10)
+        assert client.recv(PATIENCE_S)
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE"])

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from patience import PATIENCE_S
 
 from rhot_app.simulator.nodes.proxy import DelayQueue, Impairment, UdpProxy
 from rhot_node.wire.codec import decode, encode
@@ -17,7 +18,7 @@ from rhot_node.wire.messages import ClockRequest, Start, StartEntry
 def bound() -> socket.socket:
     s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     s.bind(("127.0.0.1", 0))
-    s.settimeout(2.0)
+    s.settimeout(PATIENCE_S)
     return s
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import pytest
 from findable_nodes import findable, free_udp_port, presence
+from patience import PATIENCE_S
 
 from rhot_app.__main__ import main
 from rhot_app.sources import discovery
@@ -91,7 +92,7 @@ def test_without_a_network_it_says_so(a_network: Callable[..., None]) -> None:
 def test_only_who_has_heard_the_question_can_answer_it() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         stranger.bind(("127.0.0.1", 0))
-        stranger.settimeout(2.0)
+        stranger.settimeout(PATIENCE_S)
         questions = FindSocket(free_udp_port(), this_machine_only=True)
         questions.ask(7, [stranger.getsockname()])
         data, sender = stranger.recvfrom(1024)
@@ -137,7 +138,7 @@ def test_the_library_announces_and_finds_on_loopback() -> None:
     try:
         service = announce_by_zeroconf(who, ["127.0.0.1"])
         try:
-            assert seen.get(timeout=10.0) == Sighting(who, "127.0.0.1")
+            assert seen.get(timeout=PATIENCE_S) == Sighting(who, "127.0.0.1")
         finally:
             service.close()
     finally:
