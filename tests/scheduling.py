@@ -71,7 +71,7 @@ class TestTimes:
         self._times[report.nodeid] = (wall_s + report.duration, cpu_s[-1] if cpu_s else 0.0)
 
     def pytest_sessionfinish(self) -> None:
-        if self._times and not hasattr(self._config, "workerinput"):
+        if self._times and hasattr(self._config, "cache") and not hasattr(self._config, "workerinput"):
             self._config.cache.set(CACHE_KEY, {name: [round(value, 3) for value in times]
                                                for name, times in self._times.items()})
 

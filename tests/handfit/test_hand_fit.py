@@ -293,7 +293,6 @@ def test_lengths_scatter_as_their_standard_deviations_say():
         truth = [bone for finger in hand.fingers.values() for bone in finger.bones_mm]
         lengths = [one for one in fit.numbers if one.kind == "length"]
         squares += [((fit.value(one) - true) / fit.sd(one)) ** 2 for one, true in zip(lengths, truth, strict=True)]
-    print(f"normalised squared error of {len(squares)} lengths: {np.mean(squares):.2f}")
     assert 0.6 < np.mean(squares) < 1.5
 
 
@@ -374,7 +373,6 @@ def test_contours_bring_a_hand_to_its_place():
     index, sd = number(fit, "Index", "MCP flexion"), fit.sd(number(fit, "Index", "MCP flexion"))
     fit.take(fit.fitted_to_contours(), "fitting to contours")
     after = errors_m(fit, rig.hand, pose)
-    print(f"mean error {1e3 * before.mean():.1f} mm before, {1e3 * after.mean():.1f} mm after")
     assert after.mean() < 0.5 * before.mean() and fit.instant.contour.found > 0.85
     assert fit.sd(index) < 0.2 * sd, "the contours count in the standard deviations"
     fit.set_number(index, 10.0)

@@ -47,6 +47,5 @@ def test_rendered_images_are_tracked() -> None:
                                       log_so3(state.world_from_object[:3, :3] @ true[:3, :3].T)]))
         squares.append(errors[-1] @ np.linalg.solve(state.covariance, errors[-1]) / 6.0)
     rms = np.sqrt(np.mean(np.square(errors).reshape(-1, 2, 3).sum(axis=2), axis=0))
-    print(f"rendered: {1e3 * rms[0]:.2f} mm, {np.degrees(rms[1]):.2f} deg rms, NEES {np.mean(squares):.2f}")
     assert rms[0] < 1e-3 and np.degrees(rms[1]) < 0.5
     assert np.mean(squares) < 3.0

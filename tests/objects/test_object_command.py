@@ -50,8 +50,6 @@ def test_the_pose_in_images_is_that_of_the_picture(folder: Path, capsys: pytest.
     fields = json.loads(capsys.readouterr().out)
     error = np.array(fields["translation_m"]) - POSE[:3, 3]
     turn = log_so3(rotation_from_quaternion(fields["rotation_wxyz"]) @ POSE[:3, :3].T)
-    print(f"{1e3 * np.linalg.norm(error):.2f} mm, {np.degrees(np.linalg.norm(turn)):.2f} deg, {fields['points']} "
-          f"corners, {fields['reprojection_rms_px']:.3f} px")
     assert fields["validity"] == "tracked" and fields["points"] >= 12
     assert np.linalg.norm(error) < 1e-3 and np.degrees(np.linalg.norm(turn)) < 0.5
     assert np.linalg.norm(error) < 4.0 * np.linalg.norm(fields["translation_sd_m"])

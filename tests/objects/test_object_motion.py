@@ -107,6 +107,5 @@ def test_the_process_covers_the_fastest_hand() -> None:
     for name, rates, start in zip(("m/s", "rad/s"), (velocity, spin), START_SPEED, strict=True):
         fastest = np.linalg.norm(rates, axis=1).max()
         strongest = np.linalg.norm(np.diff(rates, axis=0) / step_s, axis=1).max()
-        print(f"fast: {fastest:.1f} {name}, {strongest:.0f} {name}^2, {strongest / fastest:.1f} 1/s")
         assert fastest < 2.5 * start
         assert strongest < 1.1 * RATE * fastest

@@ -58,7 +58,6 @@ def test_a_frontal_tag_in_one_camera_is_ambiguous_and_never_surely_wrong() -> No
         wrong += found.validity is Validity.TRACKED and angle_deg(found.world_from_object, pose) > 4.0 * tilt_sd
         if found.second is not None and found.second_probability >= 0.01:
             assert min(angle_deg(one, pose) for one in (found.world_from_object, found.second)) < 5.0 * tilt_sd
-    print(f"one camera, 20 mm, 5 to 15 degrees: {ambiguous} of {count} ambiguous, {wrong} surely wrong")
     assert ambiguous > 0.5 * count
     assert wrong <= 0.01 * count
 
@@ -77,7 +76,6 @@ def test_two_cameras_decide_the_flip(model: ObjectModel, count: int) -> None:
         right += near
         decided += found.validity is Validity.TRACKED
         surely_wrong += found.validity is Validity.TRACKED and not near
-    print(f"two cameras, {model.name}: {right} of {count} right, {decided} decided, {surely_wrong} surely wrong")
     assert right >= 0.99 * count
 
 
@@ -92,7 +90,6 @@ def test_a_second_face_decides_the_flip() -> None:
         assert found is not None
         done += 1
         right += angle_deg(found.world_from_object, pose) < 5.0 and found.validity is Validity.TRACKED
-    print(f"second face: {right} of {FEW} right")
     assert right == FEW
 
 
@@ -106,7 +103,6 @@ def test_the_covariance_is_that_of_the_errors() -> None:
                                 log_so3(found.world_from_object[:3, :3] @ pose[:3, :3].T)])
         squares.append(error @ np.linalg.solve(found.covariance, error))
     nees = np.mean(squares) / 6.0
-    print(f"NEES {nees:.2f}")
     assert 0.7 < nees < 1.3  # chi-squared with 360 degrees of freedom, p = 0.9999
 
 
@@ -167,6 +163,5 @@ def test_a_small_plane_of_markers_may_be_ambiguous_and_says_so() -> None:
         ambiguous += found.validity is Validity.AMBIGUOUS
         tilt_sd = np.degrees(np.sqrt(np.trace(found.covariance[3:, 3:])))
         surely_wrong += found.validity is Validity.TRACKED and angle_deg(found.world_from_object, pose) > 5.0 * tilt_sd
-    print(f"16 mm square of markers: {ambiguous} of 100 ambiguous, {surely_wrong} surely wrong")
     assert ambiguous >= 5
     assert surely_wrong <= 1

@@ -76,9 +76,6 @@ def test_a_cube_in_a_hand_is_tracked(motion: str, hidden: float, rms_mm: float, 
     tracked = [state for state in states if state.tracked]
     distances, angles = errors(tracked, poses)
     found_mm, found_deg = 1e3 * np.sqrt(np.mean(distances**2)), np.degrees(np.sqrt(np.mean(angles**2)))
-    print(f"{motion}, {hidden:.0%} hidden: {found_mm:.2f} mm, {found_deg:.2f} deg rms, at most "
-          f"{1e3 * distances.max():.2f} mm, {np.degrees(angles.max()):.2f} deg, NEES {nees(tracked, poses):.2f}, "
-          f"{len(tracked)} of {len(states)} states")
     assert found_mm < rms_mm and found_deg < rms_deg
     assert 1e3 * distances.max() < most_mm, "a jump"
     assert np.degrees(angles.max()) < 10.0, "a flip"
@@ -103,7 +100,6 @@ def test_a_swaying_tag_is_ambiguous_at_most_and_ends_right(seed: int) -> None:
     sure = [state for state in states[4:] if state.validity is Validity.TRACKED]
     angles = np.degrees(errors(sure, poses)[1])
     wrong = angles > 10.0
-    print(f"{len(sure)} of {len(states) - 4} sure, {wrong.sum()} wrong, the rest within {angles[~wrong].max():.1f} deg")
     assert len(sure) > 0.9 * len(states)
     assert wrong.mean() < 0.01
     assert not wrong[-1]
@@ -114,7 +110,6 @@ def test_one_camera_alone_decides_when_the_tag_turns() -> None:
     alone = [frame for frame in frames(model, poses, 2.0, 1) if frame.camera == 0]
     states = track(model, alone)
     angles = np.degrees(errors([state for state in states[20:] if state.validity is Validity.TRACKED], poses)[1])
-    print(f"{len(angles)} of {len(states) - 20} decided, at most {angles.max():.1f} deg off")
     assert angles.max() < 15.0
 
 

@@ -89,14 +89,11 @@ def test_a_cube_before_two_nodes_reaches_a_client_and_a_replay_says_the_same(ben
     assert hands and all(np.isfinite(state.objects[0].distances).all() for state in hands)
     counters = node["answer"]["counters"]
     assert counters["fiducials_sent"] > SECONDS * FPS and counters["fiducials_not_sent"] == 0
-    print(f"{len(objects)} states, at most {1e3 * distances.max():.2f} mm and {np.degrees(angles.max()):.2f} degrees "
-          "from the truth")
 
     again = replayed(log)  # whose clock model knows the exchanges since the log began only
     times = np.array([state.t_master_ns for state in again])
     nearest = [again[int(np.argmin(np.abs(times - state.t_master_ns)))] for state in states]
     late_ns = np.array([one.t_master_ns - state.t_master_ns for one, state in zip(nearest, states, strict=True)])
-    print(f"replayed states are at most {1e-3 * np.abs(late_ns).max():.1f} us from the published ones")
     assert np.mean(np.abs(late_ns) < 1_000_000) > 0.9
     apart_m = [np.linalg.norm(one.objects[0].world_from_object[:3, 3] - state.objects[0].world_from_object[:3, 3])
                for one, state in zip(nearest, states, strict=True)]

@@ -48,8 +48,6 @@ def test_corners_have_no_bias_and_covariances_that_hold(family: str, size_mm: fl
             for one, (xx, xy, yy) in zip(error, np.array(found.covariances).reshape(4, 3), strict=True):
                 squares.append(one @ np.linalg.solve([[xx, xy], [xy, yy]], one) / 2.0)
     rms, bias = np.sqrt(np.mean(np.square(errors))), np.mean(outward)
-    print(f"{family} {size_mm:g} mm, noise {noise:g}: {len(errors)} of {COUNT}, {rms:.3f} px rms by axis, "
-          f"{bias:+.3f} px outward, NEES {np.mean(squares):.2f}")
     assert len(errors) >= 0.9 * COUNT
     assert rms < most_px and abs(bias) < 0.03
     assert 0.2 < np.mean(squares) < 2.0
@@ -64,7 +62,6 @@ def test_cv2s_own_corners_are_biased() -> None:
         corners, _, _ = detector.detectMarkers(image)
         away = true - true.mean(axis=0)
         outward.append(np.sum((corners[0][0] - true) * away, axis=1) / np.linalg.norm(away, axis=1))
-    print(f"cornerSubPix: {np.mean(outward):+.3f} px outward")
     assert np.mean(outward) < -0.2, "the reason for lines fitted to the edges is gone"
 
 

@@ -102,8 +102,6 @@ def test_the_cube_is_where_it_lies() -> None:
     found = pose_of(min(trials, key=lambda pair: pair[0])[1], arrays)
     assert found is not None
     centre, up = found.world_from_object[:3, 3], found.world_from_object[2, 2]
-    print(f"centre {np.round(1e3 * centre, 1)} mm, yellow face {np.degrees(np.arccos(min(up, 1.0))):.1f} deg tilted, "
-          f"{found.rms_px:.2f} px rms of {found.points} corners, {found.validity}")
     expected = np.array([-0.014, -0.024, np.clip(centre[2], 0.028, 0.0325)])
     assert np.linalg.norm(centre - expected) < 0.010
     assert up > np.cos(np.radians(8.0)), "the yellow face is the upper one"
