@@ -104,7 +104,7 @@ def test_the_process_covers_the_fastest_hand() -> None:
     poses = hand_poses("fast", np.arange(0.0, 0.9, step_s))
     velocity = np.diff(poses[:, :3, 3], axis=0) / step_s
     spin = np.array([log_so3(b @ a.T) for a, b in zip(poses[:-1, :3, :3], poses[1:, :3, :3], strict=True)]) / step_s
-    for name, rates, start in zip(("m/s", "rad/s"), (velocity, spin), START_SPEED, strict=True):
+    for rates, start in zip((velocity, spin), START_SPEED, strict=True):  # m/s, rad/s
         fastest = np.linalg.norm(rates, axis=1).max()
         strongest = np.linalg.norm(np.diff(rates, axis=0) / step_s, axis=1).max()
         assert fastest < 2.5 * start

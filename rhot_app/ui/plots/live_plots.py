@@ -50,6 +50,7 @@ class JitterPlot(PlotPanel):
         self.legend.set_entries(entries)
 
     def draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
+        """Columns: one per marker, in the order of the marker set."""
         if rows.shape[1] != len(self._curves):
             rows = np.full((len(seconds), len(self._curves)), np.nan)
         for k, curve in enumerate(self._curves):
@@ -111,6 +112,7 @@ class LatencyPlot(PlotPanel):
               for stage, colour in reversed(list(zip(STACKED, STAGE_COLOURS, strict=False))))])
 
     def draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
+        """Columns: the medians of the stages and of all, then their 99th percentiles."""
         stages = len(STACKED)
         if rows.shape[1] != len(LATENCY_COLUMNS):
             rows = np.full((len(seconds), len(LATENCY_COLUMNS)), np.nan)
@@ -133,7 +135,7 @@ class LatencyPlot(PlotPanel):
 # -- Rates and lost datagrams ------------------------------------------------------------------------------------------
 
 class RatePlot(PlotPanel):
-    """Columns: states, one per node, and last the losses per second."""
+    """States and datagrams per second, and what is lost of them."""
 
     term = "rate"
     title = "Rate and losses"
@@ -165,6 +167,7 @@ class RatePlot(PlotPanel):
         self.legend.set_entries(entries)
 
     def draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
+        """Columns: states, one per node, and last the losses per second."""
         if names != self._names and names:
             self._make_curves(names)
         if rows.shape[1] != len(self._names):
