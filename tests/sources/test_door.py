@@ -77,6 +77,7 @@ def test_admitted_frame_is_in_master_time_and_rig_order(rig: Rig, door: Datagram
     ({"t_frame_node_ns": NODE_CLOCK.from_host_ns(NOW_NS - 2 * 10**9)}, "time"),
     ({"t_frame_node_ns": NODE_CLOCK.from_host_ns(NOW_NS + 10**7), "t_send_node_ns":
       NODE_CLOCK.from_host_ns(NOW_NS + 2 * 10**7)}, "time"),
+    ({"t_send_node_ns": NODE_CLOCK.from_host_ns(NOW_NS + 10**9)}, "time"),
     ({"sequence": 10**9}, None),  # the first number may be any
 ])
 def test_refused_by_reason(rig: Rig, door: DatagramValidator, changes: dict[str, object], reason: str | None) -> None:
