@@ -33,7 +33,8 @@ def read_trc(path: Path) -> tuple[dict[str, str], list[str], pandas.DataFrame]:
     facts = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=True))
     names = [name for name in lines[3].split("\t")[2:] if name]
     assert lines[5] == "", "a blank line before the numbers"
-    return facts, names, pandas.read_csv(path, sep="\t", skiprows=6, header=None)
+    table = pandas.read_csv(path, sep="\t", skiprows=4)  # the axes' names count the columns, as for pose2sim
+    return facts, names, table.set_axis(range(table.shape[1]), axis=1)
 
 
 def test_trc_is_y_up_in_millimetres(log: Path, states: HandStates, tmp_path: Path) -> None:
@@ -50,11 +51,36 @@ def test_trc_is_y_up_in_millimetres(log: Path, states: HandStates, tmp_path: Pat
     assert known.sum() > 60 and found[known] == pytest.approx(expected[known], abs=1e-3)
 
 
-def test_a_gap_of_trc_is_empty(gappy: Path, tmp_path: Path) -> None:
-    path = export_log(gappy, tmp_path / "a.trc", options=CLASSIC).path
-    rows = [line.split("\t") for line in path.read_text().split("\n")[6:] if line]
+@pytest.fixture(scope="module")
+def gappy_trc(gappy: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return export_log(gappy, tmp_path_factory.mktemp("trc") / "a.trc", options=CLASSIC).path
+
+
+def test_a_gap_of_trc_is_nan_in_every_cell(gappy_trc: Path) -> None:
+    """Readers drop an empty last cell (OpenSim), or count a surplus one as a column (pandas)."""
+    lines = gappy_trc.read_text().split("\n")
+    rows = [line.split("\t") for line in lines[6:] if line]
+    assert {len(row) for row in rows} == {len(lines[4].split("\t"))} and all(all(row) for row in rows)
     inside = [row for row in rows if 0.8 < float(row[1]) < 1.2]
-    assert len(inside) > 10 and all(cell == "" for row in inside for cell in row[2:])
+    assert len(inside) > 10 and all(cell == "NaN" for row in inside for cell in row[2:])
+
+
+def test_opensim_reads_trc(gappy_trc: Path) -> None:
+    opensim = pytest.importorskip("opensim", reason="pip install opensim (220 MB) reads the files back")
+    table = opensim.TimeSeriesTableVec3(str(gappy_trc))
+    _, names, own = read_trc(gappy_trc)
+    assert list(table.getColumnLabels()) == names and table.getTableMetaDataString("Units") == "mm"
+    found = [[table.getRowAtIndex(row)[point][axis] for point in range(len(names)) for axis in range(3)]
+             for row in range(table.getNumRows())]
+    assert np.array(found) == pytest.approx(own.to_numpy()[:, 2:], nan_ok=True)
+
+
+def test_pose2sim_reads_trc(gappy_trc: Path) -> None:
+    common = pytest.importorskip("Pose2Sim.common", reason="pip install pose2sim reads the files back")
+    points, frames, times, names, _ = common.read_trc(str(gappy_trc))
+    _, own_names, own = read_trc(gappy_trc)
+    assert names == own_names and frames.to_list() == own[0].to_list() and times.to_list() == own[1].to_list()
+    assert points.to_numpy() == pytest.approx(own.to_numpy()[:, 2:], nan_ok=True)
 
 
 def test_c3d_is_z_up_with_angles_beside(log: Path, states: HandStates, tmp_path: Path) -> None:

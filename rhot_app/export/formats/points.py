@@ -12,6 +12,7 @@ from rhot_app.export.plan import Axes, Plan, file_from_frame, frame_up, require
 from rhot_app.export.states import HandStates, hidden_where_lost
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND
+from rhot_node.errors import printable
 
 Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
@@ -78,7 +79,8 @@ class _Points:
 
 
 class TrcWriter(_Points):
-    """Tab-separated text as OpenSim reads it: y up; a gap is three empty cells."""
+    """Tab-separated text as OpenSim reads and writes it: y up; a gap is three cells of NaN. OpenSim refuses a row whose
+    last cell is empty."""
 
     def __init__(self, plan: Plan) -> None:
         super().__init__(plan, "y-up")
@@ -86,7 +88,7 @@ class TrcWriter(_Points):
     def finish(self) -> None:
         """Write the file."""
         count, rate = sum(map(len, self._positions)), f"{self.rate_hz:g}"
-        head = [f"PathFileType\t4\t(X/Y/Z)\t{self._plan.log}",
+        head = [f"PathFileType\t4\t(X/Y/Z)\t{printable(self._plan.log)}",
                 "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
                 f"{rate}\t{rate}\t{count}\t{len(self.labels)}\t{self._plan.units}\t{rate}\t1\t{count}",
                 "Frame#\tTime\t" + "\t\t\t".join(self.labels) + "\t\t",
@@ -102,7 +104,7 @@ class TrcWriter(_Points):
         line = "%d\t%.6f\t" + "\t".join([places] * (3 * len(self.labels))) + "\n"
         for block in self._positions:
             for row in block.reshape(len(block), -1).tolist():
-                yield (line % (number + 1, number / self.rate_hz, *row)).replace("nan", "")
+                yield (line % (number + 1, number / self.rate_hz, *row)).replace("nan", "NaN")
                 number += 1
 
 
