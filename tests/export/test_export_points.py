@@ -11,8 +11,10 @@ import numpy as np
 import pandas
 import pytest
 
+from rhot_app.__main__ import main
 from rhot_app.export.export import export_log
-from rhot_app.export.plan import ExportOptions
+from rhot_app.export.formats.points import C3D_FRAMES_MAX, C3dWriter
+from rhot_app.export.plan import ExportOptions, Plan
 from rhot_app.export.states import HandStates
 from rhot_app.hand.skeleton import ANGLES, JOINTS
 from rhot_app.recording.raw_log import LogReader
@@ -116,6 +118,29 @@ def test_another_reader_of_c3d_agrees_and_sees_the_gap(gappy: Path, gappy_states
     known = wrist[:, 3] >= 0.0
     expected = 1e3 * at(gappy_states, times, "wrist")[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
     assert known.sum() > 30 and wrist[known, :3] == pytest.approx(expected[known], abs=2e-3)
+
+
+def test_readers_of_c3d_count_all_frames_of_the_longest_file(log: Path, states: HandStates, tmp_path: Path) -> None:
+    rig, first_ns = LogReader(log).rig, int(states.t_master_ns[0])
+    writer = C3dWriter(Plan(tmp_path / "a.c3d", rig, "rig", "mm", "hand", 40.0, log.name, "x" * 300, first_ns))
+    block = states.where(np.full(C3D_FRAMES_MAX // 7, 40))
+    for _ in range(7):
+        writer.add(block)
+    writer.finish()
+    assert ezc3d.c3d(str(tmp_path / "a.c3d"))["data"]["points"].shape[2] == 7 * len(block) == C3D_FRAMES_MAX
+    with (tmp_path / "a.c3d").open("rb") as file:
+        reader = c3d.Reader(file)
+        assert reader.frame_count == C3D_FRAMES_MAX and next(reader.read_frames())[0] == 1
+
+
+def test_a_longer_c3d_file_is_refused_with_the_longest_length(
+        log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("rhot_app.export.formats.points.C3D_FRAMES_MAX", 500)
+    out = tmp_path / "a.c3d"
+    assert main(["export", str(log), "--out", str(out), "--tracker", "classic", "--rate", "1000"]) == 2
+    error = capsys.readouterr().err
+    assert "500 frames" in error and "0.5 s at 1000 Hz" in error and "--rate" in error and not out.exists()
+    assert main(["export", str(log), "--out", str(out), "--tracker", "classic", "--rate", "100"]) == 0
 
 
 def test_a_table_frame_is_turned_less(log: Path, states: HandStates, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,12 @@ from rhot_app.export.states import HandStates, hidden_where_lost
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND
 from rhot_node.errors import printable
+
+C3D_FRAMES_MAX: Final = 65534
+"""A last frame of 65535 says that the number stands elsewhere; py-c3d then reads no frame, ezc3d none after that."""
+
+C3D_TEXT_MAX: Final = 255
+"""Bytes of a parameter's text, whose length is one byte."""
 
 Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
@@ -117,6 +124,17 @@ class C3dWriter(_Points):
     def __init__(self, plan: Plan) -> None:
         self._ezc3d = require("ezc3d", "a C3D file")
         super().__init__(plan, "z-up")
+        self._count = 0
+
+    def add(self, states: HandStates) -> None:
+        """Keep these states. Raises ExportError when a C3D file cannot hold so many."""
+        self._count += len(states)
+        if self._count > C3D_FRAMES_MAX:
+            longest_s = C3D_FRAMES_MAX / self.rate_hz
+            longest = f"{longest_s / 60.0:.1f} minutes" if longest_s >= 120.0 else f"{longest_s:.1f} s"
+            raise ExportError(f"{self._plan.log} is too long for C3D, whose readers count to {C3D_FRAMES_MAX} frames: "
+                              f"{longest} at {self.rate_hz:g} Hz. Give a lower --rate, or take another format.")
+        super().add(states)
 
     def finish(self) -> None:
         """Write the file."""
@@ -125,8 +143,6 @@ class C3dWriter(_Points):
         channels = tuple(f"{prefix}{angle}" for prefix in ("", OTHER_HAND)[:hands] for angle in ANGLES)
         self._describe(file, channels)
         points, residuals = self._homogeneous()
-        self.notes += [] if len(points[0, 0]) <= 65535 else [
-            "the file has more than 65535 frames; old readers of C3D count no further"]
         file["data"]["points"] = points
         file["data"]["meta_points"]["residuals"] = residuals
         file["data"]["analogs"] = np.concatenate(self._angles).T[None].astype(np.float64)
@@ -152,7 +168,8 @@ class C3dWriter(_Points):
         file.add_parameter("POINT", "X_SCREEN", ["+X"])  # type: ignore[attr-defined]
         file.add_parameter("POINT", "Y_SCREEN", ["+Z"])  # type: ignore[attr-defined]
         for key, value in self._plan.about().items():
-            file.add_parameter("RHOT", key.upper(), [value or "unknown"])  # type: ignore[attr-defined]
+            text = (value or "unknown").encode()[:C3D_TEXT_MAX].decode(errors="ignore")
+            file.add_parameter("RHOT", key.upper(), [text])  # type: ignore[attr-defined]
 
     def _homogeneous(self) -> tuple[Array, Array]:
         """(4, P, N) positions and (1, P, N) residuals as ezc3d takes them."""
