@@ -71,6 +71,7 @@ def test_symmetric_delay_gives_tens_of_microseconds() -> None:
         _, t4 = exchange(model, clock, 10**12 + k * PERIOD_NS, symmetric, rng)
     assert error_s(model, clock, t4 + 50_000_000) < 30e-6
     assert abs(model.drift - 50e-6) < 5e-6
+    assert error_s(model, clock, t4 + 10 * 10**9) < 30e-6 + 5e-6 * 10, "the drift is carried on"
 
 
 def test_silence_widens_the_bound_until_nothing_is_converted() -> None:
