@@ -223,7 +223,7 @@ class Replies:
         """As the command socket's thread does it, which has asked the next question meanwhile."""
         self._link.request(NOW_NS - 300_000)
         try:
-            reply = self._link.door.admission.open(data)
+            reply = self._link.door.open(data)
         except WireError as exc:
             self._refused[exc.reason] = self._refused.get(exc.reason, 0) + 1
             return False

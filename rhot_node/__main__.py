@@ -108,10 +108,10 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 def _serve(options: argparse.Namespace) -> int:
     from rhot_node.config import load_settings
+    from rhot_node.logs import log_to_stderr
     end = End(os.getppid() if options.exit_with_parent else None)
     settings = load_settings(options.settings)
-    logging.basicConfig(level=options.log_level.upper(), stream=sys.stderr,
-                        format=f"%(asctime)s {settings.name} %(levelname)s %(message)s")
+    log_to_stderr(options.log_level.upper(), f"%(asctime)s {settings.name} %(levelname)s %(message)s")
     sys.setswitchinterval(GIL_SWITCH_S)
     _run(options, settings, end)
     return 0

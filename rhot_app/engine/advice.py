@@ -43,7 +43,7 @@ _REFUSALS = {
                                    "them. Close other programs, or allow a larger buffer with "
                                    "`sudo sysctl -w net.core.rmem_max=8388608`."),
 }
-_REFUSED_HERE = ("kernel_overflow", "time")  # they came, but are missing in the sequence; said by `_REFUSALS`
+_OVERFLOW = "kernel_overflow"  # they came, but are missing in the sequence; said by `_REFUSALS`
 _BUSY = "This computer is too busy: close other programs, or lower the frame rate."
 _MALFORMED = frozenset({"magic", "length", "type", "flags", "header", "reserved", "count", "index", "size", "marker",
                         "range", "text", "kind"})
@@ -180,7 +180,7 @@ def _link_advice(facts: NodeFacts, running: bool) -> list[Advice]:
     found = []
     status, recent = facts.status, facts.recent
     name, here = status.name, is_loopback(facts.address)
-    lost = max(0, recent.lost - sum(recent.dropped.get(reason, 0) for reason in _REFUSED_HERE))
+    lost = max(0, recent.lost - recent.dropped.get(_OVERFLOW, 0))
     total = recent.accepted + sum(recent.dropped.values()) + lost
     if total >= 20 and lost > MANY_LOST * total:
         found.append(Advice("warning", f"Node {name}: {100 * lost / total:.0f} % of the datagrams are lost. "

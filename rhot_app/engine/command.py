@@ -84,10 +84,11 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.keys import load_master_keys
     from rhot_app.project import load_rig
     from rhot_app.sources.links import UdpNodes
+    from rhot_node.logs import log_to_stderr
 
     if args.video and args.log is None:
         raise EngineError("--video needs --log FILE: the videos belong to a recording.")
-    logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
+    log_to_stderr(logging.INFO if args.verbose else logging.WARNING)
     rig = load_rig(args.rig)
     if not args.unchecked:
         _require_acceptable(rig, args.rig)

@@ -53,6 +53,11 @@ class EngineDirectory:
         return self.path / "engine.log"
 
     @property
+    def twin_log_file(self) -> Path:
+        """What simulated nodes started in the background said."""
+        return self.path / "twin.log"
+
+    @property
     def session_file(self) -> Path:
         """Processes that an app has started, see `rhot_app.engine.process`."""
         return self.path / "session.json"

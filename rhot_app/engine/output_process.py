@@ -32,6 +32,7 @@ from rhot_app.outputs.outputs import Outputs, check_output
 from rhot_app.outputs.spec import SECRET_VARIABLE, OutputStatus, as_run
 from rhot_app.project import OutputSettings, Rig, parse_rig
 from rhot_app.state import HandState
+from rhot_node.logs import log_to_stderr
 
 RESTART_S: Final = 3.0
 SETTLE_S: Final = 15.0  # a process that starts, on a busy computer
@@ -202,7 +203,7 @@ class OutputProgram:
 
 def main() -> int:
     """Run until standard input ends: with the engine, however that ends."""
-    logging.basicConfig(level=logging.WARNING, format="%(message)s")
+    log_to_stderr()
     os.nice(NICE)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the engine's, which then closes the input
     status, sys.stdout = sys.stdout.buffer, sys.stderr

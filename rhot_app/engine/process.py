@@ -22,6 +22,7 @@ from rhot_app.engine.client import EngineClient
 from rhot_app.engine.directory import EngineDirectory, lock_holder, open_directory
 from rhot_app.errors import EngineError
 from rhot_node.files import decode_message, read_input, write_document
+from rhot_node.logs import before
 
 START_TIMEOUT_S = 240.0
 """The first start of all compiles the tracker, on a slow or busy machine for minutes; later ones take seconds."""
@@ -157,7 +158,9 @@ def stop_engine(directory: Path | None = None) -> None:
 def _spawn(rig_path: Path, place: EngineDirectory, start: bool) -> int:
     command = [sys.executable, "-m", "rhot_app", "engine", "--rig", str(rig_path.absolute()),
                "--unchecked", "--directory", str(place.path), *(["--start"] if start else [])]
-    with place.log_file.open("wb") as log:
+    with contextlib.suppress(OSError):
+        place.log_file.replace(before(place.log_file))
+    with place.log_file.open("ab") as log:
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
     with contextlib.suppress(EngineError):
         remember_process(place, process.pid, "engine")

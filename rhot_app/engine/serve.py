@@ -27,6 +27,7 @@ from rhot_app.sources.receiver import share_interpreter
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.compiled import announce_compilation
 from rhot_node.keys import KeyPair
+from rhot_node.logs import cut_log
 
 _COLLECT_S = 5.0
 
@@ -138,6 +139,7 @@ class Server:
         self._poller = zmq.Poller()
         self._poller.register(self._commands_socket, zmq.POLLIN)
         self._status_due_ns = 0
+        self._log_file = directory.log_file
 
     def end(self) -> None:
         """Have `run` return after the step at hand."""
@@ -163,6 +165,7 @@ class Server:
             self._nodes.ask_for_states(status)
             status = replace(status, advice=most_urgent_first((*status.advice, *self._nodes.advice())))
             self._publish(TOPIC_STATUS, encode(status))
+            cut_log(self._log_file)
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Serve until `end`, or until `until` is true."""

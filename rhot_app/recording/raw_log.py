@@ -15,7 +15,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, BinaryIO, Final, Protocol
 
 import msgspec
 import numpy as np
@@ -50,6 +50,7 @@ class RecordKind(enum.IntEnum):
     OBJECT_POSE = 8  # of another tracker, in the rig frame (rhot_app.recording.object_poses)
     LANDMARKS = 9  # reserved
     SLICES = 10  # sent to a node, as sent
+    REFUSED = 11  # JSON: datagrams of a node that were refused and are not recorded, by reason
 
 
 _KINDS = frozenset(int(kind) for kind in RecordKind) - {RecordKind.LANDMARKS}
@@ -63,6 +64,14 @@ class Record:
     node_id: int
     t_master_ns: int
     data: bytes
+
+
+class RecordSink(Protocol):
+    """Takes records. Must return at once and never raise: it is called between a sample and its state."""
+
+    def put(self, kind: RecordKind, node_id: int, t_master_ns: int, data: bytes) -> None:
+        """Take one record's parts."""
+        ...
 
 
 @dataclass(slots=True)

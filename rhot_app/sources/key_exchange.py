@@ -18,7 +18,7 @@ from rhot_app.sources.node_link import NodeLink
 from rhot_node.errors import printable
 from rhot_node.files import decode_message
 from rhot_node.keys import HexKey, KeyPair, connect_with
-from rhot_node.network.log_limit import LogLimit
+from rhot_node.logs import LogLimit
 
 ASK_NS = 250_000_000
 """A node is not asked more often than this."""

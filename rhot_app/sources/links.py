@@ -15,13 +15,12 @@ from collections.abc import Callable
 
 from rhot_app.barehand.observations import SliceRequest
 from rhot_app.project import Rig
-from rhot_app.recording.raw_log import RecordKind
+from rhot_app.recording.raw_log import RecordKind, RecordSink
 from rhot_app.sources.key_exchange import KeyExchange
 from rhot_app.sources.lost_nodes import LostNodes
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.poses.followed import FollowedObjects
-from rhot_app.sources.receiver import DatagramTap, Deliver, NodeReceiver, open_data_socket
-from rhot_app.sources.source import RecordSink
+from rhot_app.sources.receiver import DatagramSink, Deliver, NodeReceiver, open_data_socket
 from rhot_node.clock import ANCILLARY_SIZE, KernelTime, ask_for_times
 from rhot_node.errors import WireError
 from rhot_node.keys import KeyPair
@@ -165,14 +164,18 @@ class NodeLinks:
         t_receive_ns, _ = self._kernel_time.receive_time_ns(ancillary)
         try:
             link = self._links.get(node_of(data))
-            reply = None if link is None else link.door.admission.open(data)
-        except WireError as exc:
-            log.debug("command socket: %s", exc)
+        except WireError:
             return
-        if link is not None and isinstance(reply, ClockReply):
+        if link is None:
+            return
+        try:
+            reply = link.door.open(data)
+        except WireError:
+            link.refused_replies += 1
+            return
+        if isinstance(reply, ClockReply) and link.take_reply(reply, t_receive_ns):
             self._note(RecordKind.CLOCK_REPLY, reply.node_id, t_receive_ns, data)
-            if link.take_reply(reply, t_receive_ns):
-                self._look_where(link, sender)
+            self._look_where(link, sender)
 
     def _look_where(self, link: NodeLink, sender: tuple[str, int]) -> None:
         """What the node alone can answer came from one of the places where it may be: it is there from now on."""
@@ -332,7 +335,9 @@ class UdpNodes:
         """Tap all sockets; None ends it."""
         self._commands.record_to(tap)  # first what is known of sessions and clocks: datagrams mean nothing before
         for link, receiver in zip(self.links, self.receivers, strict=True):
-            receiver.tap = None if tap is None else _datagram_tap(tap, link.node.node_id)
+            before, receiver.sink = receiver.sink, None if tap is None else DatagramSink(tap, link)
+            if before is not None:
+                before.close()
         self._followed.tap = tap
 
     def close(self) -> None:
@@ -342,8 +347,3 @@ class UdpNodes:
         for receiver in self.receivers:
             receiver.close()
 
-
-def _datagram_tap(tap: RecordSink, node_id: int) -> DatagramTap:
-    def put(t_receive_ns: int, data: bytes) -> None:
-        tap.put(RecordKind.DATAGRAM, node_id, t_receive_ns, data)
-    return put

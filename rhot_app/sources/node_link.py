@@ -8,7 +8,7 @@ from __future__ import annotations
 from rhot_app.barehand.observations import SliceRequest
 from rhot_app.project import Rig
 from rhot_app.sources.clock import NodeClockModel
-from rhot_app.sources.validation import NOBODY_YET, DatagramValidator, holder_of
+from rhot_app.sources.validation import DatagramValidator, refuse_without_key, tagged_by
 from rhot_node.wire.codec import Seal, encode
 from rhot_node.wire.messages import ClockReply, ClockRequest, Message, NodeState
 
@@ -20,6 +20,9 @@ RESTART_NS = 250_000_000
 
 UNANSWERED_NS = 300_000_000
 """A paired node that has answered no clock request for so long may have forgotten our key: it is asked for it."""
+
+CLOCK_REPLY = "clock_reply"
+"""What `NodeLink.refused_replies` are called where datagrams are counted by reason."""
 
 PENDING_MAX = 64  # requests that may still be answered
 
@@ -36,7 +39,7 @@ class NodeLink:
         self.session = 0  # the node's own word
         self.wanted = 0  # the session we told it to stream; 0: none
         self.clock_changes = 0  # boots and steps: what the tracker knows of this node's times is void
-        self.unexpected_replies = 0
+        self.refused_replies = 0  # on the command port: forged, repeated or to no question of ours
         self.turned_away = False  # the node lets no encrypted connection of ours in: it does not know us
         self.key_name = ""  # of the link whose key we have
         self.last_reply_ns: int | None = None
@@ -49,7 +52,7 @@ class NodeLink:
         self._ready_since_ns: int | None = None
         self._was_ours = False
         if self.paired:
-            self.door.admission = NOBODY_YET
+            self.door.open = refuse_without_key
 
     @property
     def paired(self) -> bool:
@@ -73,7 +76,7 @@ class NodeLink:
         """Tag what we say with `key` and believe only what is tagged with it, from now on."""
         if name != self.key_name:
             self.key_name, self._seal, self._key_is_new = name, Seal(key), True
-            self.door.admission = holder_of(self._seal)
+            self.door.open = tagged_by(self._seal)
 
     def request(self, t1_master_ns: int) -> ClockRequest:
         """The next clock request, to be sent now; it tells the node which session its master runs."""
@@ -100,7 +103,7 @@ class NodeLink:
         """Take a reply in that the kernel received at `t4_master_ns`. False when it answers no question of ours."""
         t1_master_ns = self._pending.pop(reply.sequence, None)
         if t1_master_ns is None or t1_master_ns != reply.t1_master_ns:
-            self.unexpected_replies += 1
+            self.refused_replies += 1
             return False
         if self.clock.add(t1_master_ns, reply.t2_node_ns, reply.t3_node_ns, t4_master_ns, reply.boot_id):
             self.clock_changes += 1

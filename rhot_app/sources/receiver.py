@@ -8,9 +8,15 @@ import socket
 import struct
 import sys
 import threading
+import time
+from collections import Counter
 from collections.abc import Callable
 
+import msgspec
+
 from rhot_app.errors import SourceError
+from rhot_app.recording.raw_log import RecordKind, RecordSink
+from rhot_app.sources.node_link import CLOCK_REPLY, NodeLink
 from rhot_app.sources.validation import DatagramValidator, Verified
 from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.clock import ANCILLARY_SIZE, KernelTime, ask_for_times
@@ -66,9 +72,6 @@ DATAGRAM_MAX = 4096  # bytes; 64 markers need 2.1 kB, and a longer datagram is r
 SO_RCVBUFFORCE = 33
 _WAIT = struct.pack("@ll", 0, 200_000)  # a blocked read returns after 0.2 s to see whether it shall end
 
-DatagramTap = Callable[[int, bytes], None]
-"""``tap(t_receive_ns, data)``: sees every genuine datagram before it is judged."""
-
 Deliver = Callable[[list[CameraFrame]], None]
 """Takes verified frames of one camera, oldest first, in the thread that received them. May take as long as a state."""
 
@@ -100,6 +103,44 @@ def granted_buffer(sock: socket.socket) -> int:
     return sock.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2
 
 
+REFUSED_NS = 1_000_000_000
+"""How often the log is told how many datagrams were refused."""
+
+
+class DatagramSink:
+    """Records one node's datagrams, and how many others came: nothing that can be sent again and again."""
+
+    def __init__(self, sink: RecordSink, link: NodeLink) -> None:
+        self._sink, self._link = sink, link
+        self._told = self._refused()
+        self._due_ns = 0
+        self._lock = threading.Lock()  # the last count is another thread's
+
+    def put(self, t_receive_ns: int, data: bytes) -> None:
+        """Record a datagram."""
+        self._sink.put(RecordKind.DATAGRAM, self._link.node.node_id, t_receive_ns, data)
+
+    def count_refused(self, now_ns: int) -> None:
+        """Record how many were refused since the last time, when that is a while ago."""
+        if now_ns >= self._due_ns:
+            self._due_ns = now_ns + REFUSED_NS
+            self._tell(now_ns)
+
+    def close(self) -> None:
+        """Record what is left to say."""
+        self._tell(time.monotonic_ns())
+
+    def _tell(self, now_ns: int) -> None:
+        with self._lock:
+            before, self._told = self._told, self._refused()
+            since = self._told - before
+            if since:
+                self._sink.put(RecordKind.REFUSED, self._link.node.node_id, now_ns, msgspec.json.encode(since))
+
+    def _refused(self) -> Counter[str]:
+        return Counter(self._link.door.refused.copy()) + Counter({CLOCK_REPLY: self._link.refused_replies})
+
+
 class NodeReceiver:
     """Drains one data socket in bursts. `step` is one burst; `start` runs it in a thread until `close`.
 
@@ -109,7 +150,8 @@ class NodeReceiver:
 
     def __init__(self, sock: socket.socket, door: DatagramValidator, name: str) -> None:
         self.door = door
-        self.tap: DatagramTap | None = None
+        self.sink: DatagramSink | None = None
+        """Given every datagram of the stream that comes for the first time."""
         self.deliver: Deliver = to_nobody
         self.port: int = sock.getsockname()[1]
         self.buffer_bytes = granted_buffer(sock)
@@ -134,9 +176,11 @@ class NodeReceiver:
                 claim_interpreter()
                 t_receive_ns, now_ns = self._kernel_time.receive_time_ns(ancillary)
                 count, flags = count + 1, socket.MSG_DONTWAIT
-                if self.tap is not None and self.door.admission.genuine(data):  # a stranger fills no disk
-                    self.tap(t_receive_ns, data)
+                taken = self.door.taken
                 frame = self.door.verify(data, t_receive_ns)
+                sink = self.sink
+                if sink is not None and self.door.taken > taken:
+                    sink.put(t_receive_ns, data)
                 if frame is not None:
                     verified.append(frame)
                 if now_ns - t_receive_ns < FRESH_NS:
@@ -144,6 +188,9 @@ class NodeReceiver:
         if verified:
             self.skipped += max(0, len(verified) - NEWEST)
             self.deliver([self.door.convert(frame) for frame in verified[-NEWEST:]])
+        sink = self.sink
+        if sink is not None:
+            sink.count_refused(time.monotonic_ns())
         return count
 
     def start(self) -> None:

@@ -7,18 +7,21 @@ import threading
 import time
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Annotated
+
+import msgspec
 
 from rhot_app.barehand.observations import SliceRequest
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.object_poses import decode_pose
-from rhot_app.recording.raw_log import LogReader, Record, RecordKind
-from rhot_app.sources.node_link import NodeLink
+from rhot_app.recording.raw_log import LogReader, Record, RecordKind, RecordSink
+from rhot_app.sources.node_link import CLOCK_REPLY, NodeLink
 from rhot_app.sources.receiver import Deliver, NodeReceiver, to_nobody
-from rhot_app.sources.source import RecordSink
-from rhot_app.sources.validation import RECORDED
 from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.errors import WireError
+from rhot_node.files import decode_message
+from rhot_node.wire.codec import decode_verified
 from rhot_node.wire.messages import ClockReply, ClockRequest, Slices, Start
 
 
@@ -32,7 +35,7 @@ class LogValidator:
         self.starts = 0
         self._by_id = {link.node.node_id: link for link in self.links}
         for link in self.links:
-            link.door.admission = RECORDED
+            link.door.open = decode_verified
             if link.node.text_datagrams:
                 link.door.expect_session(1)
 
@@ -57,15 +60,27 @@ class LogValidator:
         elif record.kind is RecordKind.OBJECT_POSE:
             with contextlib.suppress(RecordingError):
                 return decode_pose(record.data)
+        elif record.kind is RecordKind.REFUSED:
+            self._count_refused(record)
         elif record.kind is RecordKind.GAP:
             self.gaps += int.from_bytes(record.data[:4], "little")
         else:
             self._feed_command(record)
         return None
 
+    def _count_refused(self, record: Record) -> None:
+        link = self._by_id.get(record.node_id)
+        with contextlib.suppress(msgspec.MsgspecError):
+            refused = decode_message(record.data, dict[str, Annotated[int, msgspec.Meta(ge=0)]])
+            if link is not None:
+                link.refused_replies += refused.pop(CLOCK_REPLY, 0)
+                link.door.received += sum(refused.values())
+                for reason, count in refused.items():
+                    link.door.drop(reason, count)
+
     def _feed_command(self, record: Record) -> None:
         try:
-            message = RECORDED.open(record.data)
+            message = decode_verified(record.data)
         except WireError:
             return
         if isinstance(message, Start):

@@ -7,21 +7,10 @@ from typing import Protocol
 
 from rhot_app.barehand.observations import SliceRequest
 from rhot_app.project import Rig
-from rhot_app.recording.raw_log import RecordKind
+from rhot_app.recording.raw_log import RecordSink
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import Deliver, NodeReceiver
 
-# -- record sink -------------------------------------------------------------------------------------------------------
-
-class RecordSink(Protocol):
-    """Takes records. Must return at once and never raise: it is called between a sample and its state."""
-
-    def put(self, kind: RecordKind, node_id: int, t_master_ns: int, data: bytes) -> None:
-        """Take one datagram with its kernel receive time, or the time of sending."""
-        ...
-
-
-# -- frame source ------------------------------------------------------------------------------------------------------
 
 class ObservationSource(Protocol):
     """Delivers verified frames of all cameras of a rig from threads of its own."""

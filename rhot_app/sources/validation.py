@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from rhot_app.sources.clock import ClockEstimate, NodeClockModel
 from rhot_app.sources.searches import NodeSearches
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Candidates
 from rhot_node.errors import WireError
-from rhot_node.wire.codec import Seal, decode, decode_sealed, decode_verified, is_tagged
+from rhot_node.wire.codec import Seal, decode, decode_sealed, is_tagged
 from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     Fiducials,
@@ -33,29 +32,20 @@ from rhot_node.wire.text import parse_text
 
 # -- authentication ----------------------------------------------------------------------------------------------------
 
-@dataclass(frozen=True, slots=True)
-class Authentication:
-    """`open` gives a datagram's message or raises WireError; `genuine` says whether it comes from whom we listen to,
-    whatever it says: only that is recorded."""
-
-    open: Callable[[bytes], Message]
-    genuine: Callable[[bytes], bool]
+Open = Callable[[bytes], Message]
+"""Gives the message of a datagram that comes from whom we listen to; raises WireError of any other."""
 
 
-def holder_of(seal: Seal) -> Authentication:
-    """Only what `seal` tagged."""
-    return Authentication(functools.partial(decode_sealed, seal=seal), seal.verifies)
+def tagged_by(seal: Seal) -> Open:
+    """Opens only what `seal` tagged."""
+    return functools.partial(decode_sealed, seal=seal)
 
 
-def _refuse(data: bytes) -> Message:
+def refuse_without_key(data: bytes) -> Message:
+    """`Open` of a paired node whose key is not known yet."""
     if is_tagged(data):
         raise WireError("no_key", "the node has not given the key yet")
     raise WireError("untagged", "no tag where one is required")
-
-
-ANYBODY = Authentication(decode, lambda data: True)
-NOBODY_YET = Authentication(_refuse, lambda data: False)
-RECORDED = Authentication(decode_verified, lambda data: True)
 
 
 # -- datagram validator ------------------------------------------------------------------------------------------------
@@ -78,16 +68,18 @@ class DatagramValidator:
     def __init__(self, rig: Rig, camera: int, clock: NodeClockModel) -> None:
         """`camera` is the node's index in the rig."""
         self.clock = clock
-        self.admission = ANYBODY
+        self.open: Open = decode
         self.sequence = SequenceWindow()  # of observations
         self._sequences: dict[type, SequenceWindow] = {
             Observations: self.sequence, Fiducials: SequenceWindow(), SliceEdges: SequenceWindow(),
             ForegroundPart: SequenceWindow()}
         self.searches = NodeSearches()
         self.received = 0  # datagrams of any kind
+        self.taken = 0  # of the stream, and come for the first time: they are recorded
         self.accepted = 0  # observations
         self.fiducials = self.searched = 0  # accepted ones; frames with edges or a foreground map
         self.dropped: dict[str, int] = {}
+        self.refused: dict[str, int] = {}  # those of them that were not taken: anybody can send them again
         self.image_size: tuple[int, int] | None = None  # of the last refused frame of another size
         self.last_t_receive_ns = 0  # of the last accepted one
         self._travel = TravelTimes()
@@ -133,13 +125,15 @@ class DatagramValidator:
     def verify(self, data: bytes, t_receive_ns: int) -> Verified | None:
         """First half of `admit`, cheap enough for a flood: everything is counted, nothing is built yet."""
         self.received += 1
+        taken = self.taken
         try:
             verified = self._verify_text(data, t_receive_ns) if self._text else self._verify(data, t_receive_ns)
         except WireError as exc:
-            self.drop(exc.reason)
-            return None
+            verified = exc.reason
         if isinstance(verified, str):
             self.drop(verified)
+            if self.taken == taken:
+                self.refused[verified] = self.refused.get(verified, 0) + 1
             return None
         if verified is None:  # a part of something
             return None
@@ -165,27 +159,32 @@ class DatagramValidator:
         if not self._session:
             return "not_started"
         assert self._text is not None
-        return self._text.read(data, t_receive_ns)
+        observations = self._text.read(data, t_receive_ns)
+        self.taken += 1
+        return observations
 
     def _verify(self, data: bytes, t_receive_ns: int) -> Verified | str | None:
         """A message, what a last part completes, None of another part, or why it is dropped."""
-        message = self.admission.open(data)
+        message = self.open(data)
         if not isinstance(message, _FrameMessage):
             return "kind"
         sequence = self._sequences[type(message)]
-        reason = self._objection(message, sequence)
+        reason = self._not_of_the_stream(message, sequence)
+        if reason is not None:
+            return reason
+        sequence.take(message.sequence)  # also what is refused now has come: it is not lost
+        self.taken += 1
+        reason = self._unlike_the_rig(message)
         if reason is not None:
             return reason
         estimate = self.clock.estimate_at(t_receive_ns)
         if estimate is None:
-            sequence.take(message.sequence)  # it came, so it is not lost
             return "no_clock"
         t_row0_ns = estimate.to_master_ns(message.t_frame_node_ns) + self._time_offset_ns
         t_send_ns = estimate.to_master_ns(message.t_send_node_ns)
         bound_s = estimate.bound_s(t_receive_ns)
         if not self._plausible(t_row0_ns, t_send_ns, t_receive_ns, bound_s):
             return "time"
-        sequence.take(message.sequence)  # also what is refused for its clock has come
         if not self._travel.believed(t_receive_ns - t_send_ns, t_receive_ns, estimate):
             return "clock_in_doubt"
         if isinstance(message, SliceEdges | ForegroundPart):
@@ -194,8 +193,8 @@ class DatagramValidator:
                                                                   t_receive_ns)
         return message, t_row0_ns, t_send_ns, t_receive_ns, bound_s
 
-    def _objection(self, message: _FrameMessage, sequence: SequenceWindow) -> str | None:
-        """Why this message is not one of the stream we asked for; None when it is."""
+    def _not_of_the_stream(self, message: _FrameMessage, sequence: SequenceWindow) -> str | None:
+        """Why this message is not a new one of the stream that we asked for; None when it is."""
         if message.node_id != self._node_id:
             return "foreign_node"
         if message.session != self._session:
@@ -203,6 +202,10 @@ class DatagramValidator:
         verdict = sequence.judge(message.sequence)
         if verdict is not SequenceVerdict.FRESH and verdict is not SequenceVerdict.LATE:
             return verdict.name.lower()
+        return None
+
+    def _unlike_the_rig(self, message: _FrameMessage) -> str | None:
+        """What of this message is not as the rig says; None when all is."""
         if isinstance(message, Observations) and (message.marker_checksum != self._checksum
                                                   or message.marker_count != self._count):
             return "marker_set"

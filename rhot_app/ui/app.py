@@ -17,6 +17,7 @@ from rhot_app.project import load_rig
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
 from rhot_node.files import require_replaceable
+from rhot_node.logs import log_to_stderr
 
 if TYPE_CHECKING:
     from rhot_app.ui.common.controller import Controller
@@ -61,6 +62,7 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
         _require_settings_file(args.settings)
     choose_gl_platform()
     cap_software_gl()
+    log_to_stderr()
     session = Session(args.directory)
     from rhot_app.ui.common.job import workers
 

@@ -19,7 +19,7 @@ import zmq
 from rhot_node.config import NodeSettings
 from rhot_node.errors import LinkError, printable
 from rhot_node.keys import NodeTrust, serve_with
-from rhot_node.network.log_limit import LogLimit
+from rhot_node.logs import LogLimit
 from rhot_node.network.pairing import REQUEST_MAX as STRANGERS_REQUEST_MAX
 from rhot_node.network.pairing import Reception
 from rhot_node.network.pictures import PictureBox, encode_preview

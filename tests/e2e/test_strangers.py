@@ -7,6 +7,7 @@ import contextlib
 import json
 import socket
 import time
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,12 +21,14 @@ from patience import PATIENCE_S
 from scene import Scene
 
 from rhot_app.engine.client import EngineClient
+from rhot_app.recording.raw_log import LogReader, RecordKind
 from rhot_app.state import Knowledge
 from rhot_node.clock import NodeClock
 from rhot_node.keys import KeyPair, connect_with, new_key_pair
 from rhot_node.wire.codec import Seal, encode
 from rhot_node.wire.messages import ClockRequest, MarkerObservation, Message, Observations, Start, StartEntry, Stop
 
+REPEATED = 200
 SILENCE_S = 0.2  # a master is answered within milliseconds
 
 pytestmark = pytest.mark.timeout(TEST_S)
@@ -185,6 +188,38 @@ def test_it_moves_no_marker(attack: Attack) -> None:
     wait_until(client, lambda: sum(forged_ones()) >= 200, PATIENCE_S, "all forgeries are counted")
     assert forged_ones() == [100, 100]
     assert {kind for kind, count in attack.dropped().items() if count} <= {"untagged", "tag"} | AT_START
+
+
+def test_it_fills_neither_the_log_nor_the_engines_messages(attack: Attack) -> None:
+    path, said = attack.bench.folder / "flood.rhotlog", len(attack.bench.log("engine"))
+    attack.client.command("record", path=str(path))
+    wait_until(attack.client, lambda: genuine_datagrams(path), PATIENCE_S, "observations in the log")
+    genuine, port = genuine_datagrams(path)[-1], attack.bench.rig.nodes[0].data_port
+    before = attack.dropped().get("duplicate", 0)
+    for k in range(REPEATED):
+        for data in (genuine, genuine[:-1], bytes(40), b"\n" * 1400):
+            attack.udp.sendto(data, ("127.0.0.1", port))
+        if k % 50 == 49:  # what the kernel has no room for proves nothing
+            sent = k + 1
+            wait_until(attack.client, lambda sent=sent: attack.dropped().get("duplicate", 0) - before >= sent,
+                       PATIENCE_S, "all are refused")
+    attack.client.command("record_stop")
+    with contextlib.closing(LogReader(path)) as reader:
+        records = list(reader)
+    assert [one.data for one in records if one.kind is RecordKind.DATAGRAM].count(genuine) == 1
+    refused: Counter[str] = Counter()
+    for record in records:
+        if record.kind is RecordKind.REFUSED:
+            refused.update(json.loads(record.data))
+    assert refused["duplicate"] == REPEATED and refused["magic"] == 2 * REPEATED
+    assert refused["tag"] == REPEATED, "cut off by a byte"
+    assert len(attack.bench.log("engine")) - said < 1000
+
+
+def genuine_datagrams(path: Path) -> list[bytes]:
+    """What the log has of the left node by now."""
+    with contextlib.closing(LogReader(path)) as reader:
+        return [record.data for record in reader if record.kind is RecordKind.DATAGRAM and record.node_id == 1]
 
 
 def test_it_pairs_with_nobody_without_a_code(attack: Attack) -> None:

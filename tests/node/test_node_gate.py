@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from trusted_node import TrustedNode
 
 from rhot_node.capture.camera import Frame
 from rhot_node.keys import new_key_pair, serve_with
-from rhot_node.network.log_limit import LogLimit
+from rhot_node.logs import LINES_AT_ONCE, LineLimit, LogLimit, before, cut_log
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import Stop
 
@@ -52,6 +53,33 @@ def test_log_lines_are_due_once_a_minute_of_each_and_count_what_was_left_out() -
     assert [limit.due("a", t_s) for t_s in (0.0, 1.0, 59.0, 60.0, 61.0)] == [1, 0, 0, 3, 0]
     assert limit.due("b", 61.0) == 1
     assert sum(limit.due(f"address {k}", 62.0) > 0 for k in range(10_000)) < 50, "addresses cost nothing to make up"
+
+
+def test_a_place_in_the_program_writes_some_lines_at_once_and_then_one_a_minute_with_a_count() -> None:
+    clock = [0.0]
+    limit, lines = LineLimit(lambda: clock[0]), []
+    for second in range(200):
+        clock[0] = float(second)
+        for line in range(100):
+            record = logging.LogRecord("a", logging.ERROR, __file__, line % 2, "no, %s", ("never",), None)
+            if limit.filter(record):
+                lines.append((second, line % 2, record.getMessage()))
+    assert [second for second, place, _ in lines if place == 0] == [*[0] * LINES_AT_ONCE, 60, 120, 180]
+    assert [second for second, place, _ in lines if place == 1] == [*[0] * LINES_AT_ONCE, 60, 120, 180]
+    assert lines[-1][2] == "no, never (2999 more lines like this were left out)"
+
+
+def test_a_long_log_is_kept_aside_and_written_on(tmp_path: Path) -> None:
+    path = tmp_path / "engine.log"
+    with path.open("ab", buffering=0) as log:
+        log.write(b"first" * 10)
+        cut_log(path, 100)
+        assert path.stat().st_size == 50, "not yet"
+        log.write(b"x" * 100)
+        cut_log(path, 100)
+        log.write(b"second")
+    assert path.read_bytes() == b"second"
+    assert before(path).read_bytes() == b"first" * 10 + b"x" * 100
 
 
 def test_without_encryption_nothing_is_answered(node: TrustedNode) -> None:

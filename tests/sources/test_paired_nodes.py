@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -62,8 +63,54 @@ def test_forged_frames_move_nothing_and_are_not_recorded(setup: Setup) -> None:
             stranger.sendto(data, ("127.0.0.1", port))
     eventually(lambda: sum(door.dropped.values()) == 5)
     assert door.dropped == {"untagged": 1, "tag": 3, "duplicate": 1}
-    assert len(setup.frames) == count and len(setup.records.of(RecordKind.DATAGRAM)) == recorded + 1
+    assert len(setup.frames) == count and len(setup.records.of(RecordKind.DATAGRAM)) == recorded
     setup.stream()
+
+
+def test_what_is_repeated_over_and_over_is_counted_in_the_log_and_not_recorded(
+        setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
+    masters: set[tuple[str, int]] = set()
+    take = setup.node.link.take
+    monkeypatch.setattr(setup.node.link, "take", lambda data, sender, t_ns: (masters.add(sender), take(
+        data, sender, t_ns)))
+    setup.run()
+    eventually(lambda: masters and setup.records.of(RecordKind.CLOCK_REPLY))
+    (master,) = masters
+    link, port = setup.source.links[0], setup.source.receivers[0].port
+    frame, reply = setup.records.of(RecordKind.DATAGRAM)[-1], setup.records.of(RecordKind.CLOCK_REPLY)[-1]
+    before = link.door.received, link.refused_replies
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        for k in range(2_000):
+            stranger.sendto(frame, ("127.0.0.1", port))
+            stranger.sendto(reply, master)
+            if k % 100 == 99:
+                sent = k + 1
+                eventually(lambda sent=sent: link.door.received - before[0] + link.refused_replies - before[1]
+                           >= 2 * sent)
+    setup.source.record_to(None)
+    assert setup.records.of(RecordKind.DATAGRAM).count(frame) == 1
+    assert setup.records.of(RecordKind.CLOCK_REPLY).count(reply) == 1
+    replayed = LogValidator(setup.rig)
+    for record in setup.records:
+        replayed.feed(Record(*record))
+    (again,) = replayed.links
+    assert again.door.dropped == link.door.dropped and again.door.dropped["duplicate"] == 2_000
+    assert again.refused_replies == link.refused_replies == 2_000
+    told = setup.records.of(RecordKind.REFUSED)
+    assert sum(map(len, told)) < 2_000, "the count is small whatever is sent"
+
+
+def test_frames_of_another_marker_set_are_recorded_once_for_the_rig_that_knows_it(setup: Setup) -> None:
+    setup.run()
+    stream = setup.node.sessions.current
+    assert stream is not None
+    strange = dataclasses.replace(setup.node.frame(setup.rig), marker_checksum=7)
+    door, before = setup.source.links[0].door, len(setup.records.of(RecordKind.DATAGRAM))
+    for _ in range(3):
+        setup.node.link.send(strange, stream)
+    eventually(lambda: sum(door.dropped.values()) == 3)
+    assert door.dropped == {"marker_set": 1, "duplicate": 2}
+    assert len(setup.records.of(RecordKind.DATAGRAM)) == before + 1
 
 
 def test_commands_of_strangers_and_replayed_ones_change_nothing(setup: Setup) -> None:

@@ -5,14 +5,18 @@ import time
 
 import pytest
 from patience import quickest
+from streaming_node import Records
 
 from rhot_app.errors import SourceError
+from rhot_app.recording.raw_log import RecordKind
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
+from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import (
     FRESH_NS,
     NEWEST,
     RECEIVE_BUFFER,
+    DatagramSink,
     NodeReceiver,
     granted_buffer,
     open_data_socket,
@@ -82,8 +86,10 @@ def test_receive_time_is_the_kernels() -> None:
 def test_a_burst_is_counted_whole_and_only_its_newest_tracked() -> None:
     receiver, frames, sender = make_receiver()
     checksum = synthetic_rig().markers.checksum
-    seen: list[bytes] = []
-    receiver.tap = lambda t_receive_ns, data: seen.append(data)
+    records = Records()
+    link = NodeLink(synthetic_rig(), 0)
+    link.door = receiver.door
+    receiver.sink = DatagramSink(records, link)
     for k in range(100):
         sender.send(datagram(k, checksum))
     sender.send(b"junk")
@@ -93,7 +99,8 @@ def test_a_burst_is_counted_whole_and_only_its_newest_tracked() -> None:
     assert receiver.door.dropped == {"length": 1}
     assert len(frames) == NEWEST
     assert receiver.skipped == 100 - NEWEST
-    assert len(seen) == 101
+    assert len(records.of(RecordKind.DATAGRAM)) == 100
+    assert records.of(RecordKind.REFUSED) == [b'{"length":1}']
     receiver.close()
 
 

@@ -159,8 +159,10 @@ def test_node_rows_carry_units(engine):
 
 
 def test_a_frame_that_came_too_late_is_counted_once_and_a_healthy_node_has_no_losses(engine):
-    node = replace(engine.status(1.0).nodes[0], received=4000, lost=14, dropped={"time": 14, "clock_in_doubt": 90})
-    assert unused_frames(node) == {"time": 14}
+    node = replace(engine.status(1.0).nodes[0], received=4000, lost=3,
+                   dropped={"time": 14, "clock_in_doubt": 90, "kernel_overflow": 3})
+    assert unused_frames(node) == {"time": 14, "kernel_overflow": 3}
+    node = replace(node, lost=0, dropped={"time": 14, "clock_in_doubt": 90})
     assert node_row(node).losses == "" and "14 × came too late" in node_row(node).tooltip
     assert node_row(replace(node, received=700)).losses == "14 frames unused"
 

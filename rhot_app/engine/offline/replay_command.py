@@ -53,8 +53,9 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.sources.replay import LogReplay
     from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
     from rhot_app.tracking.trackers import make_tracker
+    from rhot_node.logs import log_to_stderr
 
-    logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="%(message)s")
+    log_to_stderr(logging.INFO if args.verbose else logging.WARNING)
     reader = LogReader(args.path)
     rig = load_rig(args.rig) if args.rig is not None else reader.rig
     if args.tracker is not None:

@@ -29,6 +29,7 @@ from rhot_app.errors import EngineError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
 from rhot_node.files import open_input
+from rhot_node.logs import before
 from rhot_node.network.pairing import ALPHABET
 
 LAST_S: Final = 60.0
@@ -68,9 +69,10 @@ class Report:
     def add_engine(self, directory: Path | None) -> Path | None:
         """Rig, status, nodes and log file of the engine that runs there; returns the log that it records, if any."""
         place = EngineDirectory((directory or default_directory()).absolute())
-        for path in (place.log_file, place.path / "twin.log"):
-            with contextlib.suppress(OSError):
-                self._add_text(path.name, _tail(path))
+        for log in (place.log_file, place.twin_log_file):
+            for path in (log, before(log)):
+                with contextlib.suppress(OSError):
+                    self._add_text(path.name, _tail(path))
         with EngineClient(place.path, states=False, events=False) as client:
             try:
                 status = client.command("status")["status"]

@@ -34,6 +34,7 @@ from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_sh
 from rhot_app.simulator.scene.scene_description import Show
 from rhot_node.config import load_settings
 from rhot_node.errors import NodeError, SettingsError
+from rhot_node.logs import cut_log, log_to_stderr
 
 # -- control socket ----------------------------------------------------------------------------------------------------
 
@@ -134,6 +135,7 @@ class Supervisor:
     def step(self) -> None:
         """Start again what has died, a moment later."""
         for index, node in enumerate(self._nodes):
+            cut_log(node.log_path)
             if node.alive:
                 continue
             died = self._died_s.setdefault(index, time.monotonic())
@@ -156,6 +158,7 @@ def socket_path(directory: Path, name: str) -> Path:
 # -- the live twin -----------------------------------------------------------------------------------------------------
 
 _NICE = 5
+LOG_NAME = "twin.log"  # where the app has it write (`EngineDirectory.twin_log_file`)
 
 
 def run(scene: Scene, show: Show, directory: Path, rig_path: Path) -> None:
@@ -178,6 +181,7 @@ def run(scene: Scene, show: Show, directory: Path, rig_path: Path) -> None:
         while True:
             cameras.step()
             supervisor.step()
+            cut_log(directory / LOG_NAME)
             event = pace.note(time.monotonic())
             if event is not None:
                 print(json.dumps(event), flush=True)
@@ -193,6 +197,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--directory", type=Path, required=True, help="folder for sockets, settings and logs")
     parser.add_argument("--rig", type=Path, required=True, help="rig file to write when the nodes are ready")
     args = parser.parse_args(arguments)
+    log_to_stderr()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with contextlib.suppress(OSError):
         os.nice(_NICE)

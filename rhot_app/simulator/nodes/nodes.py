@@ -38,11 +38,11 @@ class TwinNode:
         SimulatorError, TrustError, OSError."""
         self.name = settings.name
         self._settings_path = settings_path(directory, settings.name)
-        self._log_path = directory / f"{settings.name}.log"
+        self.log_path = directory / f"{settings.name}.log"
         save_settings(self._settings_path, settings)
         self._public_key = "" if settings.trust == "open" else pair_beforehand(
             keys_path(self._settings_path), load_master_keys().me)
-        with self._log_path.open("ab") as log:
+        with self.log_path.open("ab") as log:
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "rhot_node", "--settings", str(self._settings_path), "--camera", camera,
                  "--exit-with-parent"], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log)
@@ -86,14 +86,14 @@ class TwinNode:
         if not self.alive:
             return f"the simulated node {self.name} ended before it was ready: {self._last_words()}"
         return (f"the simulated node {self.name} was not ready in time: compiling its detector takes minutes where "
-                f"others need the processors as well. What is compiled is kept; start again (log: {self._log_path}).")
+                f"others need the processors as well. What is compiled is kept; start again (log: {self.log_path}).")
 
     def _last_words(self) -> str:
         with contextlib.suppress(OSError):
-            lines = self._log_path.read_text(errors="replace").strip().splitlines()
+            lines = self.log_path.read_text(errors="replace").strip().splitlines()
             if lines:
-                return f"{lines[-1]} (whole log: {self._log_path})"
-        return f"it wrote nothing to {self._log_path}."
+                return f"{lines[-1]} (whole log: {self.log_path})"
+        return f"it wrote nothing to {self.log_path}."
 
     def close(self) -> None:
         """Ask the daemon to end, and insist after a few seconds. May be called twice."""

@@ -17,11 +17,10 @@ from rhot_app.objects.observations import MeasuredPose
 from rhot_app.objects.pose import Validity
 from rhot_app.project import ObjectPoses, Rig
 from rhot_app.recording.object_poses import encode_pose
-from rhot_app.recording.raw_log import RecordKind
+from rhot_app.recording.raw_log import RecordKind, RecordSink
 from rhot_app.sources.poses.open_source import open_source
 from rhot_app.sources.poses.source import ForeignPose, PoseSource
 from rhot_app.sources.receiver import Deliver, to_nobody
-from rhot_app.sources.source import RecordSink
 
 Array = NDArray[np.float64]
 OpenSource = Callable[[str, str], PoseSource]

@@ -30,6 +30,7 @@ from rhot_app.errors import EngineError, SimulatorError
 from rhot_app.project import load_rig, parse_rig, save_rig, with_tracker
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
 from rhot_node.compiled import WINDOW
+from rhot_node.logs import before
 
 if TYPE_CHECKING:
     from rhot_app.simulator.nodes.remote import TwinRemote
@@ -186,11 +187,13 @@ class Session:
     def _start_twin(self, choice: TwinChoice, report: Report) -> Path:
         """Start the twin in the background; its ready line goes to a file, so that it outlives this process."""
         rig_path, output = self._place.path / TWIN_RIG, self._place.path / TWIN_OUTPUT
-        errors = self._place.path / "twin.log"
+        errors = self._place.twin_log_file
         command = [*TWIN_COMMAND, "--motion", choice.motion,
                    "--seed", str(choice.seed), "--preset", choice.preset,
                    "--directory", str(self._place.path), "--rig", str(rig_path)]
-        with output.open("wb") as out, errors.open("wb") as log:
+        with contextlib.suppress(OSError):
+            errors.replace(before(errors))
+        with output.open("wb") as out, errors.open("ab") as log:
             process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=log,
                                        start_new_session=True)
         remember_process(self._place, process.pid, TWIN_ROLE)

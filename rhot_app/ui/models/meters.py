@@ -127,7 +127,6 @@ class LatencyWindow:
 
 # -- rates and losses --------------------------------------------------------------------------------------------------
 
-_GAPS_TOO = ("time", "kernel_overflow")
 _AT_START = frozenset({"clock_in_doubt", "no_clock", "not_started", "session"})
 
 SETTLE_NS = 1_200_000_000
@@ -164,12 +163,11 @@ def count_lost(status: EngineStatus) -> int:
 def unused_frames(node: NodeStatus) -> dict[str, int]:
     """How many frames of a node could not be used, by reason ("lost": never arrived); each is counted once.
 
-    A frame that came too late is a gap in the sequence too. What comes before the clock and the session are agreed is
-    no loss: every start has some.
+    One that the kernel had no room for is a gap in the sequence too. What comes before the clock and the session are
+    agreed is no loss: every start has some.
     """
-    twice = sum(node.dropped.get(reason, 0) for reason in _GAPS_TOO)
     found = {reason: count for reason, count in node.dropped.items() if count and reason not in _AT_START}
-    lost = max(node.lost - twice, 0)
+    lost = max(node.lost - node.dropped.get("kernel_overflow", 0), 0)
     return {**({"lost": lost} if lost else {}), **found}
 
 
