@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from colour_scenes import PAINTS, picture, place
 from marker_rendering import Canvas
 
+from rhot_app.calibration.check.camera_advice import CameraAdvisor
 from rhot_app.calibration.check.exposure import balance_on_grey, measure_exposure
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
+from rhot_app.simulator.render.camera_controls import controls_of, development
 from rhot_node.config import CameraSettings
+from rhot_node.detect.colour import colours_of
+from rhot_node.detect.illuminant import RGB_FROM_YCC
+from rhot_node.detect.image import YuvImage
 
 GAMMA = 2.2
 
@@ -65,6 +72,56 @@ def test_dark_markers_get_light_and_after_that_gain() -> None:
     assert "more light, or raise the gain" in long.findings[0].remedy
     unknown = measure_exposure(image, masks(image.u.shape))
     assert "more light" in unknown.findings[0].remedy
+
+
+def as_set(settings: CameraSettings) -> YuvImage:
+    """The painted hand as a camera with these settings shows it."""
+    developed = development(controls_of(settings), 1.0, 1.0)
+    ycc = colours_of(picture(), np.ones((120, 160), np.bool_))
+    levels = np.minimum((ycc @ RGB_FROM_YCC.T).clip(0.0, 255.0) * (settings.gain or 1.0) ** (1.0 / GAMMA)
+                        * developed.white, developed.full)
+    y, u, v = (np.clip(levels @ developed.mix.T + developed.offset, 0, 255).astype(np.uint8).T.reshape(3, 120, 160))
+    return YuvImage(np.kron(y, np.ones((2, 2), np.uint8)), u, v)
+
+
+@pytest.mark.parametrize(("settings", "code", "remedy"), [
+    ({"saturation": 0.0}, "colourless", "Raise saturation to 1"),
+    ({"contrast": 0.0}, "flat", "Raise contrast to 1"),
+    ({"brightness": -1.0}, "under", "Raise brightness to 0"),
+    ({"red_gain": 3.0}, "marker_over", "Lower red_gain"),
+    ({"blue_gain": 4.0}, "marker_over", "lower blue_gain"),
+    ({"saturation": 4.0}, "marker_over", "Lower saturation to 1"),
+    ({"contrast": 4.0}, "marker_over", "Lower contrast to 1"),
+    ({"brightness": 0.6}, "marker_over", "Lower brightness to 0"),
+    ({"gain": 4.0}, "marker_over", "Lower gain to"),
+])
+def test_a_setting_that_spoils_the_picture_is_named(settings: dict[str, Any], code: str, remedy: str) -> None:
+    told = CameraSettings(**settings)
+    report = measure_exposure(as_set(told), masks((120, 160)), told) if code == "marker_over" else \
+        measure_exposure(as_set(told), {}, told)
+    (finding,) = [one for one in report.findings if one.code == code]
+    assert finding.grade is Grade.POOR and remedy in finding.remedy and "Shorten exposure" not in finding.remedy
+    if code == "marker_over":
+        assert not report.summary.startswith("0.0 %"), "one channel that is cut off is too bright, too"
+
+
+def test_nothing_is_good_before_every_marker_and_the_lamp_were_seen() -> None:
+    advisor, settings, image = CameraAdvisor(tuple(PAINTS)), CameraSettings(row_time_us=48.0), picture()
+    inside = masks(image.u.shape)
+    half = {name: inside[name] for name in tuple(PAINTS)[:3]}
+    codes = [advisor.update(image, k / 33.0, settings, half).verdict.codes for k in range(12)]
+    assert codes[0] >= {"unseen", "flicker_waiting"}
+    assert "unseen" in codes[-1] and "flicker_waiting" not in codes[-1]
+    assert advisor.update(image, 12 / 33.0, settings, inside).verdict.grade is Grade.GOOD
+    advisor.restart()
+    assert "unseen" in advisor.update(image, 0.0, settings, half).verdict.codes
+
+
+def test_a_covered_lens_is_not_good() -> None:
+    covered = Canvas(64, 64, (130, 130, 130)).expose(np.random.default_rng(1))
+    assert [one.code for one in measure_exposure(covered).findings] == ["flat"]
+    dim = picture(light=0.1)
+    assert [one.code for one in measure_exposure(dim).findings] == ["under"]
 
 
 def test_a_lamp_in_the_picture_and_a_black_picture_are_told() -> None:

@@ -8,7 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.check.exposure import ExposureReport, Mask, WhiteBalance, balance_on_grey, measure_exposure
+from rhot_app.calibration.check.exposure import (
+    ExposureReport,
+    Mask,
+    WhiteBalance,
+    balance_on_grey,
+    measure_exposure,
+    unseen_finding,
+)
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_node.config import CameraSettings
@@ -29,10 +36,12 @@ class CameraAdvice:
 
 
 class CameraAdvisor:
-    """Looks at the pictures of one camera as they come."""
+    """Looks at the pictures of one camera as they come. `markers`: names of those that it must have seen once before
+    anything is called good."""
 
-    def __init__(self) -> None:
-        self._flicker = FlickerWatch()
+    def __init__(self, markers: Sequence[str] = ()) -> None:
+        self._markers = tuple(markers)
+        self.restart()
 
     def update(self, image: YuvImage, t_row0_s: float, settings: CameraSettings,
                markers: Mapping[str, Mask] | None = None, grey: Box | None = None) -> CameraAdvice:
@@ -43,20 +52,23 @@ class CameraAdvisor:
         """
         self._flicker.add(image, t_row0_s)
         exposure = measure_exposure(image, markers, settings)
+        self._seen.update(exposure.markers)
         row_time = 1e-6 * settings.row_time_us or None
         flicker = None
         if self._flicker.ready:
             flicker = self._flicker.report(row_time, 1e-6 * settings.exposure_us, settings.fps)
         white = None if grey is None else balance_on_grey(image, grey, settings)
-        findings = [*exposure.findings, *(flicker.findings if flicker else ()), *(white.findings if white else ())]
-        seen = exposure.picture
-        words = f"{100.0 * seen.over:.1f} % too bright, {100.0 * seen.under:.1f} % black"
-        words += "" if flicker is None else f", flicker {100.0 * flicker.depth:.1f} %"
+        unseen = unseen_finding((name for name in self._markers if name not in self._seen), settings)
+        waiting = [Finding("flicker_waiting", Grade.FAIR, "Flicker is not measured yet.", "It takes some pictures.")]
+        findings = [*exposure.findings, *unseen, *(flicker.findings if flicker else waiting),
+                    *(white.findings if white else ())]
+        words = exposure.summary + ("" if flicker is None else f", flicker {100.0 * flicker.depth:.1f} %")
         return CameraAdvice(exposure, flicker, white, judge(f"{words}.", findings))
 
     def restart(self) -> None:
         """Forget the frames so far: the settings have changed."""
         self._flicker = FlickerWatch()
+        self._seen: set[str] = set()
 
 
 # -- mains flicker -----------------------------------------------------------------------------------------------------

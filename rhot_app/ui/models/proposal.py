@@ -55,6 +55,11 @@ class Change(Protocol):
         """Bring back what was there before; raises RhotError."""
         ...
 
+    @property
+    def way_back(self) -> str:
+        """A sentence: until when, and how, what is there now can be brought back."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class RigChange:
@@ -73,6 +78,14 @@ class RigChange:
     def restore(self, command: Command) -> None:
         """The old rig in the engine and in the file."""
         self._change(command, self.after, self.before, f"{RESTORING} what was before the {self.reason}")
+
+    @property
+    def way_back(self) -> str:
+        """Only a file has a history."""
+        if self.path is None or not self.path.exists():
+            return "This rig has no file, so nothing is kept: it can be brought back here, until this window closes."
+        return ("What is in the rig file now is kept, and can be brought back at any time with Calibrate, Bring back "
+                "an earlier calibration.")
 
     def _change(self, command: Command, old: Rig, new: Rig, reason: str) -> None:
         set_rig(command, new)
@@ -99,6 +112,11 @@ class NodeChange:
     def restore(self, command: Command) -> None:
         """The old settings."""
         _set_node(command, self.node_id, self.before)
+
+    @property
+    def way_back(self) -> str:
+        """Nodes have no history."""
+        return "The nodes keep no earlier settings: these can be brought back here, until this window closes."
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +146,11 @@ class Proposal:
         """Take all changes back, the last one first; raises RhotError."""
         for change in reversed(self.changes):
             change.restore(command)
+
+    @property
+    def ways_back(self) -> str:
+        """How what is there now can be brought back, each way once."""
+        return " ".join(dict.fromkeys(change.way_back for change in self.changes)) or "Nothing changes."
 
     @property
     def rig(self) -> Rig | None:

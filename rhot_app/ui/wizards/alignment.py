@@ -44,7 +44,7 @@ def make_plan(kit: Kit, poses: PoseFeed | None = None, now_ns: Callable[[], int]
         states.stop()
 
     pages = (SourcePage(source, kit.memory), TogetherPage(together, states, kit), ChartPage(solve, kit.scheme),
-             AcceptPage(accept, kit.scheme, "The alignment in use can be brought back here until this window closes."))
+             AcceptPage(accept, kit.scheme))
     return Plan("Another tracker", pages, solver="rhot_app.ui.wizards.steps.alignment_steps", put_back=end)
 
 

@@ -27,7 +27,7 @@ def make_plan(kit: Kit) -> Plan:
     step = SettingsStep(choices, kit.rig.markers)
     tryout = Tryout(kit.connect)
     accept = AcceptStep(lambda: step.propose(kit.rig_path),
-                        missing="Nothing was changed, and the pictures are not good yet.")
+                        missing="No picture shows these settings yet, or they cannot be used: go back.")
     page = CameraPage(step, tryout)
     tryout.setParent(page)
 

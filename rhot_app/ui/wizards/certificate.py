@@ -234,8 +234,6 @@ class KeepPage(AcceptPage):
         self.table.setHorizontalHeaderLabels(["", "verdict", "measured"])
         self.restore_button.setText("Delete it again")
         self.restore_button.setToolTip("Removes the folder that was written.")
-        self._note.setText("Nothing was written so far. A certificate is a folder with a page, a PDF, the raw numbers "
-                           "and the recordings; the rig stays as it is.")
 
 
 def _marker_box(ids: tuple[str, ...], chosen: int, meaning: str, choose: Callable[[str], None]) -> QComboBox:

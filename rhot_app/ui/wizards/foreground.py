@@ -13,8 +13,6 @@ from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, LearningStep, SkinStep, ask_node, propose
 
-_KEPT = "Each node keeps what it had, and Restore the old one brings it back."
-
 
 def make_plan(kit: Kit) -> Plan:
     """The wizard's pages for the rig at hand."""
@@ -22,7 +20,7 @@ def make_plan(kit: Kit) -> Plan:
     empty, skin = EmptyStep(cameras), SkinStep(cameras, lambda: kit.connect().command)
     accept = AcceptStep(lambda: propose(empty, skin), missing="Learn the empty scene and your hand first.")
     pages = (LearnPage(empty, kit, "Learn the empty scene"), LearnPage(skin, kit, "Learn my skin"),
-             AcceptPage(accept, kit.scheme, _KEPT))
+             AcceptPage(accept, kit.scheme))
 
     def put_back() -> None:
         """What was only tried out goes, and what is being learnt is given up."""

@@ -16,7 +16,7 @@ from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.camera import make_plan
 from rhot_app.ui.wizards.framework.plan import Kit
 from rhot_app.ui.wizards.models.drawing import Layer
-from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, CameraEye
+from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, CameraEye, SettingsStep
 from rhot_node.config import CameraSettings
 
 EXPOSURE, RED = CONTROLS[0], CONTROLS[5]
@@ -84,14 +84,24 @@ def test_from_a_dark_picture_to_saved_settings(hands, asker):
     hands.until(lambda: hands.verdict is not None)
     hands.next()
     assert hands.window.page.table.item(0, 2).text() == "5.00 ms"
+    assert "any time" not in hands.window.page.note.text(), "nodes keep no earlier settings"
     hands.use()
     assert asker.saved == [1, 2] and exposures(asker) == [5000.0, 5000.0]
     hands.restore()
     assert exposures(asker) == [4000.0, 4000.0] and asker.saved == [1, 2, 2, 1]
 
 
+def painted(rig):
+    """A room in which every marker of the rig is seen."""
+    picture = np.repeat(np.linspace(60, 150, 640, dtype=np.uint8)[None, :, None], 480, axis=0).repeat(3, axis=2)
+    for number, marker in enumerate(rig.markers.markers):
+        cv2.circle(picture, (60 + 90 * number, 200), 16, tuple(map(int, marker.display_rgb[::-1])), -1, cv2.LINE_AA)
+    return picture
+
+
 def test_a_good_check_is_a_result_and_ticks_the_menu(hands, asker):
-    asker.draw = lambda node_id, t_s: np.full((480, 640, 3), 130, np.uint8)
+    picture = painted(asker.rig)
+    asker.draw = lambda node_id, t_s: picture
     hands.until(lambda: "good" in hands.sentence)
     hands.until(lambda: hands.frame.steps.states[0] == "current" and hands.window.step.view().done)
     told = []
@@ -100,6 +110,42 @@ def test_a_good_check_is_a_result_and_ticks_the_menu(hands, asker):
     assert hands.window.page.table.rowCount() > 0
     hands.use()
     assert told == [("camera settings", None, True)] and asker.saved == []
+
+
+@pytest.mark.parametrize(("shown", "code"), [("grey", "colourless"), ("covered", "flat")])
+def test_no_other_pictures_are_good(hands, asker, shown, code):
+    grey = cv2.cvtColor(cv2.cvtColor(painted(asker.rig), cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+    picture = grey if shown == "grey" else np.full_like(grey, 130)
+    asker.draw = lambda node_id, t_s: picture
+    hands.until(lambda: hands.verdict is not None and code in hands.verdict.codes)
+    hands.until(lambda: "flicker_waiting" not in hands.verdict.codes)
+    assert code in hands.verdict.codes and not hands.verdict.acceptable and not hands.window.step.view().done
+
+
+def test_a_camera_that_gives_no_picture_is_not_good(asker):
+    step = SettingsStep(CameraChoices(asker.rig.nodes, asker.told), asker.rig.markers)
+    for number in range(12):
+        shown = {"left": Picture("left", painted(asker.rig), number, number * 30_000_000, 1 + number * 400_000_000)}
+        step.take(step.see(shown))
+        if number == 5:
+            assert step.view().verdict.acceptable and not step.view().may_go_on, "the other one may be slow"
+    assert step.view().verdict.codes >= {"no_picture"} and not step.view().done
+
+
+def test_settings_that_are_worse_are_not_used(hands, asker):
+    picture = painted(asker.rig)
+
+    def draw(node_id, t_s):
+        grey = np.full_like(picture, 130)
+        return grey if asker.settings[node_id].camera.contrast == 0.0 else picture
+
+    asker.draw = draw
+    hands.until(lambda: hands.verdict is not None and hands.verdict.acceptable)
+    row(hands, "contrast").check_box.setChecked(True)
+    row(hands, "contrast").box.setValue(0.0)
+    hands.until(lambda: "flat" in hands.verdict.codes)
+    hands.next()
+    assert not hands.verdict.acceptable and not hands.window.step.usable
 
 
 def test_closing_puts_back_what_was_tried_out(hands, asker, monkeypatch):

@@ -76,6 +76,8 @@ def test_a_proposal_is_put_into_force_whole_or_not_at_all(asker, tmp_path):
         def restore(self, command):
             raise AssertionError("was never used")
 
+        way_back = ""
+
     proposal = Proposal("lens calibration", judge("rms 0.3 px", []), (), (change_of(path, "new"), Refusing()))
     with pytest.raises(EngineError):
         proposal.use(asker.command)
@@ -89,6 +91,20 @@ def test_a_node_change_goes_to_the_node_and_back(asker):
     assert asker.settings[2].camera.gain == 2.5 and asker.settings[1].camera.gain is None
     change.restore(asker.command)
     assert asker.settings[2].camera.gain is None
+
+
+def test_only_what_a_rigs_file_keeps_is_said_to_come_back_at_any_time(tmp_path):
+    change = change_of(rig_file(tmp_path), "new")
+    node = NodeChange(2, {"camera": {"gain": None}}, {"camera": {"gain": 2.5}})
+
+    def ways_back(*changes):
+        return Proposal("calibration", judge("rms 0.3 px", []), (), changes).ways_back
+
+    assert "any time" in ways_back(change) and ways_back(change, change) == ways_back(change)
+    assert "any time" in ways_back(change, node) and "until this window closes" in ways_back(change, node)
+    unsaved = [RigChange(change.before, change.after, path, "calibration") for path in (None, tmp_path / "gone.json")]
+    for nothing_kept in ((), (node,), *((one,) for one in unsaved)):
+        assert "any time" not in ways_back(*nothing_kept)
 
 
 def test_the_last_step_refuses_a_poor_result_and_comes_back(asker):

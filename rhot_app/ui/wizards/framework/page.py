@@ -64,8 +64,6 @@ class Page(QWidget):
 # -- Last page of every wizard: before and after -----------------------------------------------------------------------
 
 HEADS = ("", "before", "after")
-KEPT = ("What is there now is kept, and can be brought back at any time with Calibrate, Bring back an earlier "
-        "calibration.")
 
 
 class AcceptPage(Page):
@@ -73,8 +71,7 @@ class AcceptPage(Page):
 
     restore_asked = Signal()
 
-    def __init__(self, step: AcceptStep, scheme: Scheme, kept: str = KEPT) -> None:
-        """`kept` says what becomes of the old one."""
+    def __init__(self, step: AcceptStep, scheme: Scheme) -> None:
         super().__init__(step)
         self._accept = step
         self._rows: tuple[Row, ...] | None = None
@@ -82,16 +79,14 @@ class AcceptPage(Page):
         self.centre = self.table
         self.restore_button = QPushButton("Restore the old one")
         self.restore_button.setAutoDefault(False)
-        self.restore_button.setToolTip("Brings back what was there before, in the engine and in the file. The new "
-                                       "calibration is kept among the earlier ones.")
+        self.restore_button.setToolTip("Brings back what was there before.")
         self.restore_button.clicked.connect(self.restore_asked)
-        note = QLabel(f"Nothing was saved so far. {kept}")
-        note.setWordWrap(True)
-        note.setProperty("muted", True)
-        self.column.addWidget(note)
+        self.note = QLabel()
+        self.note.setWordWrap(True)
+        self.note.setProperty("muted", True)
+        self.column.addWidget(self.note)
         self.column.addWidget(self.restore_button)
         self.column.addStretch(1)
-        self._note = note
 
     def show_view(self, view: StepView) -> None:
         """The rows of the proposal, and the way back while there is one."""
@@ -100,7 +95,8 @@ class AcceptPage(Page):
         if rows != self._rows:
             self._rows = rows
             self.table.show_rows(rows)
-        self._note.setVisible(self._accept.state == "proposed")
+        self.note.setText(f"Nothing was saved so far. {proposal.ways_back}" if proposal is not None else "")
+        self.note.setVisible(self._accept.state == "proposed")
         self.restore_button.setVisible(self._accept.restorable)
 
 

@@ -304,6 +304,11 @@ class AlignmentChange:
         except OSError as exc:
             raise CalibrationError(f"{self.path}: cannot be removed ({exc.strerror}).") from exc
 
+    @property
+    def way_back(self) -> str:
+        """The file is replaced."""
+        return "The alignment in use can be brought back here, until this window closes."
+
 
 class AlignmentSolver:
     """Makes the work of a recording, and one proposal of each result."""

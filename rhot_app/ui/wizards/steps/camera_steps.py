@@ -151,6 +151,7 @@ _STRIPE_PX = 4
 SETTLE_NS = 400_000_000
 """From a node's answer until a picture shows what it was told: a few frames, and the picture's own way."""
 
+SILENT_NS = 3_000_000_000  # without a picture while other cameras deliver
 _GREY_PX = 24  # a click on grey paper is a box of this side
 
 
@@ -170,7 +171,7 @@ class CameraEye:
     def __init__(self, markers: MarkerSet) -> None:
         self._markers = markers
         self._detector = FastDetector(markers)
-        self._advisor = CameraAdvisor()
+        self._advisor = CameraAdvisor([one.id for one in markers.markers if one.shape != "landmark"])
         self._settings: CameraSettings | None = None
 
     def look(self, picture: Picture, settings: CameraSettings, grey: Box | None) -> PictureAdvice:
@@ -205,7 +206,9 @@ class SettingsStep(Step):
         self._sent = dict(choices.before)
         self._grey: dict[str, Box] = {}
         self._looks: dict[str, PictureAdvice] = {}
+        self._last_ns: dict[str, int] = {}  # when each camera gave its last picture, or the first one gave its first
         self._settled_ns: int | None = 0
+        self._before: Grade | None = None  # of the settings that were in force
         self._problem = ""
 
     def untold(self) -> list[int]:
@@ -242,12 +245,15 @@ class SettingsStep(Step):
         """
         found = {}
         for name in self._grey:
-            look = self._looks.get(name)
-            fresh = look is not None and self._settled_ns is not None and look.received_ns > self._settled_ns
-            white = look.advice.white if fresh and look is not None else None
+            white = self._looks[name].advice.white if self._fresh(name) else None
             if white is not None and white.findings:
                 found[name] = (white.red_gain or 1.0, white.blue_gain or 1.0)
         return found
+
+    def _fresh(self, camera: str) -> bool:
+        """Whether the last advice is on a picture that shows what the camera was told last."""
+        look = self._looks.get(camera)
+        return look is not None and self._settled_ns is not None and look.received_ns > self._settled_ns
 
     def balance(self) -> bool:
         """Set the gains that make the grey patches grey; whether there was anything to set."""
@@ -277,25 +283,42 @@ class SettingsStep(Step):
     def take(self, seen: dict[str, PictureAdvice]) -> None:
         """The newest advice."""
         self._looks = {**self._looks, **seen}
+        if seen and not self._last_ns:
+            self._last_ns = dict.fromkeys(self._ids, next(iter(seen.values())).received_ns)
+        self._last_ns.update((name, look.received_ns) for name, look in seen.items())
         for name, look in seen.items():
             if look.problem and name in self._grey:
                 self.mark_grey(name, None)
                 self._problem = f"{name}: {look.problem}"
+        if not self.choices.changed and self._current and self.verdict is not None:
+            self._before = self.verdict.grade
 
     @property
     def verdict(self) -> Verdict | None:
         """On all cameras together; None before the first pictures."""
-        advice = {name: look.advice for name, look in self._looks.items()}
+        advice = {name: look.advice for name, look in self._looks.items() if name not in self._silent}
         if not advice:
             return None
-        summary = "; ".join(f"{name} {one.exposure.picture.over:.1%} too bright, {one.exposure.picture.under:.1%} black"
-                            for name, one in advice.items())
-        return judge(f"{summary}.", [_of(name, finding) for name, one in advice.items()
-                                     for finding in one.verdict.findings])
+        summary = "; ".join(f"{name} {one.exposure.summary}" for name, one in advice.items())
+        missing = [Finding("no_picture", Grade.POOR, f"No picture comes from {name}.", "", "Look at the Nodes panel.")
+                   for name in self._silent]
+        return judge(f"{summary}.", [*missing, *(_of(name, finding) for name, one in advice.items()
+                                                 for finding in one.verdict.findings)])
+
+    @property
+    def _silent(self) -> list[str]:
+        """Cameras that gave no picture for long while others did."""
+        newest = max(self._last_ns.values(), default=0)
+        return [name for name, last in self._last_ns.items() if newest - last > SILENT_NS]
+
+    @property
+    def _current(self) -> bool:
+        """Whether pictures of all cameras that deliver any show what was told last."""
+        return bool(self._looks) and all(self._fresh(name) for name in self._ids if name not in self._silent)
 
     @property
     def _good(self) -> bool:
-        return self.verdict is not None and self.verdict.grade is Grade.GOOD
+        return self._current and self.verdict is not None and self.verdict.grade is Grade.GOOD
 
     def view(self) -> StepView:
         """What to turn, and why."""
@@ -303,23 +326,25 @@ class SettingsStep(Step):
             return StepView("No camera answers.", hint="Look at the Nodes panel: its sentence says what is wrong.")
         verdict, good = self.verdict, self._good
         sentence = ("The pictures are good: press Next." if good else
-                    "Turn the knobs until the verdict is good.")
-        return StepView(sentence, done=good or bool(self.choices.changed), hint=self._problem, verdict=verdict,
-                        overlays={name: look.overlay for name, look in self._looks.items()}, passable=True)
+                    "Show the hand with its markers, and turn the knobs until the verdict is good.")
+        return StepView(sentence, done=good, hint=self._problem, verdict=verdict,
+                        overlays={name: look.overlay for name, look in self._looks.items()}, passable=self._current)
 
     def propose(self, rig_path: Path | None) -> Proposal | None:
-        """All changed cameras' settings; settings that were checked and are good; None for neither.
+        """All changed cameras' settings, or those in force when they may be used; None for neither.
 
-        Poor light does not forbid to save: what is in force now was no better, and a lamp is not a setting.
+        Poor light does not forbid to save what is no worse than the settings in force: a lamp is not a setting.
         """
+        if self.verdict is None or not self._current:
+            return None
         if not self.choices.changed:
-            return Proposal(REASON, self.verdict, self.choices.rows(self.choices.nodes)) if (
-                self.verdict is not None and self._good) else None
-        verdict = self.verdict or judge("no picture has come since.", [])
-        allowed = [replace(finding, grade=Grade.FAIR) if finding.grade is Grade.POOR else finding
-                   for finding in verdict.findings]
-        summary = verdict.sentence.partition(": ")[2]
-        return Proposal(REASON, judge(summary, allowed), self.choices.rows(self.choices.changed),
+            return Proposal(REASON, self.verdict, self.choices.rows(self.choices.nodes)) \
+                if self.verdict.acceptable else None
+        verdict = self.verdict
+        if verdict.grade is Grade.POOR and self._before is Grade.POOR:
+            verdict = judge(f"{verdict.sentence.partition(': ')[2]} The settings in force are no better.",
+                            [replace(finding, grade=Grade.FAIR) for finding in verdict.findings])
+        return Proposal(REASON, verdict, self.choices.rows(self.choices.changed),
                         tuple(NodeChange(node.node_id, *self.choices.differences(node.node_id))
                               for node in self.choices.changed))
 

@@ -195,6 +195,12 @@ class WriteCertificate:
         """Remove what was written."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
+    @property
+    def way_back(self) -> str:
+        """What it is, and that it replaces nothing."""
+        return ("A certificate is a folder with a page, a PDF, the raw numbers and the recordings; the rig stays as it "
+                "is.")
+
 
 class KeepStep(AcceptStep):
     """The last step: the lines, and the folder that they are written to."""

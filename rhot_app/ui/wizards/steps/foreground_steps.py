@@ -270,6 +270,11 @@ class ForegroundChange:
                     raise EngineError(f"{exc} {problem}") from exc
                 raise
 
+    @property
+    def way_back(self) -> str:
+        """The nodes' own: one earlier state."""
+        return "Each node keeps what it had, and Restore the old one brings it back here, until this window closes."
+
     def restore(self, command: Command) -> None:
         """What was kept before. A node that does not answer keeps none of the others from it."""
         problem = self._take_back(command)
