@@ -12,7 +12,7 @@ for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import pytest  # noqa: E402
 from hypothesis import HealthCheck, settings  # noqa: E402
 
-import rhot_app  # noqa: E402, F401 - decides where compiled code is kept, before any test loads numba
+import rhot_node  # noqa: E402, F401 - decides where compiled code is kept, before any test loads numba
 
 # An example takes what it takes: compiling, or a machine that does other things, is no fault of what is tested. And the
 # examples are the same in every run; benchmarks/fuzz.py looks for others.
