@@ -14,11 +14,20 @@ from synthetic_rig import WIDE, Viewing, compare, make_rig, observe, run, still_
 from waving import waving
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.filters.meters import FilterMeter, FilterTargets, jitter, lag, motion_of
+from rhot_app.calibration.filters.meters import (
+    FilterFigures,
+    FilterMeter,
+    FilterTargets,
+    MarkerFigures,
+    jitter,
+    judge_filters,
+    lag,
+    motion_of,
+)
 from rhot_app.calibration.filters.tuning import OFF, make_footage, simulate, tune_filters
 from rhot_app.calibration.observations import InstantTable
 from rhot_app.calibration.recorded_observations import read_instants
-from rhot_app.calibration.verdict import Grade
+from rhot_app.calibration.verdict import Grade, Verdict
 from rhot_app.errors import CalibrationError
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.project import FilterSettings, OneEuroSettings, load_rig, save_rig
@@ -114,6 +123,7 @@ def test_stricter_targets_give_calmer_or_faster_filters(tables: tuple[InstantTab
     assert (np.diff(curves.still_jitter_m, axis=0) > 0.0).all() and (np.diff(curves.lag_s, axis=0) < 0.0).all()
     impossible = tune_filters(*tables, RIG, FilterTargets(0.05e-3, 0.5e-3))
     assert impossible.verdict.codes == {"jitter"} and impossible.verdict.grade is Grade.FAIR
+    assert impossible.position.chosen.beta < impossible.position.betas[-1], "no more noise than the lag asks for"
 
 
 def test_a_noisy_marker_gets_settings_of_its_own(tables: tuple[InstantTable, InstantTable]) -> None:
@@ -128,7 +138,25 @@ def test_a_noisy_marker_gets_settings_of_its_own(tables: tuple[InstantTable, Ins
     assert own[2].min_cutoff_hz < min(one.min_cutoff_hz for k, one in enumerate(own) if k != 2)
     assert report.pixel.chosen.min_cutoff_hz == own[2].min_cutoff_hz  # what holds for all is the strictest
     rig = report.apply(RIG, per_marker=True)
+    common, single = (report.choice(per_marker=per_marker).markers for per_marker in (False, True))
+    assert single[0].lag_s < common[0].lag_s, "the figures are those of the settings that are written"
     assert rig.filters.pixel_markers[RIG.markers.ids[2]] == own[2] and len(rig.filters.position_markers) == 6
+
+
+def judged(*rows: tuple[float, float, float, float], raw_m: float = 1e-3) -> Verdict:
+    """Of markers with a jitter and a lag, new and now, mm and ms."""
+    markers = tuple(MarkerFigures(f"m{k}", True, 0.8, 0.05, raw_m, jitter, lag_s, 1e-3, jitter_now, lag_now, 1e-3)
+                    for k, (jitter, lag_s, jitter_now, lag_now) in enumerate(1e-3 * np.array(rows)))
+    return judge_filters(FilterFigures(FilterTargets(), markers, 0.0))
+
+
+def test_filters_that_are_worse_in_jitter_and_in_lag_are_not_used() -> None:
+    worse, calmer, faster = (0.9, 5.0, 0.5, 2.0), (0.4, 5.0, 0.5, 2.0), (0.9, 1.0, 0.5, 2.0)
+    assert not judged(worse, worse).acceptable and "worse" in judged(worse, worse).codes
+    assert judged(worse, calmer).grade is Grade.FAIR and "m0" in judged(worse, calmer).findings[0].sentence
+    for verdict in (judged(calmer, faster), judged((0.5, 2.0, 0.5, 2.0)), judged((0.9, np.nan, 0.5, 2.0))):
+        assert "worse" not in verdict.codes
+    assert not judged((1.2, 2.0, 1.3, 3.0)).acceptable, "no filter at all jitters less"
 
 
 def test_recordings_that_do_not_serve_are_named(tables: tuple[InstantTable, InstantTable]) -> None:

@@ -11,7 +11,7 @@ from rhot_app.errors import CalibrationError, input_file
 
 if TYPE_CHECKING:
     from rhot_app.calibration.filters.meters import FilterTargets, MarkerFigures
-    from rhot_app.calibration.filters.tuning import FilterCurves, FilterReport
+    from rhot_app.calibration.filters.tuning import FilterChoice, FilterCurves, FilterReport
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,11 +43,11 @@ def run(args: argparse.Namespace) -> int:
     line = ProgressLine("filters")
     report = tune_filters(still, fast, rig, targets, line.report)
     line.finish()
-    written = ""
-    if args.out is not None and report.verdict.acceptable:
+    choice, written = report.choice(per_marker=args.per_marker), ""
+    if args.out is not None and choice.verdict.acceptable:
         accept(args.out, report.apply(rig, per_marker=args.per_marker), "filter tuning")
         written = str(args.out)
-    return show(_fields(report), _lines(report), report.verdict, as_json=args.json, written=written)
+    return show(_fields(report, choice), _lines(report, choice), choice.verdict, as_json=args.json, written=written)
 
 
 def _targets(args: argparse.Namespace) -> FilterTargets:
@@ -63,11 +63,11 @@ def _targets(args: argparse.Namespace) -> FilterTargets:
     return targets
 
 
-def _fields(report: FilterReport) -> dict[str, Any]:
+def _fields(report: FilterReport, choice: FilterChoice) -> dict[str, Any]:
     return {
         "targets": {"jitter_mm": 1e3 * report.targets.jitter_m, "lag_ms": 1e3 * report.targets.lag_s},
         "pixel": _filter(report.pixel, report), "position": _filter(report.position, report),
-        "markers": {marker.marker_id: _marker(marker) for marker in report.markers},
+        "markers": {marker.marker_id: _marker(marker) for marker in choice.markers},
     }
 
 
@@ -97,14 +97,14 @@ def _known(value: float, scale: float = 1.0) -> float | None:
     return scale * value if value == value else None
 
 
-def _lines(report: FilterReport) -> list[str]:
+def _lines(report: FilterReport, choice: FilterChoice) -> list[str]:
     lines = [""]
     for name, unit, curves in (("before depth", "px/s", report.pixel), ("after depth", "m/s", report.position)):
         chosen = curves.chosen
         lines.append(f"{name}: min cutoff {chosen.min_cutoff_hz:g} Hz, beta {chosen.beta:g} Hz per {unit}, derivative "
                      f"cutoff {chosen.derivative_cutoff_hz:g} Hz")
     lines += ["", "marker     jitter at rest, mm: raw   now   new     lag, ms: now   new   error, mm: now   new"]
-    for m in report.markers:
+    for m in choice.markers:
         lines.append(f"{m.marker_id:<10}{1e3 * m.raw_jitter_m:24.2f}{1e3 * m.jitter_now_m:6.2f}{1e3 * m.jitter_m:6.2f}"
                      f"{1e3 * m.lag_now_s:17.1f}{1e3 * m.lag_s:6.1f}{1e3 * m.error_now_m:17.2f}{1e3 * m.error_m:6.2f}")
     return lines

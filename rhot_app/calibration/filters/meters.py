@@ -177,6 +177,13 @@ class MarkerFigures:
     lag_now_s: float
     error_now_m: float
 
+    @property
+    def worse(self) -> bool:
+        """Whether the rig's filters, or none at all, are better in jitter and in lag; a lag that does not show is none
+        that is worse. No filter has no lag."""
+        return (self.jitter_m > self.jitter_now_m and abs(self.lag_s) > abs(self.lag_now_s)) \
+            or (self.jitter_m > self.raw_jitter_m and abs(self.lag_s) > 0.0)
+
 
 @dataclass(frozen=True, slots=True)
 class FilterFigures:
@@ -200,7 +207,8 @@ def judge_filters(figures: FilterFigures) -> Verdict:
     summary = (f"at rest the markers jitter by {1e3 * figures.worst('jitter_m'):.2f} mm rms at most (unfiltered "
                f"{1e3 * figures.worst('raw_jitter_m'):.2f}, with the rig's filters "
                f"{1e3 * figures.worst('jitter_now_m'):.2f}); {moving}.")
-    return judge(summary, [*_still(figures), *_fast(figures), *_compromise(figures), *_unseen(figures)])
+    return judge(summary, [*_still(figures), *_fast(figures), *_worse(figures), *_compromise(figures),
+                           *_unseen(figures)])
 
 
 def _still(figures: FilterFigures) -> list[Finding]:
@@ -218,6 +226,19 @@ def _fast(figures: FilterFigures) -> list[Finding]:
     return [Finding("not_fast", Grade.POOR if speed < SLUGGISH_M_S else Grade.FAIR,
                     f"The fast movement reached {speed:.2f} m/s only.", "Lag shows in fast movement.",
                     "Wave the hand briskly, 20 cm wide, and record again.")]
+
+
+def _worse(figures: FilterFigures) -> list[Finding]:
+    known = [marker for marker in figures.markers if marker.known]
+    worse = [marker.marker_id for marker in known if marker.worse]
+    if not worse:
+        return []
+    all_worse = len(worse) == len(known)
+    who = "every marker" if all_worse else ", ".join(worse)
+    return [Finding("worse", Grade.POOR if all_worse else Grade.FAIR,
+                    f"For {who} jitter and lag are worse than with the rig's filters, or than without any.",
+                    "The limits leave nothing better to choose.",
+                    "Keep the rig's filters, or allow more jitter or more lag.")]
 
 
 def _compromise(figures: FilterFigures) -> list[Finding]:

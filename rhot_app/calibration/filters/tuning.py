@@ -4,7 +4,7 @@ The rule, for the filter before depth and then for the one after it, marker by m
 
 1. held still, beta 0: the highest min cutoff whose jitter is within the target, since a higher one lags less;
 2. moved fast: the smallest beta whose lag is within the target, and whose rms error is no more than so much lag makes
-   of the speed; a smaller one is calmer.
+   of the speed; a smaller one is calmer. Where none is, the one that exceeds the two targets by the smallest factor.
 
 The filter before depth may use up half of the lag, the one after it what is left. What holds for all markers is the
 lowest of their cutoffs and the largest of their betas.
@@ -148,14 +148,37 @@ class FilterCurves:
 
 
 @dataclass(frozen=True, slots=True)
+class FilterChoice:
+    """What settings do to each marker, and the verdict on that."""
+
+    markers: tuple[MarkerFigures, ...]
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True)
 class FilterReport:
-    """The proposal (`pixel.chosen`, `position.chosen`), what it does to each marker, and the curves behind it."""
+    """The proposal, the curves behind it, and what it does: `common` with the settings that hold for all markers, `own`
+    with each marker's."""
 
     targets: FilterTargets
-    markers: tuple[MarkerFigures, ...]
     pixel: FilterCurves = field(repr=False)
     position: FilterCurves = field(repr=False)
-    verdict: Verdict
+    common: FilterChoice
+    own: FilterChoice
+
+    @property
+    def markers(self) -> tuple[MarkerFigures, ...]:
+        """What the settings for all markers do to each."""
+        return self.common.markers
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict on the settings for all markers."""
+        return self.common.verdict
+
+    def choice(self, *, per_marker: bool) -> FilterChoice:
+        """What `apply` would do."""
+        return self.own if per_marker else self.common
 
     def apply(self, rig: Rig, *, per_marker: bool = False) -> Rig:
         """The rig with the proposed filters, switched on; `per_marker`: with each known marker's own settings too."""
@@ -185,10 +208,11 @@ def tune_filters(still: InstantTable, fast: InstantTable, rig: Rig, targets: Fil
     before = _rows(pixel.chosen, markers)
     progress("trying filters after depth", 0.5)
     position = _tune(bench, lambda own: (before, own), POSITION_BETAS, rig.filters.position, targets)
-    figures = _figures(bench, rig, before, _rows(position.chosen, markers))
+    common, own = (FilterChoice(figures, judge_filters(FilterFigures(targets, figures, bench.drift_m_s)))
+                   for figures in (_figures(bench, rig, before, _rows(position.chosen, markers)),
+                                   _figures(bench, rig, _own_rows(pixel), _own_rows(position))))
     progress("filters", 1.0)
-    return FilterReport(targets, figures, pixel, position, judge_filters(
-        FilterFigures(targets, figures, bench.drift_m_s)))
+    return FilterReport(targets, pixel, position, common, own)
 
 
 def _tune(bench: FilterBench, place: Place, betas: Array, now: OneEuroSettings,
@@ -205,7 +229,8 @@ def _tune(bench: FilterBench, place: Place, betas: Array, now: OneEuroSettings,
     calm = np.array([bench.jitter_m(*place(rows(cutoff, beta))) for beta in betas])
     within = (np.abs(lags) <= targets.lag_s) & (errors <= targets.lag_s * bench.speeds_m_s)
     moved = bench.known & np.isfinite(lags).all(axis=0)
-    own = np.array([_smallest(betas, within[:, m]) for m in range(within.shape[1])])
+    excess = np.maximum(np.abs(lags) / targets.lag_s, calm / targets.jitter_m)
+    own = np.array([_smallest(betas, within[:, m], excess[:, m]) for m in range(within.shape[1])])
     beta = float(own[moved].max()) if moved.any() else now.beta
     return FilterCurves(
         MIN_CUTOFFS_HZ, still, betas, lags, errors, calm, _settings(cutoff, beta, now),
@@ -218,10 +243,12 @@ def _highest(candidates: Array, good: NDArray[np.bool_]) -> float:
     return float(candidates[max(int(np.argmin([*good, False])) - 1, 0)])
 
 
-def _smallest(candidates: Array, good: NDArray[np.bool_]) -> float:
-    """The smallest candidate from which on all are good; the largest when none is."""
+def _smallest(candidates: Array, good: NDArray[np.bool_], excess: Array) -> float:
+    """The smallest candidate from which on all are good; the one of the smallest excess when the largest is not."""
+    if not good[-1]:
+        return float(candidates[int(np.argmin(np.where(np.isfinite(excess), excess, np.inf)))])
     bad = np.flatnonzero(~good)
-    return float(candidates[min(int(bad[-1]) + 1 if len(bad) else 0, len(candidates) - 1)])
+    return float(candidates[int(bad[-1]) + 1 if len(bad) else 0])
 
 
 def _settings(min_cutoff_hz: float, beta: float, now: OneEuroSettings) -> OneEuroSettings:
@@ -231,6 +258,10 @@ def _settings(min_cutoff_hz: float, beta: float, now: OneEuroSettings) -> OneEur
 
 def _rows(settings: OneEuroSettings, markers: int) -> Array:
     return np.tile((settings.min_cutoff_hz, settings.beta, settings.derivative_cutoff_hz), (markers, 1))
+
+
+def _own_rows(curves: FilterCurves) -> Array:
+    return np.concatenate([_rows(own, 1) for own in curves.by_marker])
 
 
 def _figures(bench: FilterBench, rig: Rig, pixel: Array, position: Array) -> tuple[MarkerFigures, ...]:

@@ -74,7 +74,7 @@ def test_from_two_movements_to_a_rig_with_other_filters(hands):
     QTest.keyClicks(page.jitter, "2.00")
     QTest.keyClick(page.jitter, Qt.Key.Key_Tab)
     hands.until(lambda: step.report is not None and step.report is not first)
-    assert step.report.position.chosen.min_cutoff_hz > first.position.chosen.min_cutoff_hz, "more jitter is allowed"
+    assert step.report.pixel.chosen.min_cutoff_hz > first.pixel.chosen.min_cutoff_hz, "more jitter is allowed"
     page.own.setChecked(True)
     hands.next()
     table = hands.window.page.table

@@ -49,7 +49,7 @@ class TuneStep(SolveStep):
         self.stage: FilterStage = "position"
         self._rig = rig
         self._logs = logs
-        super().__init__(self._work, lambda report: report.verdict, self._charts)
+        super().__init__(self._work, lambda report: report.choice(per_marker=self.per_marker).verdict, self._charts)
 
     def _work(self) -> Task | None:
         still, fast = self._logs()
@@ -103,15 +103,15 @@ def propose(report: FilterReport | None, rig: Rig, path: Path | None, *, per_mar
     """The rig with the proposed filters, and what they do to every marker."""
     if report is None:
         return None
-    after = report.apply(rig, per_marker=per_marker)
+    after, choice = report.apply(rig, per_marker=per_marker), report.choice(per_marker=per_marker)
     rows = list(rig_rows(rig, after))
-    for one in report.markers:
+    for one in choice.markers:
         if one.known:
             rows.append(Row(f"{one.marker_id}: jitter at rest", _figure(1e3 * one.jitter_now_m, 2, "mm"),
                             _figure(1e3 * one.jitter_m, 2, "mm")))
             rows.append(Row(f"{one.marker_id}: lag", _figure(1e3 * one.lag_now_s, 1, "ms"),
                             _figure(1e3 * one.lag_s, 1, "ms")))
-    return Proposal(REASON, report.verdict, tuple(rows), (RigChange(rig, after, path, REASON),))
+    return Proposal(REASON, choice.verdict, tuple(rows), (RigChange(rig, after, path, REASON),))
 
 
 def _figure(value: float, decimals: int, unit: str) -> str:
