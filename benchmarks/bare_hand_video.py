@@ -39,6 +39,7 @@ from rhot_app.handfit.session import HandFit  # noqa: E402
 from rhot_app.handfit.state import Anchor  # noqa: E402
 from rhot_app.project import CameraCalibration, Rig  # noqa: E402
 from rhot_node.detect.foreground import learn_skin  # noqa: E402
+from rhot_node.pictures import open_video  # noqa: E402
 
 
 def numbers(path: Path) -> list[list[float]]:
@@ -71,7 +72,7 @@ def landmarks(path: Path) -> dict[int, np.ndarray]:
 
 
 def film(path: Path) -> list[np.ndarray]:
-    capture = cv2.VideoCapture(str(path))
+    capture = open_video(path)
     frames: list[np.ndarray] = []
     while True:
         read, image = capture.read()

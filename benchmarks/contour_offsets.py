@@ -15,7 +15,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-import cv2
 import msgspec
 import numpy as np
 from landmarks import DATA, FPS, landmark_errors, recorded_rig, triangulated
@@ -32,6 +31,7 @@ from rhot_app.recording.landmark_command import track
 from rhot_app.recording.landmark_log import read_landmark_table, write_landmark_log
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import learn_skin
+from rhot_node.pictures import open_video
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def regions_of(surface: Surface, with_ball: bool) -> list[str]:
 
 def pictures(path: Path) -> list[NDArray[np.uint8]]:
     """(H, W, 3) RGB, all of a film."""
-    film, found = cv2.VideoCapture(str(path)), []
+    film, found = open_video(path), []
     while (read := film.read())[0]:
         found.append(np.ascontiguousarray(read[1][..., ::-1]))
     return found

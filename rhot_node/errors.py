@@ -25,6 +25,14 @@ class CameraError(NodeError):
     """A camera or recording cannot be opened, stopped delivering, or changed its image size."""
 
 
+class PictureError(NodeError):
+    """A picture or a video of a file, or of a message, cannot be decoded. `reason`: why, as what follows its name."""
+
+    def __init__(self, reason: str, path: object = None) -> None:
+        super().__init__(f"{'the picture' if path is None else path} {reason}.")
+        self.reason = reason
+
+
 class LinkError(NodeError):
     """A network port cannot be opened or an address is not usable."""
 

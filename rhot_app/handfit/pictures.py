@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.check.camera_calibration import calibration_finding
 from rhot_app.errors import CalibrationError
 from rhot_app.project import Rig, RigNode
-from rhot_node.files import read_input, why
+from rhot_node import pictures
+from rhot_node.errors import PictureError
 
 Image = NDArray[np.uint8]
-
-MOST_BYTES = 256 * 2**20
-"""More than an uncompressed picture of any camera has."""
 
 
 def require_calibrated(rig: Rig) -> str:
@@ -57,13 +54,10 @@ def files_by_camera(rig: Rig, given: Sequence[str]) -> dict[int, Path]:
 def read_picture(path: Path, node: RigNode) -> Image:
     """(H, W, 3) RGB. Raises CalibrationError for what is no picture, or none of this camera's size."""
     try:
-        data = read_input(path, MOST_BYTES)
-    except (OSError, ValueError) as exc:
-        raise CalibrationError(f"{path}: cannot be read ({why(exc)}).") from exc
-    bgr = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) if data else None
-    if bgr is None:
-        raise CalibrationError(f"{path}: this is not a picture. Give a PNG or JPEG file.")
-    picture = np.ascontiguousarray(bgr[:, :, ::-1], np.uint8)
+        bgr = pictures.read_picture(path)
+    except PictureError as exc:
+        raise CalibrationError(str(exc)) from exc
+    picture = np.ascontiguousarray(bgr[:, :, ::-1])
     require_size(picture, node, str(path))
     return picture
 

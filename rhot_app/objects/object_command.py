@@ -73,12 +73,9 @@ def _solve(model: ObjectModel, rig: Rig, images: Sequence[str]) -> ObjectPose:
 
 def _detect(rig: Rig, detector: Any, argument: str) -> FiducialFrame:
     """The tags in the image of ``CAMERA=IMAGE``."""
-    import cv2
-    import numpy as np
-
     from rhot_app.errors import ObjectError
     from rhot_app.objects.observations import fiducial_frame
-    from rhot_node.files import read_input, why
+    from rhot_node.pictures import read_picture
     from rhot_node.wire.messages import Fiducials
 
     name, equals, path = argument.partition("=")
@@ -86,20 +83,13 @@ def _detect(rig: Rig, detector: Any, argument: str) -> FiducialFrame:
     if not equals or name not in names:
         raise ObjectError(f"--images {argument}: there is no camera {name!r}. Write CAMERA=IMAGE with one of "
                           f"{', '.join(names)}.")
-    try:
-        luma = cv2.imdecode(np.frombuffer(read_input(Path(path)), np.uint8), cv2.IMREAD_GRAYSCALE)
-    except (OSError, ValueError) as exc:
-        raise ObjectError(f"{path}: cannot be read ({why(exc)}).") from exc
-    except cv2.error:
-        luma = None
-    if luma is None:
-        raise ObjectError(f"{path}: this is no image. Give a PNG or JPEG file.")
+    luma = read_picture(Path(path), grey=True)
     camera, (height, width) = names.index(name), luma.shape
     lens = rig.nodes[camera].intrinsics
     if (width, height) != (lens.width, lens.height):
         raise ObjectError(f"{path}: the image has {width} x {height} px, camera {name!r} {lens.width} x {lens.height}. "
                           "Give an unscaled image of that camera.")
-    found = detector.detect(np.asarray(luma, np.uint8))
+    found = detector.detect(luma)
     return fiducial_frame(Fiducials(1, 1, 0, 0, 0, 0, 0, 0, width, height, 0, found), camera, 0)
 
 

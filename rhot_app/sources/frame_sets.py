@@ -25,8 +25,10 @@ from rhot_app.sources.clock import ClockEstimate
 from rhot_app.sources.replay import LogValidator
 from rhot_node.capture.yuv import HEADER_NAME, read_header, read_images
 from rhot_node.detect.image import to_bgr
-from rhot_node.errors import CameraError, VideoError
+from rhot_node.errors import CameraError, PictureError, VideoError
 from rhot_node.files import open_input, require_file, why
+from rhot_node.pictures import decode_picture
+from rhot_node.pictures import open_video as decoder
 from rhot_node.video.avi import Stamp, pictures_of, read_stamps
 
 Image = NDArray[np.uint8]
@@ -91,8 +93,9 @@ class CameraVideo:
                 picture = None
                 if chosen[k]:
                     file.seek(stored.offset)
-                    picture = cv2.imdecode(np.frombuffer(file.read(stored.size), np.uint8), cv2.IMREAD_COLOR)
-                yield k, None if picture is None else np.asarray(picture, np.uint8)
+                    with contextlib.suppress(PictureError):
+                        picture = decode_picture(file.read(stored.size))
+                yield k, picture
 
     def some(self, wanted: NDArray[np.bool_], most: int) -> list[Image]:
         """At most `most` of the pictures `wanted` (N,), evenly spread."""
@@ -158,8 +161,11 @@ def _open_raw(node: RigNode, folder: Path, fps: float | None) -> CameraVideo:
 
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
-    """A decoder of the file. What is no video it cannot open; it then reads nothing."""
-    capture = cv2.VideoCapture(str(path))
+    """A decoder of the file. What is no video it cannot open; it then reads nothing. Raises RecordingError."""
+    try:
+        capture = decoder(path)
+    except PictureError as exc:
+        raise RecordingError(str(exc)) from exc
     try:
         yield capture
     finally:

@@ -13,10 +13,10 @@ from rhot_node.capture.camera import NS_PER_S, EndOfRecording, Frame, available_
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, YuvImage, from_bgr
-from rhot_node.errors import CameraError
-from rhot_node.files import require_file
+from rhot_node.errors import CameraError, PictureError
+from rhot_node.pictures import open_video, read_picture
 
-IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".pgm", ".webp"})
+IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp"})
 
 
 class ImageSource(Protocol):
@@ -59,12 +59,10 @@ class ImageFiles:
 
     def image(self) -> Plane:
         """Decode the current file."""
-        path = self._paths[self._index]
-        _require_file(path)
-        image = cv2.imread(str(path), cv2.IMREAD_COLOR)
-        if image is None:
-            raise CameraError(f"{path}: not an image that can be decoded. Remove or replace it.")
-        return np.asarray(image, dtype=np.uint8)
+        try:
+            return read_picture(self._paths[self._index])
+        except PictureError as exc:
+            raise CameraError(f"{exc} Remove or replace it.") from exc
 
     def rewind(self) -> None:
         """Go before the first file."""
@@ -104,8 +102,10 @@ class VideoFile:
         self._capture.release()
 
     def _open(self) -> cv2.VideoCapture:
-        _require_file(self._path)
-        capture = cv2.VideoCapture(str(self._path))
+        try:
+            capture = open_video(self._path)
+        except PictureError as exc:
+            raise CameraError(str(exc)) from exc
         if not capture.isOpened():
             capture.release()
             raise CameraError(f"{self._path}: not a video that can be decoded. Convert it, e.g. to H.264 in MP4.")
@@ -189,10 +189,3 @@ class PacedCamera:
             exposure_ns=self._exposure_ns,
             row_time_ns=self._row_time_ns,
         )
-
-
-def _require_file(path: Path) -> None:
-    try:
-        require_file(path)
-    except OSError as exc:
-        raise CameraError(f"{path}: cannot be read ({exc.strerror}).") from exc

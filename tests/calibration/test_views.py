@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -40,6 +41,19 @@ def test_good_pictures_make_views(folder: Path) -> None:
     assert read.dropped == () and read.size is None
 
 
+def test_an_orientation_in_a_file_turns_nothing(folder: Path) -> None:
+    files = matching_files(str(folder / "*.jpg"))
+    before = read_views(files, BOARD)
+    for path, orientation in zip(files, (6, 3, 8), strict=False):
+        about = b"Exif\0\0II*\0" + struct.pack("<IHHHIHHI", 8, 1, 274, 3, 1, orientation, 0, 0)
+        data = path.read_bytes()
+        path.write_bytes(data[:2] + b"\xff\xe1" + struct.pack(">H", len(about) + 2) + about + data[2:])
+    after = read_views(files, BOARD)
+    assert after.dropped == () and len(after.views) == len(files)
+    for one, other in zip(before.views, after.views, strict=True):
+        assert one.size == other.size and np.array_equal(one.pixels, other.pixels)
+
+
 def cut_off(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:9000])
 
@@ -59,7 +73,7 @@ def covered(path: Path) -> None:
 
 
 @pytest.mark.parametrize(("spoil", "reason", "code"), [
-    (cut_off, "cut off", "file"), (scrambled, "cannot be read as a picture", "file"),
+    (cut_off, "cut off", "file"), (scrambled, "not a picture", "file"),
     (lambda path: path.write_bytes(b""), "is empty", "file"),
     (half_size, "is 320x240 px, the others are 640x480", "file"), (covered, "no board with 9x6", "no_board"),
     (lambda path: cv2.imwrite(str(path), np.full((480, 640), 7, np.uint8)), "one brightness", "no_board")])
@@ -86,7 +100,7 @@ def test_nothing_to_read(folder: Path) -> None:
         read_views([], BOARD)
     for path in folder.glob("*.jpg"):
         scrambled(path)
-    with pytest.raises(CalibrationError, match=r"none of 5 files can be used; left1\.jpg cannot be read"):
+    with pytest.raises(CalibrationError, match=r"none of 5 files can be used; left1\.jpg is not a picture"):
         read_views(matching_files(str(folder / "*.jpg")), BOARD)
     with pytest.raises(CalibrationError, match=r"nowhere\.jpg cannot be read \(No such file"):
         read_views([folder / "nowhere.jpg"], BOARD)

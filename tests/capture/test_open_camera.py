@@ -156,7 +156,7 @@ def test_a_broken_image_is_named(tmp_path: Path) -> None:
     (tmp_path / "images" / "001.png").write_bytes(b"\x89PNG and then nothing")
     camera = open_camera(f"{tmp_path / 'images'}?rate=max", SETTINGS, CLOCK)
     camera.read(1.0)
-    with pytest.raises(CameraError, match=r"001\.png: not an image"):
+    with pytest.raises(CameraError, match=r"001\.png is not a picture"):
         camera.read(1.0)
 
 
@@ -169,7 +169,7 @@ def test_only_files_and_cameras_are_opened(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "start")
     wrong = {
         "/dev/null": "is no camera", "/dev/shm": "is no camera", str(tmp_path / "pipe.avi"): "it is a pipe",
-        str(tmp_path / "images"): r"000\.jpg: cannot be read \(it is a pipe",
+        str(tmp_path / "images"): r"000\.jpg cannot be read \(it is a pipe",
     }
     for spec, sentence in wrong.items():
         with pytest.raises(CameraError, match=sentence):
@@ -187,7 +187,7 @@ def test_what_cannot_be_opened_is_named(tmp_path: Path) -> None:
     wrong = {
         "/dev/video99": "/dev/video99: no such camera", "99": "/dev/video99: no such camera",
         str(tmp_path / "gone.avi"): "no such file", str(tmp_path / "empty"): "a folder without images",
-        str(tmp_path / "text.avi"): r"text\.avi: not a video", str(tmp_path / "cut.png"): r"cut\.png: not an image",
+        str(tmp_path / "text.avi"): r"text\.avi: not a video", str(tmp_path / "cut.png"): r"cut\.png is not a picture",
         str(tmp_path / "zero.avi"): r"zero\.avi", f"yuv:{tmp_path / 'gone'}": "no such folder",
         f"yuv:{tmp_path}?rate=max": "takes \\?start=", f"{tmp_path / 'empty'}?start=x": "takes \\?rate=",
         f"{tmp_path / 'empty'}?rate=2": "the only rate is max", "": "names no file", "?rate=max": "names no file",

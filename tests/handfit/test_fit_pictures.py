@@ -49,7 +49,7 @@ def test_what_is_no_picture_of_a_camera_is_said(files, tmp_path):
     rig, (first, second) = files
     (tmp_path / "notes.txt").write_text("no picture")
     cv2.imwrite(str(tmp_path / "small.png"), np.zeros((240, 320, 3), np.uint8))
-    for given, sentence in (([str(tmp_path / "notes.txt")], "this is not a picture"),
+    for given, sentence in (([str(tmp_path / "notes.txt")], "is not a picture"),
                             ([str(tmp_path / "none.png")], "cannot be read"),
                             ([str(tmp_path)], "cannot be read"),
                             ([str(tmp_path / "small.png")], "320 x 240 px.*calibrated at 640 x 480"),

@@ -91,6 +91,14 @@ def test_long_files_are_named() -> None:
             warnings.warn(f"{path.relative_to(ROOT)} has {lines} lines; does it do two things?", stacklevel=1)
 
 
+def test_pictures_and_videos_of_others_are_opened_in_one_place() -> None:
+    """It checks them first, and turns no pixels; a camera's device is no file."""
+    allowed = {"rhot_node/pictures.py", "rhot_node/capture/webcam.py"}
+    found = [str(path.relative_to(ROOT)) for path in sources(*PACKAGES, "benchmarks")
+             if re.search(r"cv2\.(imread|imdecode|VideoCapture\()|^(?:from|import) (?:PIL|imageio)", path.read_text())]
+    assert set(found) <= allowed, f"use rhot_node/pictures.py: {', '.join(sorted(set(found) - allowed))}"
+
+
 def test_what_is_left_for_later_has_an_owner() -> None:
     found = [f"{path.relative_to(ROOT)}: {match.group()}" for path, text in tracked_text() if path.suffix == ".py"
              for match in UNOWNED.finditer(text)]

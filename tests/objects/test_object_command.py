@@ -70,7 +70,7 @@ def test_a_file_alone_is_checked(folder: Path, capsys: pytest.CaptureFixture[str
     (["cube.json", "--rig", "{}/rig.json", "--images", "top={}/left.png"], "no camera 'top'"),
     (["cube.json", "--rig", "{}/rig.json", "--images", "left.png"], "CAMERA=IMAGE"),
     (["cube.json", "--rig", "{}/rig.json", "--images", "left={}/gone.png"], "cannot be read"),
-    (["cube.json", "--rig", "{}/rig.json", "--images", "left={}/text.png"], "no image"),
+    (["cube.json", "--rig", "{}/rig.json", "--images", "left={}/text.png"], "not a picture"),
     (["cube.json", "--rig", "{}/rig.json", "--images", "left={}/small.png"], "64 x 48 px"),
     (["cube.json", "--rig", "{}/rig.json", "--images", "left={}/empty.png"], "no tag of 'cube'"),
     (["cube.json", "--rig", "{}/rig.json", "--images", "left={}/left.png", "left={}/left.png"], "twice"),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from rhot_app.calibration.commands.output import add_json_argument, show
 from rhot_app.errors import CalibrationError, input_file
+from rhot_node.errors import PictureError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -81,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         region = collector.add(name, shown, [_corners(box) for box in boxes])
         enlarged += _enlarged(f"{name} in picture {picture + 1}", shown, [_corners(box) for box in boxes], region)
     for image in images:
-        if image is not None:
+        if not isinstance(image, PictureError):
             collector.keep_view(image)
     skin = _skin([parse_box(f"skin{text}" if text.startswith("@") else f"skin={text}", "--skin") for text in args.skin],
                  images, args.image)
@@ -147,47 +148,42 @@ def _note_enlarged(enlarged: list[str]) -> list[Finding]:
                     f"{ENOUGH} of paint are enough in one box.")] if enlarged else []
 
 
-def _read_all(paths: list[Path]) -> tuple[list[YuvImage | None], list[Finding]]:
-    """All pictures, None for those that cannot be decoded, of which the findings tell; some must remain."""
+def _read_all(paths: list[Path]) -> tuple[list[YuvImage | PictureError], list[Finding]]:
+    """All pictures, or why one cannot be decoded, which the findings tell; some must remain."""
     from rhot_app.calibration.verdict import Finding, Grade
 
     images = [_read(path) for path in paths]
-    damaged = [path for path, image in zip(paths, images, strict=True) if image is None]
+    damaged = [image for image in images if isinstance(image, PictureError)]
     if len(damaged) == len(paths):
-        raise CalibrationError(_undecodable(paths[0]))
-    return images, [Finding("file", Grade.FAIR, f"{path} cannot be decoded.", "The file is damaged.",
-                            "The others were used without it; take it again.") for path in damaged]
+        raise CalibrationError(f"--image {damaged[0]}")
+    return images, [Finding("file", Grade.FAIR, str(each), "The file is damaged.",
+                            "The others were used without it; take it again.") for each in damaged]
 
 
-def _undecodable(path: Path) -> str:
-    return f"--image {path}: not an image that can be decoded (PNG, JPEG, BMP, TIFF)."
-
-
-def _read(path: Path) -> YuvImage | None:
-    """The picture, None for one that cannot be decoded; raises CalibrationError for one that is missing or tiny."""
-    import cv2
-    import numpy as np
-
+def _read(path: Path) -> YuvImage | PictureError:
+    """The picture, or why it cannot be decoded. Raises CalibrationError for one that is missing or tiny."""
     from rhot_node.detect.image import from_bgr
+    from rhot_node.pictures import read_picture
 
     if not path.is_file():
         raise CalibrationError(f"--image {path}: there is no such file (a pipe or a device is none).")
-    bgr = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if bgr is None:
-        return None
+    try:
+        bgr = read_picture(path)
+    except PictureError as exc:
+        return exc
     if min(bgr.shape[:2]) < 16:
         raise CalibrationError(f"--image {path}: {bgr.shape[1]} x {bgr.shape[0]} px is too small to show a marker.")
-    return from_bgr(np.asarray(bgr, dtype=np.uint8))
+    return from_bgr(bgr)
 
 
-def _image(box: BoxArgument, images: list[YuvImage | None], paths: list[Path]) -> YuvImage:
+def _image(box: BoxArgument, images: list[YuvImage | PictureError], paths: list[Path]) -> YuvImage:
     """The picture that a box lies in; raises CalibrationError unless it does, wholly."""
     if not 0 <= box.picture < len(images):
         raise CalibrationError(f"{box.text!r} asks for picture {box.picture + 1}, and there "
                                f"{'is' if len(images) == 1 else 'are'} {len(images)}; give another --image.")
     image = images[box.picture]
-    if image is None:
-        raise CalibrationError(f"{_undecodable(paths[box.picture])} {box.text!r} is in it.")
+    if isinstance(image, PictureError):
+        raise CalibrationError(f"--image {image} {box.text!r} is in it.")
     (width, height), (x, y, wide, high) = image.size, box.box
     if x < 0 or y < 0 or x + wide > width or y + high > height:
         raise CalibrationError(f"{box.text!r} reaches outside {paths[box.picture]}, which has {width} x {height} px.")
@@ -199,7 +195,7 @@ def _corners(box: BoxArgument) -> tuple[int, int, int, int]:
     return x, y, x + width, y + height
 
 
-def _skin(boxes: list[BoxArgument], images: list[YuvImage | None], paths: list[Path]) -> np.ndarray:
+def _skin(boxes: list[BoxArgument], images: list[YuvImage | PictureError], paths: list[Path]) -> np.ndarray:
     import numpy as np
 
     from rhot_app.calibration.colour.colours import NO_COLOURS

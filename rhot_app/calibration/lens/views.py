@@ -8,9 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
-import numpy as np
-
 from rhot_app.calibration.board.boards import Board, Chessboard
 from rhot_app.calibration.board.corners import BoardView, Gray, detect
 from rhot_app.calibration.board.shared_views import Dropped
@@ -18,13 +15,11 @@ from rhot_app.calibration.board.size_check import Beyond, look_beyond, size_find
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent
-from rhot_node.files import read_input
+from rhot_node import pictures
+from rhot_node.errors import PictureError
 
 MOST_EXPLAINED = 8
 """Pictures of one camera that are searched for the reason why they show no board: that takes a second each."""
-
-_JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
-_FORGIVEN = 0.25  # of a JPEG's bytes after its end mark: cameras append thumbnails and notes
 
 
 @dataclass(slots=True)
@@ -82,17 +77,11 @@ def read_picture(path: Path, board: Board) -> Read:
 
 
 def open_picture(path: Path) -> tuple[Gray | None, str]:
-    """The picture in grey levels, or None and the reason: missing, no picture, or cut off."""
+    """The picture in grey levels, or None and the reason."""
     try:
-        data = read_input(path)
-    except OSError as exc:
-        return None, f"cannot be read ({exc.strerror})"
-    if data.startswith(_JPEG_START) and data.rfind(_JPEG_END) < (1.0 - _FORGIVEN) * len(data):
-        return None, "is cut off or damaged: its end is missing"  # the decoder would fill it up with grey
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
-    if image is None:
-        return None, "cannot be read as a picture" if data else "is empty"
-    return np.asarray(image, np.uint8), ""
+        return pictures.read_picture(path, grey=True), ""
+    except PictureError as exc:
+        return None, exc.reason
 
 
 def drop_other_sizes(reads: Sequence[Read]) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.simulator.render.exposure_samples import FrameTime
+from rhot_node.pictures import decode_picture
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -117,8 +118,8 @@ class KeptPainter:
             assert self._file is not None
             name = next(name for name in self._file.namelist() if name.startswith(f"{number}_"))
             x0, y0 = (int(part) for part in name.split("_")[1:])
-            data = np.frombuffer(self._file.read(name), np.uint8)
-            crop = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else np.zeros((0, 0, 3)), np.uint8)
+            data = self._file.read(name)
+            crop = decode_picture(data) if data else np.zeros((0, 0, 3), np.uint8)
             y1, x1 = y0 + crop.shape[0], x0 + crop.shape[1]
         self._image[:, y0:y1, x0:x1] = crop.transpose(2, 0, 1) * self._level[:, None, None]
         return (x0, y0, x1, y1) if x0 < x1 else (0, 0, 0, 0), np.zeros(0)

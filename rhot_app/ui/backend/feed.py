@@ -12,13 +12,14 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker, Listener
+from rhot_node.errors import PictureError
+from rhot_node.pictures import decode_picture
 
 Image = NDArray[np.uint8]
 
@@ -157,11 +158,12 @@ def ask_picture(asker: Asker, camera: str, node_id: int) -> Picture:
     answer = asker.command("still", node_id=node_id, format="jpeg")
     received_ns = time.monotonic_ns()
     jpeg, about = answer.get("jpeg"), answer.get("answer", {})
-    bgr = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if isinstance(jpeg, bytes) and jpeg else None
-    if bgr is None:
-        raise EngineError(f"camera {camera} gave a picture that cannot be read; restart its node.")
+    try:
+        bgr = decode_picture(jpeg if isinstance(jpeg, bytes) else b"")
+    except PictureError as exc:
+        raise EngineError(f"camera {camera} gave a picture that cannot be read; restart its node.") from exc
     bgr.setflags(write=False)
-    return Picture(camera, bgr.astype(np.uint8, copy=False), int(about.get("number", 0)),
+    return Picture(camera, bgr, int(about.get("number", 0)),
                    int(about.get("t_node_ns", 0)), received_ns)
 
 

@@ -20,7 +20,7 @@ from rhot_app.ui.handfit.frame import FitFrame
 from rhot_app.ui.wizards.framework.plan import Memory
 
 TITLE: Final = "Fit the hand to pictures"
-_PICTURES = (f"Pictures and videos (*.png *.jpg *.jpeg *.bmp *.tif *.tiff {' '.join(f'*{end}' for end in VIDEOS)});;"
+_PICTURES = (f"Pictures and videos (*.png *.jpg *.jpeg *.tif *.tiff *.webp {' '.join(f'*{end}' for end in VIDEOS)});;"
              "All files (*)")
 _LONGEST_S = 1e5  # of a video: a day
 

@@ -19,6 +19,8 @@ from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.model import build_model
 from rhot_app.project import Rig
 from rhot_app.state import HandState
+from rhot_node.errors import PictureError
+from rhot_node.pictures import decode_picture
 
 Image = NDArray[np.uint8]
 
@@ -94,7 +96,8 @@ def _smaller(camera: CameraModel) -> CameraModel:
 
 def _background(preview: Preview | None, camera: CameraModel) -> Image:
     size = camera.width, camera.height
-    bgr = None if preview is None else cv2.imdecode(np.frombuffer(preview.jpeg, np.uint8), cv2.IMREAD_COLOR)
-    if bgr is None:
+    try:
+        bgr = decode_picture(b"" if preview is None else preview.jpeg)
+    except PictureError:
         return np.full((size[1], size[0], 3), GREY, np.uint8)
     return np.ascontiguousarray(cv2.resize(bgr, size, interpolation=cv2.INTER_LINEAR)[:, :, ::-1], np.uint8)

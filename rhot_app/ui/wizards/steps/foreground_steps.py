@@ -18,6 +18,8 @@ from rhot_app.errors import EngineError, RhotError
 from rhot_app.ui.models.proposal import Command, Proposal, Row
 from rhot_app.ui.wizards.models.drawing import Layer, Overlay
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView
+from rhot_node.errors import PictureError
+from rhot_node.pictures import decode_picture
 
 REASON = "background and skin"
 
@@ -215,9 +217,10 @@ class SkinStep(LearningStep):
 
 def mask_of(png: bytes) -> Mask:
     """What a node's answer shows. Raises EngineError when it is no picture."""
-    grey = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_GRAYSCALE) if png else None
-    if grey is None:
-        raise EngineError("a node gave a foreground that cannot be read; restart it.")
+    try:
+        grey = decode_picture(png, grey=True)
+    except PictureError as exc:
+        raise EngineError("a node gave a foreground that cannot be read; restart it.") from exc
     hand: NDArray[np.uint8] = np.asarray(grey > 127, np.uint8)
     count, _, stats, _ = cv2.connectedComponentsWithStats(hand, connectivity=8)
     total = int(hand.sum())
