@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.objects.state import ObjectState
+from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.uint8]
@@ -123,15 +124,18 @@ class SeenContour:
     of_hand: NDArray[np.bool_]
 
 
-def no_hand(t_ns: int, condition: Condition, cameras: tuple[str, ...] = (), filter_s: float = 0.0) -> HandState:
-    """The state of master time `t_ns` without a hand or markers. `filter_s`: what it took."""
-    unknown, nothing = int(Knowledge.UNKNOWN), np.empty((0, 3))
+def no_hand(t_ns: int, condition: Condition, cameras: tuple[str, ...] = (), filter_s: float = 0.0,
+            markers: tuple[str, ...] = ()) -> HandState:
+    """The state of master time `t_ns` without a hand and with nothing known of `markers`. `filter_s`: what it took."""
+    unknown, count, nothing = int(Knowledge.UNKNOWN), len(markers), np.full((len(markers), 3), np.nan)
     return HandState(
-        sequence=0, t_master_ns=t_ns, t_receive_ns=t_ns, condition=condition, marker_ids=(), marker_positions=nothing,
-        marker_raw_positions=nothing, marker_covariances=np.empty((0, 3, 3)), marker_knowledge=np.empty(0, np.uint8),
-        camera_names=cameras, camera_pixels=np.empty((len(cameras), 0, 2)),
-        camera_flags=np.empty((len(cameras), 0), np.uint16), joint_positions=np.full((21, 3), np.nan),
-        joint_knowledge=np.full(21, unknown, np.uint8), fingertip_positions=np.full((5, 3), np.nan),
-        angles=np.full(21, np.nan), angle_knowledge=np.full(21, unknown, np.uint8),
-        world_from_palm=np.full((4, 4), np.nan), palm_knowledge=Knowledge.UNKNOWN, epipolar_error_px=np.empty(0),
+        sequence=0, t_master_ns=t_ns, t_receive_ns=t_ns, condition=condition, marker_ids=markers,
+        marker_positions=nothing, marker_raw_positions=nothing.copy(),
+        marker_covariances=np.full((count, 3, 3), np.nan), marker_knowledge=np.full(count, unknown, np.uint8),
+        camera_names=cameras, camera_pixels=np.full((len(cameras), count, 2), np.nan),
+        camera_flags=np.full((len(cameras), count), int(MarkerFlag.LOST), np.uint16),
+        joint_positions=np.full((21, 3), np.nan), joint_knowledge=np.full(21, unknown, np.uint8),
+        fingertip_positions=np.full((5, 3), np.nan), angles=np.full(21, np.nan),
+        angle_knowledge=np.full(21, unknown, np.uint8), world_from_palm=np.full((4, 4), np.nan),
+        palm_knowledge=Knowledge.UNKNOWN, epipolar_error_px=np.full(count, np.nan),
         **UNESTIMATED | {"hand_scale": np.nan}, latency_s={"filter": filter_s})

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import os
+from collections.abc import Iterator
 
 # Before numpy loads. A second thread only waits for the first one, busily, where matrices are as small as here: the
 # shape of a hand then takes five times the processor's time. Programs that a test starts inherit it.
@@ -20,6 +22,26 @@ settings.register_profile("patient", deadline=None, derandomize=True, suppress_h
 settings.load_profile("patient")
 
 pytest_plugins = ["scheduling", "studies"]
+
+
+@pytest.fixture
+def tracker_may_fail() -> list[logging.LogRecord]:
+    """For a test in which a tracker fails: what was logged of it."""
+    return []
+
+
+@pytest.fixture(autouse=True)
+def no_tracker_fails(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What a tracker fails over is counted and logged, and the rest is tracked: no test must overlook it."""
+    found: list[logging.LogRecord] = (request.getfixturevalue("tracker_may_fail")
+                                      if "tracker_may_fail" in request.fixturenames else [])
+    handler = logging.Handler()
+    handler.emit = found.append  # type: ignore[method-assign]
+    logger = logging.getLogger("rhot_app.diagnostics")
+    logger.addHandler(handler)
+    yield
+    logger.removeHandler(handler)
+    assert not found or "tracker_may_fail" in request.fixturenames, f"{found[0].getMessage()}: {found[0].exc_info}"
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -11,8 +11,9 @@ import numpy as np
 
 from rhot_app.calibration.check.health import HealthMonitor, HealthSample
 from rhot_app.calibration.verdict import Grade
+from rhot_app.diagnostics import Diagnostic
 from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice
-from rhot_app.engine.node_meter import NodeMeter, most_urgent_first
+from rhot_app.engine.node_meter import RECENT_NS, NodeMeter, most_urgent_first
 from rhot_app.engine.pipeline import Pipeline
 from rhot_app.engine.rig_watch import HandWatch, RigWatch
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus
@@ -76,7 +77,7 @@ class Observer:
     def _condition(self, running: bool, nodes: tuple[NodeStatus, ...], now_ns: int) -> Condition:
         if not running:
             return Condition.IDLE
-        if self._pipeline.failure or any(node.state == "fault" for node in nodes):
+        if any(one.level == "error" for one in self._diagnosed(now_ns)) or any(node.state == "fault" for node in nodes):
             return Condition.FAULT
         state, rate_hz = self._pipeline.last_state, self._pipeline.states.rate_hz(now_ns)
         if state is None or rate_hz == 0.0:
@@ -84,6 +85,10 @@ class Observer:
         condition = condition_of(state)
         self._ever_tracked |= condition is Condition.TRACKING
         return condition
+
+    def _diagnosed(self, now_ns: int) -> list[Diagnostic]:
+        """What the tracker has failed over or warned of within the last two seconds."""
+        return self._pipeline.diagnostics.since(now_ns - RECENT_NS)
 
     def _advice(self, nodes: tuple[NodeStatus, ...], running: bool, now_ns: int, black: NodeBlack) -> list[Advice]:
         facts = [replace(self._facts(camera, status, now_ns), black=black(status.node_id))
@@ -99,8 +104,7 @@ class Observer:
             health = self._health.advice(self._pipeline.last_state, self._pipeline.work.tracker, now_ns)
             found += self.hand_watch.advice(self._pipeline.work.tracker, now_ns)
             found += [*stale, *(one for one in health if not (stale and one.mender == "stereo"))]
-        if self._pipeline.failure:
-            found.append(Advice("error", self._pipeline.failure))
+        found += [Advice(one.level, one.sentence) for one in self._diagnosed(now_ns)]
         notices = [Advice("info", text) for text in self._source.notices()]
         return [*found, *nowhere, *calibration_advice(self.rig), *notices]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import threading
 import time
@@ -14,6 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.diagnostics import diagnostics_of
 from rhot_app.engine.status import LatencySummary, encode
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
@@ -26,7 +26,15 @@ from rhot_app.sources.source import ObservationSource
 from rhot_app.state import LATENCY_STAGES, HandState
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.markers.marker_model import points_on
-from rhot_app.tracking.tracker import CameraFrame, CameraObservations, ImageTracking, Tracker, feed, may_be_due
+from rhot_app.tracking.tracker import (
+    CameraFrame,
+    CameraObservations,
+    ImageTracking,
+    Tracker,
+    feed,
+    frame_part,
+    may_be_due,
+)
 from rhot_node.wire.codec import decode as decode_datagram
 from rhot_node.wire.codec import encode as encode_datagram
 from rhot_node.wire.marker_table import MarkerTable
@@ -37,8 +45,6 @@ RECENT = 256
 
 PublishState = Callable[[bytes], None]
 AfterState = Callable[[], None]
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +66,7 @@ class Pipeline:
         self.last_state: HandState | None = None
         self.frame_count = 0
         self.recent: deque[CameraObservations] = deque(maxlen=RECENT)
-        self.failure = ""
+        self.diagnostics = diagnostics_of(work.tracker)
         self._work = work
         self._publish = publish
         self._after_state = after_state
@@ -77,6 +83,7 @@ class Pipeline:
         """Go on with another source or tracker, from the next step on."""
         with self._lock:
             self._work = work
+            self.diagnostics = diagnostics_of(work.tracker)
             self._changes = work.source.changes
             self.last_state = None
 
@@ -87,29 +94,23 @@ class Pipeline:
             self._work.last_seen_ns[:] = time.monotonic_ns()
             self.latency.clear()
             self.last_state = None
-            self.failure = ""
+            self.diagnostics.clear()
             self._previous = {}
 
     def take(self, source: ObservationSource, frames: list[CameraFrame]) -> None:
-        """Take frames of one camera in and publish the state that is due, if any. Never raises: a tracker's fault must
-        not end the stream for good. Frames of a source that has been replaced are ignored."""
+        """Take frames of one camera in and publish the state that is due, if any. Never raises: a tracker's fault loses
+        the frame (`Diagnostics`). Frames of a source that has been replaced are ignored."""
         with self._lock:
             work = self._work
             if work.source is not source:
                 return
-            try:
+            with self.diagnostics.part("frames on their way", work.tracker.reset):
                 state = self._process(work, frames)
-            except Exception as exc:
-                log.exception("the tracker failed over a frame")
-                self.failure = (f"The tracker failed over a frame ({type(exc).__name__}: {exc}) and began anew. "
-                                "Record a log and report this.")
-                work.tracker.reset()  # it may be in any state
-                return
-            if isinstance(work.tracker, ImageTracking):
-                for request in work.tracker.requests():
-                    work.source.search(request)
-            if state is not None:
-                self._after_state()
+                if isinstance(work.tracker, ImageTracking):
+                    for request in work.tracker.requests():
+                        work.source.search(request)
+                if state is not None:
+                    self._after_state()
 
     def _process(self, work: Work, frames: list[CameraFrame]) -> HandState | None:
         if work.source.changes != self._changes:
@@ -120,19 +121,21 @@ class Pipeline:
                   or len(frame.pixels) == markers]  # some may be of the rig before
         observations = [frame for frame in frames if isinstance(frame, CameraObservations)]
         self.frame_count += len(observations)
-        live, tracker = work.source.live, work.tracker
+        live, tracker, cameras = work.source.live, work.tracker, [link.node.name for link in work.source.links]
         now_ns = time.monotonic_ns()
         state, last = None, next((frame for frame in reversed(frames) if may_be_due(frame)), None)
         for frame in frames:
-            feed(tracker, frame)
-            # Live, only the newest instant matters to anybody; a replay leaves none out.
-            if may_be_due(frame) and (not live or frame is last):
-                if not live and isinstance(tracker, ImageTracking):
-                    tracker.wait()
-                solved = tracker.solve()
-                if solved is not None:
-                    self._send(solved, live)
-                    state = solved
+            solved = None
+            with frame_part(self.diagnostics, tracker, frame, cameras):
+                feed(tracker, frame)
+                # Live, only the newest instant matters to anybody; a replay leaves none out.
+                if may_be_due(frame) and (not live or frame is last):
+                    if not live and isinstance(tracker, ImageTracking):
+                        tracker.wait()
+                    solved = tracker.solve()
+            if solved is not None:
+                self._send(solved, live)
+                state = solved
         for frame in observations:  # once the state is out: nobody waits for this
             work.last_seen_ns[frame.camera, ~np.isnan(frame.pixels[:, 0])] = now_ns
         self.recent.extend(observations)

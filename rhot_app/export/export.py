@@ -87,6 +87,7 @@ def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig
         notes = _write(tracked, name, options, out, lambda: progress(f"writing {out.name}", 0.99))
         if not tracked.tracked:
             notes.append(f"the hand is tracked in none of the {tracked.count} states")
+        notes += [sentence.removesuffix(".") for sentence in tracked.warnings]
         progress(f"exported {log.name}", 1.0)
         return Exported(out, tracked.count, tuple(tracked.losses), tuple(notes))
 

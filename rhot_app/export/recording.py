@@ -11,6 +11,7 @@ import numpy as np
 
 from rhot_app.barehand.observations import ImageFrame, SliceRequest
 from rhot_app.calibration.recorded_observations import why_none
+from rhot_app.diagnostics import Diagnostic, diagnostics_of
 from rhot_app.engine.offline.replay_summary import replay_states, smoothed_states
 from rhot_app.errors import ExportError, RecordingError, take_losses
 from rhot_app.export.states import HandStates, in_blocks
@@ -81,10 +82,19 @@ class TrackedLog:
             self.count += len(block)
             self.tracked += int(np.count_nonzero(block.tracked))
             yield block
+        self.losses += [one.sentence for one in self._diagnosed("error")]
         if self._door.gaps:
             self.losses.append(f"the disk was too slow while recording: {self._door.gaps} records are missing")
         if not self.count:
             raise RecordingError(self._why_nothing())
+
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences about what was ambiguous in it, complete after the pass."""
+        return [one.sentence for one in self._diagnosed("warning")]
+
+    def _diagnosed(self, level: str) -> list[Diagnostic]:
+        return [one for one in self._frames.diagnostics.all() if one.level == level]
 
     def _records(self) -> Iterator[Record]:
         """All that can be read; a broken log ends where it breaks."""
@@ -129,6 +139,7 @@ class _FrameCount:
 
     def __init__(self, tracker: Tracker | SmoothedTracker, cameras: int) -> None:
         self.count = 0
+        self.diagnostics = diagnostics_of(tracker)
         self.smooths = isinstance(tracker, SmoothedTracker)
         self.reset = tracker.reset
         if isinstance(tracker, SmoothedTracker):

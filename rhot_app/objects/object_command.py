@@ -41,17 +41,20 @@ def run(args: argparse.Namespace) -> int:
             raise ObjectError(f"{args.file}: {model.name!r} has colour markers only, which are not looked for in still "
                               "images. Give an object with fiducials.")
         announce_compilation("some seconds")
-        fields.update(_pose_fields(_solve(model, load_rig(args.rig), args.images)))
+        found, warnings = _solve(model, load_rig(args.rig), args.images)
+        fields.update(_pose_fields(found), warnings=warnings)
     print(json.dumps(fields) if args.json else "\n".join(_lines(fields)))
     return 0
 
 
-def _solve(model: ObjectModel, rig: Rig, images: Sequence[str]) -> ObjectPose:
+def _solve(model: ObjectModel, rig: Rig, images: Sequence[str]) -> tuple[ObjectPose, list[str]]:
+    """The pose, and sentences about what is ambiguous in the images."""
     from rhot_app.errors import ObjectError
     from rhot_app.geometry.camera import CameraModel
     from rhot_app.objects.motion import CameraArrays
     from rhot_app.objects.observations import ObjectPoints
     from rhot_app.objects.pose import estimate_pose
+    from rhot_app.objects.track import copies_sentence
     from rhot_node.detect.tags import TagDetector
 
     points = ObjectPoints(model)
@@ -61,6 +64,10 @@ def _solve(model: ObjectModel, rig: Rig, images: Sequence[str]) -> ObjectPose:
     if doubled:
         raise ObjectError(f"--images names the camera {rig.nodes[doubled[0]].name!r} twice; give one image of each.")
     views = [view for frame in frames if (view := points.view(frame)) is not None]
+    ambiguous = [copies_sentence(rig.nodes[frame.camera].name, frame.keys[copies[0]], model.name)
+                 for frame in frames for copies in points.copies(frame)]
+    if not views and ambiguous:
+        raise ObjectError(f"{', '.join(images)}: no pose. {' '.join(ambiguous)}")
     if not views:
         raise ObjectError(f"no tag of {model.name!r} was found in {', '.join(images)}. Is it in sight, sharp and "
                           "at least 20 px large?")
@@ -68,7 +75,7 @@ def _solve(model: ObjectModel, rig: Rig, images: Sequence[str]) -> ObjectPose:
     found = estimate_pose(points, cameras, views)
     if found is None:
         raise ObjectError(f"the tags of {model.name!r} determine no pose; is their layout in the object file right?")
-    return found
+    return found, ambiguous
 
 
 def _detect(rig: Rig, detector: Any, argument: str) -> FiducialFrame:
@@ -125,4 +132,4 @@ def _lines(fields: dict[str, Any]) -> list[str]:
     if fields["validity"] == "ambiguous":
         lines.append(f"a second pose has a probability of {100.0 * fields['second_probability']:.0f} %; show a second "
                      "tag, or the tag to a second camera.")
-    return lines
+    return lines + fields["warnings"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,10 +104,21 @@ class ObjectPoints:
             self.tags = np.full(len(self.points), NO_TAG)
             self.normals, self.sizes = np.full_like(self.points, np.nan), np.full(len(self.points), np.nan)
 
-    def view(self, frame: FiducialFrame | MarkerPoints) -> ObjectView | None:
-        """The object's image points in a frame, None without any."""
+    def copies(self, frame: FiducialFrame) -> list[list[int]]:
+        """The object's tags that a frame has more than once: for each, which of the frame's tags it may be."""
+        places: dict[tuple[int, ...], list[int]] = {}
+        for n, key in enumerate(map(tuple, frame.keys.tolist())):
+            if key in self._first:
+                places.setdefault(key, []).append(n)
+        return [found for found in places.values() if len(found) > 1]
+
+    def view(self, frame: FiducialFrame | MarkerPoints, chosen: Collection[int] = ()) -> ObjectView | None:
+        """The object's image points in a frame, None without any. A tag that the frame has more than once is ambiguous:
+        of it only the copy in `chosen`, numbers of the frame's tags, counts."""
         if isinstance(frame, FiducialFrame):
-            own = [(n, self._first[key]) for n, key in enumerate(map(tuple, frame.keys.tolist())) if key in self._first]
+            left_out = {n for found in self.copies(frame) for n in found if n not in chosen}
+            own = [(n, self._first[key]) for n, key in enumerate(map(tuple, frame.keys.tolist()))
+                   if key in self._first and n not in left_out]
             rows = np.array([first + corner for _, first in own for corner in range(4)], np.intp)
             chosen = [n for n, _ in own]
             pixels, covariances = frame.corners[chosen].reshape(-1, 2), frame.covariances[chosen].reshape(-1, 2, 2)

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.diagnostics import Diagnostics, Part
 from rhot_app.estimation.filter import FilteredState, IteratedFilter, Knot
 from rhot_app.estimation.residual import Residual
 from rhot_app.geometry.camera import CameraModel
@@ -32,6 +33,7 @@ from rhot_app.objects.pose import (
     same_pose,
 )
 from rhot_app.objects.state import ObjectState, Validity, unknown_object
+from rhot_node.wire.messages import FAMILIES
 
 Array = NDArray[np.float64]
 
@@ -177,6 +179,13 @@ class ObjectTrack:
         self._rejected += 1
         return self._rejected >= REJECTIONS and self._start(measurement)
 
+    def predicts(self, measurement: Measurement) -> bool:
+        """Whether a hypothesis accepts a measurement; False without a track."""
+        t_s = 1e-9 * (measurement.t_ns - self._epoch_ns)
+        return measurement.t_ns - self._accepted_ns <= LOST_AFTER_NS and any(
+            t_s >= one.filter.knots[0].t_s and measurement.gate(*one.filter.predict(t_s)).residual is not None
+            for one in self._hypotheses)
+
     def state(self, t_ns: int) -> ObjectState:
         """The state at master time `t_ns` by the measurements before it. The newest ones are kept for that: at an
         earlier time than all of them it is that of the oldest."""
@@ -280,9 +289,13 @@ class ObjectTrack:
 class ObjectTracker:
     """Tracks several objects with the cameras of one rig. Cameras need no synchronisation."""
 
-    def __init__(self, objects: Sequence[ObjectModel], cameras: Sequence[CameraModel]) -> None:
-        """Raises ObjectError when two objects cannot be told apart."""
+    def __init__(self, objects: Sequence[ObjectModel], cameras: Sequence[CameraModel],
+                 diagnostics: Diagnostics | None = None, camera_names: Sequence[str] = ()) -> None:
+        """`diagnostics` takes what it fails over and warns of, by `camera_names`. Raises ObjectError when two objects
+        cannot be told apart."""
         require_distinct(objects, [one.name for one in objects])
+        self._diagnostics = Diagnostics() if diagnostics is None else diagnostics
+        self._camera_names = camera_names or [str(number) for number in range(len(cameras))]
         self._cameras = CameraArrays.of(list(cameras))
         self._points = [ObjectPoints(one) for one in objects]
         self._tracks = [ObjectTrack(one.name) for one in objects]
@@ -290,15 +303,26 @@ class ObjectTracker:
 
     def take(self, frame: FiducialFrame | MarkerPoints) -> list[ObjectState]:
         """Weigh one frame; the state of every object after it, at the time of the object's points or of row 0."""
-        return [self._take(number, frame) for number in range(len(self._tracks))]
+        found = []
+        for number in range(len(self._tracks)):
+            t_ns = frame.t_row0_master_ns
+            with self._part(number):
+                t_ns = self._take(number, frame)
+            found.append(self._state(number, t_ns))
+        return found
 
     def take_pose(self, name: str, measurement: Measurement) -> bool:
         """Weigh a pose of the object `name`; whether it was accepted. One of an object that is not here is not."""
-        return any(track.take(measurement) for track in self._tracks if track.name == name)
+        accepted = False
+        for number, track in enumerate(self._tracks):
+            if track.name == name:
+                with self._part(number):
+                    accepted |= track.take(measurement)
+        return accepted
 
     def states(self, t_ns: int) -> list[ObjectState]:
         """The state of every object at master time `t_ns`, by what has been taken."""
-        return [track.state(t_ns) for track in self._tracks]
+        return [self._state(number, t_ns) for number in range(len(self._tracks))]
 
     def estimates(self) -> list[tuple[int, FilteredState] | None]:
         """Of every object, as `Track.estimate`."""
@@ -309,13 +333,47 @@ class ObjectTracker:
         self._tracks = [ObjectTrack(track.name) for track in self._tracks]
         self._newest = [{} for _ in self._tracks]
 
-    def _take(self, number: int, frame: FiducialFrame | MarkerPoints) -> ObjectState:
+    def _part(self, number: int, what: str = "the object") -> Part:
+        def restart() -> None:
+            self._tracks[number], self._newest[number] = ObjectTrack(name), {}
+        name = self._tracks[number].name
+        return self._diagnostics.part(f"{what} {name}", restart)
+
+    def _state(self, number: int, t_ns: int) -> ObjectState:
+        with self._part(number, "the state of the object"):
+            return self._tracks[number].state(t_ns)
+        return unknown_object(self._tracks[number].name, t_ns, Validity.LOST)
+
+    def _take(self, number: int, frame: FiducialFrame | MarkerPoints) -> int:
+        """Master time of the object's points, or of row 0 without any."""
         track, newest = self._tracks[number], self._newest[number]
-        view = self._points[number].view(frame)
+        chosen = self._chosen(number, frame) if isinstance(frame, FiducialFrame) else []
+        view = self._points[number].view(frame, chosen)
         if view is None:
-            return track.state(frame.t_row0_master_ns)
+            return frame.t_row0_master_ns
         others = [other for camera, other in newest.items()
                   if camera != view.camera and abs(view.t_ns - other.t_ns) < PREDICTED_AFTER_NS]
         newest[view.camera] = view
         track.take(PointMeasurement(self._points[number], self._cameras, view, others))
-        return track.state(view.t_ns)
+        return view.t_ns
+
+    def _chosen(self, number: int, frame: FiducialFrame) -> list[int]:
+        """Of each tag that is seen more than once the copy that alone fits the prediction, if there is one."""
+        points, track, chosen = self._points[number], self._tracks[number], list[int]()
+        for copies in points.copies(frame):
+            fits = []
+            for n in copies:
+                view = points.view(replace(frame, keys=frame.keys[[n]], corners=frame.corners[[n]],
+                                           covariances=frame.covariances[[n]]))
+                if view is not None and track.predicts(PointMeasurement(points, self._cameras, view)):
+                    fits.append(n)
+            chosen += fits if len(fits) == 1 else []
+            self._diagnostics.warn(copies_sentence(self._camera_names[frame.camera], frame.keys[copies[0]], track.name))
+        return chosen
+
+
+def copies_sentence(camera: str, key: NDArray[np.int64], name: str) -> str:
+    """That a camera sees the tag `key` (2,) of the object `name` more than once, and what becomes of it."""
+    family, number = key
+    return (f"Camera {camera} sees tag {number} ({FAMILIES[family]}) of {name} more than once. All copies but one "
+            "where the object is predicted are left out. Cover the other print.")

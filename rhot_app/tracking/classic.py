@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.diagnostics import Diagnostics
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays
@@ -38,6 +39,7 @@ class ClassicTracker:
     """Implements `Tracker` for one rig. `solve` is due work; `ingest` only stores."""
 
     def __init__(self, rig: Rig) -> None:
+        self.diagnostics = Diagnostics()
         self._rig = compile_rig(rig)
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
         self._pairing = Pairing(cameras, markers)

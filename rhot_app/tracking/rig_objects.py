@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import ImageFrame, SliceRequest
+from rhot_app.diagnostics import Diagnostics, diagnostics_of
 from rhot_app.estimation.filter import AHEAD_S, FilteredState, smooth
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
@@ -26,7 +27,7 @@ from rhot_app.objects.state import ObjectState, Validity, unknown_object
 from rhot_app.objects.stream import PoseMeasurement
 from rhot_app.objects.track import LOST_AFTER_NS, PREDICTED_AFTER_NS, ObjectTracker
 from rhot_app.project import Rig
-from rhot_app.state import HandState, Knowledge, SeenContour
+from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
 from rhot_app.tracking.markers.marker_model import scaled_table
 from rhot_app.tracking.tracker import CameraObservations, ImageTracking, KeepsKeyFrames, ShowsContours, Tracker
 from rhot_node.wire.messages import MarkerFlag
@@ -44,10 +45,11 @@ _JUMP_NS = 1_000_000_000
 class RigObjects:
     """The objects of a rig, and the contacts of its hands with them."""
 
-    def __init__(self, rig: Rig) -> None:
-        """Raises RigError when the mesh of an object cannot be used."""
-        self._tracker = ObjectTracker(rig.models, [CameraModel.from_rig(node.intrinsics, node.pose)
-                                                   for node in rig.nodes])
+    def __init__(self, rig: Rig, diagnostics: Diagnostics) -> None:
+        """`diagnostics` takes what is failed over or ambiguous. Raises RigError when the mesh of an object cannot be
+        used."""
+        cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
+        self._tracker = ObjectTracker(rig.models, cameras, diagnostics, [node.name for node in rig.nodes])
         ids = rig.markers.ids
         worn = [marker.marker for model in rig.models for marker in model.markers]
         self._columns = np.array([ids.index(name) for name in worn], np.intp)
@@ -55,7 +57,7 @@ class RigObjects:
         shapes = [shape_of(one.model, one.folder) for one in rig.objects if one.model is not None]
         hands = [build_model(hand) for hand in (rig.hand, rig.other_hand) if hand is not None]
         self._contacts = [_HandContacts(hand, [None if shape is None else ContactMonitor(hand, shape)
-                                               for shape in shapes]) for hand in hands]
+                                               for shape in shapes], diagnostics) for hand in hands]
 
     def reset(self) -> None:
         """Forget everything: a new session, or a node's clock was set."""
@@ -91,8 +93,8 @@ class RigObjects:
 class _HandContacts:
     """Contacts of one hand with each object; None for one without a shape."""
 
-    def __init__(self, hand: HandModel, monitors: list[ContactMonitor | None]) -> None:
-        self._pads, self._monitors = fingertip_pads(hand), monitors
+    def __init__(self, hand: HandModel, monitors: list[ContactMonitor | None], diagnostics: Diagnostics) -> None:
+        self._pads, self._monitors, self._diagnostics = fingertip_pads(hand), monitors, diagnostics
 
     def reset(self) -> None:
         for monitor in self._monitors:
@@ -106,9 +108,11 @@ class _HandContacts:
             if monitor is None:
                 found.append(one)
             elif hand.tracked and one.tracked:
-                pad, sd, touching = monitor.update(hand.world_from_palm, hand.angles, hand.fingertip_covariances,
-                                                   one.world_from_object, one.covariance, pads)
-                found.append(replace(one, distances=pad.distance, distance_sd=sd, contacts=touching))
+                with self._diagnostics.part(f"contacts with {one.name}", self.reset):
+                    pad, sd, touching = monitor.update(hand.world_from_palm, hand.angles, hand.fingertip_covariances,
+                                                       one.world_from_object, one.covariance, pads)
+                    one = replace(one, distances=pad.distance, distance_sd=sd, contacts=touching)
+                found.append(one)
             else:
                 monitor.trigger.touching[:] = False
                 found.append(one)
@@ -124,16 +128,23 @@ class WithObjects:
 
     def __init__(self, rig: Rig, hand: Tracker, own: Indices) -> None:
         """`hand`: of the markers `own`, numbers in the rig. Raises RigError as `RigObjects`."""
-        self._objects, self._hand, self._markers = RigObjects(rig), hand, MarkersBeside(rig, own)
+        self.diagnostics = diagnostics_of(hand)
+        self._objects, self._hand = RigObjects(rig, self.diagnostics), hand
+        self._markers = MarkersBeside(rig, own)
+        self._latest: CameraObservations | None = None
+        self._names, self._own = tuple(node.name for node in rig.nodes), tuple(rig.markers.ids[row] for row in own)
+        self._count = 0
 
     def reset(self) -> None:
         """Forget everything but the count of states."""
+        self._latest = None
         self._objects.reset()
         self._hand.reset()
         self._markers.reset()
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame's markers in."""
+        self._latest = observations
         self._objects.ingest_markers(observations)
         self._hand.ingest(self._markers.of_hand(observations))
 
@@ -174,11 +185,19 @@ class WithObjects:
         return self._hand.newest_frames() if self._markers.all_of_hand else tuple(self._markers.newest)
 
     def solve(self) -> HandState | None:
-        """The hand's state that is due, with the objects at its instant."""
-        state = self._hand.solve()
+        """The hand's state that is due, with the objects at its instant. Objects are there without the hand over which
+        its tracker fails."""
+        state, latest = None, self._latest
+        with self.diagnostics.part("the hand", self._hand.reset) as part:
+            state = self._hand.solve()
+        if part.failed and latest is not None:
+            state = replace(no_hand(latest.t_row0_master_ns, Condition.LOST, self._names, markers=self._own),
+                            t_receive_ns=latest.t_receive_ns)
         if state is None:
             return None
-        objects = self._objects.states(state.t_master_ns)
+        self._count += 1
+        other = None if state.other is None else replace(state.other, sequence=self._count - 1)
+        state, objects = replace(state, sequence=self._count - 1, other=other), self._objects.states(state.t_master_ns)
         return self._objects.with_objects(self._markers.completed(state, objects), objects)
 
 
@@ -235,9 +254,10 @@ class MarkersBeside:
 class SmoothedObjects(RigObjects):
     """Takes the frames of a recording; `states` then smooths: it uses later frames as well."""
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: Rig, diagnostics: Diagnostics) -> None:
         """Raises RigError as `RigObjects`."""
-        super().__init__(rig)
+        super().__init__(rig, diagnostics)
+        self._diagnostics = diagnostics
         self._histories = [_History(model.name) for model in rig.models]
 
     def ingest_objects(self, frame: ObjectFrame) -> None:
@@ -257,7 +277,13 @@ class SmoothedObjects(RigObjects):
 
     def states(self, t_ns: int) -> list[ObjectState]:
         """The objects at master time `t_ns`, without contacts. Ask in the order of time."""
-        return [history.at(t_ns) for history in self._histories]
+        found = []
+        for history in self._histories:
+            one = unknown_object(history.name, t_ns, Validity.LOST)
+            with self._diagnostics.part(f"the smoothing of {history.name}", lambda: None):
+                one = history.at(t_ns)
+            found.append(one)
+        return found
 
     def _keep(self) -> None:
         for history, found in zip(self._histories, self._tracker.estimates(), strict=True):

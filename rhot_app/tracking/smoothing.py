@@ -15,12 +15,13 @@ from typing import TypeVar
 
 import numpy as np
 
+from rhot_app.diagnostics import diagnostics_of
 from rhot_app.estimation.filter import ChunkedSmoother, FilteredState, Knot
 from rhot_app.hand.motion.hand_process import HandProcess
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.objects.observations import ObjectFrame
 from rhot_app.project import Rig
-from rhot_app.state import Condition, HandState
+from rhot_app.state import Condition, HandState, no_hand
 from rhot_app.tracking.markers.acquisition import Located
 from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObservations
@@ -67,6 +68,7 @@ class RecordingEstimator(Estimator):
         self._count = 0  # of frames
         self._instants: dict[_Key, Instant] = {}  # that are not final yet, in the order of arrival
         self._final: list[Instant] = []
+        self._failed: list[Instant] = []
         self._buffered: list[Knot] = []  # late frames may still change them
         self._scale = 1.0, math.nan
         self._smoother: ChunkedSmoother | None = None
@@ -85,8 +87,13 @@ class RecordingEstimator(Estimator):
 
     def solve(self) -> HandState | None:
         """The filtered state after the frame, None when it came before."""
-        state = super().solve()
         newest = next(reversed(self._instants.values()), None)
+        try:
+            state = super().solve()
+        except Exception:
+            if newest is not None and newest.number == self._count - 1 and newest.recent is None:
+                self._failed.append(self._instants.pop(_key(newest.observations)))
+            raise
         if newest is not None and newest.number == self._count - 1 and newest.recent is None:
             if state is not None and state.condition in (Condition.SEARCHING, Condition.LOST):
                 newest.none = state
@@ -98,13 +105,26 @@ class RecordingEstimator(Estimator):
 
     def smoothed(self) -> Iterator[HandState]:
         """The states that have become final, in the order of time. Their `sequence` is 0."""
+        self._failed.clear()
         for instant in self.taken():
-            yield self.describe(instant, instant.t_ns)
+            state = None
+            with self.diagnostics.part("a smoothed state", lambda: None):
+                state = self.describe(instant, instant.t_ns)
+            if state is not None:
+                yield state
 
     def taken(self) -> list[Instant]:
         """The instants that have become final, in the order of time."""
         final, self._final = self._final, []
         return final
+
+    def failed(self) -> list[Instant]:
+        """The instants over which it failed since this was asked last: there is no hand in them."""
+        failed, self._failed = self._failed, []
+        for one in failed:
+            one.none = replace(no_hand(one.t_ns, Condition.LOST, self._rig.camera_names, markers=self._rig.marker_ids),
+                               t_receive_ns=one.observations.t_receive_ns)
+        return failed
 
     def conclude(self) -> None:
         """The recording, or a part of it, is over: all instants are final."""
@@ -210,13 +230,17 @@ class TwoRecordingEstimators(TwoHands):
         """The states of both hands that have become final, in the order of time."""
         hands = self._recording
         for tracker, waiting in zip(hands, self._waiting, strict=True):
-            waiting.update((instant.number, instant) for instant in tracker.taken())
+            waiting.update((instant.number, instant) for instant in tracker.failed() + tracker.taken())
         one, other = self._waiting
         for number in [number for number in one if number in other]:
             pair = one.pop(number), other.pop(number)
             t_ns = max([instant.t_ns for instant in pair if instant.none is None] or [pair[0].t_ns])
-            yield self._merge(*(replace(tracker.describe(instant, t_ns), t_master_ns=t_ns)
-                                for tracker, instant in zip(hands, pair, strict=True)))
+            state = None
+            with self.diagnostics.part("a smoothed state", lambda: None):
+                state = self._merge(*(replace(tracker.describe(instant, t_ns), t_master_ns=t_ns)
+                                      for tracker, instant in zip(hands, pair, strict=True)))
+            if state is not None:
+                yield state
             for waiting in self._waiting:  # what is so far behind has no counterpart
                 for late in [late for late in waiting if late < number - _RECENT]:
                     del waiting[late]
@@ -241,7 +265,8 @@ class SmoothedTracker:
         require_estimator(rig)
         hand, own = without_objects(rig)
         self._tracker = RecordingEstimator(hand) if rig.other_hand is None else TwoRecordingEstimators(hand)
-        self._objects = SmoothedObjects(rig) if rig.objects else None
+        self.diagnostics = diagnostics_of(self._tracker)
+        self._objects = SmoothedObjects(rig, self.diagnostics) if rig.objects else None
         self._markers = MarkersBeside(rig, own)
         self._sequence = 0
         self._last_ns: int | None = None
@@ -256,7 +281,8 @@ class SmoothedTracker:
             self._objects.ingest_markers(observations)
             observations = self._markers.of_hand(observations)
         self._tracker.ingest(observations)
-        self._tracker.solve()
+        with self.diagnostics.part("the hand", self._tracker.reset):
+            self._tracker.solve()
 
     def ingest_objects(self, frame: ObjectFrame) -> None:
         """Take the tags of one frame in."""

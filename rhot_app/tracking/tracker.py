@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
@@ -9,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import EdgeFrame, ImageFrame, SliceRequest
-from rhot_app.objects.observations import ObjectFrame
+from rhot_app.diagnostics import Diagnostics, Part
+from rhot_app.objects.observations import MeasuredPose, ObjectFrame
 from rhot_app.state import HandState, SeenContour
 
 if TYPE_CHECKING:
@@ -154,6 +156,13 @@ def feed(tracker: Tracker, frame: CameraFrame) -> None:
             tracker.ingest_image(frame)
     elif isinstance(tracker, ObjectTracking):
         tracker.ingest_objects(frame)
+
+
+def frame_part(diagnostics: Diagnostics, tracker: Tracker, frame: CameraFrame, cameras: Sequence[str]) -> Part:
+    """A context for what `tracker` makes of one frame: an exception loses the frame, and is counted by its camera."""
+    name = (f"a pose of {frame.name}" if isinstance(frame, MeasuredPose)
+            else f"a frame of camera {cameras[frame.camera]}")
+    return diagnostics.part(name, tracker.reset, among="frames")
 
 
 def solve_after(tracker: Tracker, frame: CameraFrame) -> HandState | None:

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.diagnostics import Diagnostics
 from rhot_app.project import Rig
-from rhot_app.state import HandState
+from rhot_app.state import Condition, HandState, no_hand
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.rig_arrays import rigs_of_hands
@@ -41,6 +42,8 @@ class TwoHands:
         self._ids, self._own = rig.markers.ids, (own, others)
         self._order = np.argsort(np.concatenate(self._own))
         self._hand, self._other = one_hand(first), one_hand(second)
+        self.diagnostics = Diagnostics()
+        self._names = tuple(node.name for node in rig.nodes)
         self._extrapolators = Extrapolator(first), Extrapolator(second)
         self._sequence = 0
         self._newest: list[CameraObservations | None] = [None] * len(rig.nodes)
@@ -67,11 +70,31 @@ class TwoHands:
 
     def solve(self) -> HandState | None:
         """The state after the frames since the last one, None without any."""
-        hand, other = self._hand.solve(), self._other.solve()
+        (hand, failed), (other, other_failed) = self._each()
+        if hand is not None and other_failed:
+            other = self._failed(1, hand)
+        elif other is not None and failed:
+            hand = self._failed(0, other)
         if hand is None or other is None:  # both or neither: they see the same frames
             return None
         t_ns = max([state.t_master_ns for state in (hand, other) if state.tracked] or [hand.t_master_ns])
         return self._merged_at(t_ns, hand, other)
+
+    def _each(self) -> list[tuple[HandState | None, bool]]:
+        """The next state of each hand, and whether its tracker failed."""
+        found = []
+        for tracker, name in zip((self._hand, self._other), ("the hand", "the other hand"), strict=True):
+            state = None
+            with self.diagnostics.part(name, tracker.reset) as part:
+                state = tracker.solve()
+            found.append((state, part.failed))
+        return found
+
+    def _failed(self, number: int, counterpart: HandState) -> HandState:
+        """The state of a hand whose tracker failed, beside that of the other one."""
+        ids = tuple(self._ids[marker] for marker in self._own[number])
+        return replace(no_hand(counterpart.t_master_ns, Condition.LOST, self._names, markers=ids),
+                       t_receive_ns=counterpart.t_receive_ns)
 
     def _merged_at(self, t_ns: int, hand: HandState, other: HandState) -> HandState:
         """The next state, of both hands at `t_ns`."""
@@ -83,7 +106,8 @@ class TwoHands:
         """The state of `hand` with the markers of both."""
         arrays: dict[str, Any] = {name: self._gather(getattr(hand, name), getattr(other, name), axis)
                                  for axis, names in enumerate((_PER_MARKER, _PER_CAMERA)) for name in names}
-        latency = hand.latency_s | {stage: hand.latency_s[stage] + other.latency_s[stage] for stage in _WORK}
+        latency = hand.latency_s | {stage: hand.latency_s.get(stage, 0.0) + other.latency_s.get(stage, 0.0)
+                                    for stage in _WORK}
         return replace(hand, sequence=self._sequence - 1, marker_ids=self._ids, latency_s=latency,
                        other=replace(other, sequence=self._sequence - 1), **arrays)
 

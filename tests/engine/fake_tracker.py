@@ -18,8 +18,11 @@ class FakeTracker:
         self.solves = 0
         self.resets = 0
         self.broken = False
+        self.broken_camera = -1
 
     def ingest(self, observations: CameraObservations) -> None:
+        if observations.camera == self.broken_camera:
+            raise ValueError("that picture")
         self.ingested.append(observations)
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:

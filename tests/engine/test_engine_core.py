@@ -1,7 +1,9 @@
 """The engine over synthetic nodes: states out, figures, recording and replay, rigs changed while it runs."""
 
 import resource
+from collections import Counter
 from collections.abc import Callable, Iterator
+from logging import LogRecord
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -110,18 +112,37 @@ def test_silent_node_is_named_and_forgotten_when_it_answers(rig: Rig, bench: Ben
     assert not any("Node left does not" in text for text in said)
 
 
-def test_broken_tracker_is_reported_and_begins_anew(bench: Bench, nodes: list[SyntheticNode]) -> None:
+def test_a_broken_tracker_is_reported_once_begins_anew_and_is_no_fault_any_more_once_it_works(
+        bench: Bench, nodes: list[SyntheticNode], tracker_may_fail: list[LogRecord],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rhot_app.engine.observer.RECENT_NS", 100_000_000)
     bench.engine.start()
     bench.run_until(lambda: len(bench.published) > 3)
     tracker = bench.trackers[-1]
     resets = tracker.resets
     tracker.broken = True
     bench.run_until(lambda: bench.engine.status().condition == "FAULT")
-    assert tracker.resets > resets
     assert any("numbers went wrong" in advice.text for advice in bench.engine.status().advice)
+    bench.run_until(lambda: tracker.resets > resets + 1)
+    by_camera = Counter(record.getMessage() for record in tracker_may_fail)
+    assert set(by_camera.values()) == {1} and len(by_camera) <= len(nodes), "a sentence of each camera"
     tracker.broken = False
-    bench.engine.start()
     bench.run_until(lambda: bench.engine.status().condition == "TRACKING")
+    assert not any("numbers went wrong" in advice.text for advice in bench.engine.status().advice)
+
+
+def test_a_camera_over_whose_frames_the_tracker_fails_costs_only_these(
+        bench: Bench, nodes: list[SyntheticNode], tracker_may_fail: list[LogRecord]) -> None:
+    bench.engine.start()
+    bench.until_published(10)
+    tracker = bench.trackers[-1]
+    tracker.broken_camera = 0
+    resets = tracker.resets
+    bench.until_published(30)
+    status = bench.engine.status()
+    assert status.condition == "FAULT" and tracker.resets == resets
+    assert any("camera left" in advice.text and "that picture" in advice.text for advice in status.advice)
+    assert [record.levelname for record in tracker_may_fail] == ["ERROR"]
 
 
 def test_log_replays_to_the_same_states(tmp_path: Path, rig: Rig, bench: Bench, nodes: list[SyntheticNode]) -> None:

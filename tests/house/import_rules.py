@@ -10,8 +10,8 @@ from pathlib import Path
 # What a room may import of this project, besides itself. A name stands for everything beneath it. The longest matching
 # name decides, so a row for one file (rhot_node.markers) overrides the row of its package.
 NODE_BASE = ("rhot_node.errors", "rhot_node.files", "rhot_node.clock", "rhot_node.markers", "resources")
-APP_BASE = ("rhot_node", "resources", "rhot_app.errors", "rhot_app.progress", "rhot_app.project",
-            "rhot_app.rig_history", "rhot_app.keys")
+APP_BASE = ("rhot_node", "resources", "rhot_app.diagnostics", "rhot_app.errors", "rhot_app.progress",
+            "rhot_app.project", "rhot_app.rig_history", "rhot_app.keys")
 MODELS = ("rhot_app.geometry", "rhot_app.filters", "rhot_app.estimation")
 SOLVERS = ("rhot_app.calibration", "rhot_app.hand", "rhot_app.objects")
 ENGINE_SIDE = ("rhot_app.recording", "rhot_app.sources", "rhot_app.outputs", "rhot_app.simulator")
@@ -29,6 +29,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_node": ("rhot_node", "resources"),
     # the app, from the bottom up
     "rhot_app.errors": ("rhot_node.files",),
+    "rhot_app.diagnostics": (),
     "rhot_app.progress": (),
     "rhot_app.keys": ("rhot_node",),
     "rhot_app.rig_history": ("rhot_node", "rhot_app.errors", "rhot_app.project", "rhot_app.hand.anatomy"),
@@ -47,7 +48,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.calibration.recorded_observations": BELOW_ENGINE,  # reads them for all
     "rhot_app.objects": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.calibration.verdict"),
     "rhot_app.objects.alignment.alignment_command": BELOW_ENGINE,
-    "rhot_app.state": ("rhot_app.objects.state",),
+    "rhot_app.state": ("rhot_node.wire.messages", "rhot_app.objects.state"),
     "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.state"),
     "rhot_app.articulated": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.barehand"),
     "rhot_app.handfit": (*APP_BASE, *MODELS, "rhot_app.calibration", "rhot_app.hand", "rhot_app.barehand"),

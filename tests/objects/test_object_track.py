@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from itertools import count
+from logging import LogRecord
 
 import numpy as np
 import pytest
 from object_scenes import CUBE, PERIOD_NS, ROW_NS, TAG, hand_poses, observe, wide_cameras
 
+from rhot_app.diagnostics import Diagnostics
 from rhot_app.errors import ObjectError
 from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
 from rhot_app.objects.object_file import ObjectModel, plate
@@ -167,6 +170,67 @@ def test_several_objects_are_tracked_at_once() -> None:
         assert errors([one[number] for one in states[10:]], where[name])[0].max() < 5e-3
     with pytest.raises(ObjectError, match="cannot be told apart"):
         ObjectTracker([CUBE, plate("other", 1, 1, 45.0, 0.0, "DICT_APRILTAG_36h11", 2)], CAMERAS)
+
+
+def with_a_copy(frame: FiducialFrame, at: np.ndarray) -> FiducialFrame:
+    """The frame with a second print of its first tag, its middle at a pixel."""
+    if not len(frame.keys):
+        return frame
+    copy = frame.corners[:1] - frame.corners[0].mean(axis=0) + at
+    return replace(frame, keys=np.concatenate([frame.keys[:1], frame.keys]),
+                   corners=np.concatenate([copy, frame.corners]),
+                   covariances=np.concatenate([frame.covariances[:1], frame.covariances]))
+
+
+def test_a_tag_that_is_seen_twice_counts_where_the_object_is_predicted() -> None:
+    poses, diagnostics = in_hand("grasp"), Diagnostics()
+    tracker, states = ObjectTracker([CUBE], CAMERAS, diagnostics, ("left", "right")), []
+    for number, frame in enumerate(frames(CUBE, poses, 1.0, 1)):
+        states.append(tracker.take(frame if number < 4 else with_a_copy(frame, np.array([60.0, 400.0])))[0])
+    distances, angles = errors(states, poses)
+    assert len(distances) == len(states) and distances.max() < 3e-3 and np.degrees(angles.max()) < 2.0
+    said = diagnostics.all()
+    assert {one.level for one in said} == {"warning"} and sum(one.count for one in said) == len(states) - 4
+    assert all("more than once" in one.sentence and "cube" in one.sentence for one in said)
+    assert any("left" in one.sentence for one in said) and any("right" in one.sentence for one in said)
+
+
+def test_a_tag_that_is_seen_twice_counts_nowhere_without_a_prediction() -> None:
+    poses, diagnostics = swaying(20.0), Diagnostics()
+    stream = [with_a_copy(frame, np.array([60.0, 400.0])) for frame in frames(TAG, poses, 0.3, 1)]
+    tracker = ObjectTracker([TAG], CAMERAS, diagnostics)
+    assert {tracker.take(frame)[0].validity for frame in stream} == {Validity.SEARCHING}
+    assert sum(one.count for one in diagnostics.all()) == len(stream)
+    # Two prints at nearly the same place: the prediction cannot say which is the object's.
+    tracker = ObjectTracker([TAG], CAMERAS)
+    exact = frames(TAG, poses, 1.0, 1)
+    for frame in exact[:20]:
+        tracker.take(frame)
+    for frame in exact[20:]:
+        state = tracker.take(with_a_copy(frame, frame.corners[0].mean(axis=0) + 0.05))[0]
+    assert state.validity is Validity.LOST
+
+
+def test_an_object_that_is_failed_over_costs_only_itself(monkeypatch: pytest.MonkeyPatch,
+                                                         tracker_may_fail: list[LogRecord]) -> None:
+    poses, diagnostics = in_hand("grasp"), Diagnostics()
+    take, calls = ObjectTrack.take, count()
+
+    def fail(track: ObjectTrack, measurement: object) -> bool:
+        if track.name == "tag" and next(calls) < 30:
+            raise ValueError("a singular matrix")
+        return take(track, measurement)
+    monkeypatch.setattr(ObjectTrack, "take", fail)
+    tracker, counts = ObjectTracker([CUBE, TAG], CAMERAS, diagnostics), []
+    for cube, tag in zip(frames(CUBE, poses, 1.0, 1), frames(TAG, swaying(20.0), 1.0, 2), strict=True):
+        states = tracker.take(replace(cube, keys=np.concatenate([cube.keys, tag.keys]),
+                                      corners=np.concatenate([cube.corners, tag.corners]),
+                                      covariances=np.concatenate([cube.covariances, tag.covariances])))
+        counts.append(tuple(state.tracked for state in states))
+    assert all(cube for cube, _ in counts) and [tag for _, tag in counts] == [False] * 30 + [True] * (len(counts) - 30)
+    fault, = diagnostics.all()
+    assert fault.level == "error" and fault.count == 30 and "singular" in fault.sentence and "tag" in fault.sentence
+    assert len(tracker_may_fail) == 1
 
 
 POSE_COVARIANCE = np.diag([1e-6] * 3 + [1e-4] * 3)  # m^2, rad^2

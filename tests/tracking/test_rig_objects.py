@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import count
+from logging import LogRecord
 from pathlib import Path
 
 import msgspec
@@ -24,6 +26,8 @@ from rhot_app.outputs.osc import object_messages
 from rhot_app.project import Rig, load_rig, with_object, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.extrapolation import Extrapolator
+from rhot_app.tracking.markers.estimator import Estimator
+from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
@@ -90,6 +94,34 @@ def test_an_object_of_markers_is_tracked_beside_the_hand(rig: Rig, kind: str) ->
     assert np.linalg.norm(state.marker_positions[ball] - expected) < 2e-3
     assert np.isfinite(one.distances).all() and not one.contacts.any() and (one.distances > 0.0).all()
     assert np.isfinite(one.distance_sd).all() == (kind == "estimator")
+
+
+@pytest.mark.parametrize("smoothed", [False, True])
+def test_objects_are_there_without_a_hand_that_is_failed_over(rig: Rig, smoothed: bool,
+                                                              monkeypatch: pytest.MonkeyPatch,
+                                                              tracker_may_fail: list[LogRecord]) -> None:
+    rig = with_tracker(rig, "estimator")
+    seen, solve, calls = frames(rig, 40), Estimator.solve, count()
+
+    def fail(estimator: Estimator) -> HandState | None:
+        state = solve(estimator)
+        if next(calls) in range(30, 33):
+            raise FloatingPointError("overflow")
+        return state
+    monkeypatch.setattr(Estimator, "solve", fail)
+    tracker, states = SmoothedTracker(rig) if smoothed else make_tracker(rig), list[HandState]()
+    for frame in seen:
+        tracker.ingest(frame)
+        if not isinstance(tracker, SmoothedTracker):
+            states += [state] if (state := tracker.solve()) is not None else []
+    states += list(tracker.finish()) if isinstance(tracker, SmoothedTracker) else []
+    assert [state.sequence for state in states] == list(range(len(states)))
+    lost = [state for state in states[20:] if state.condition is Condition.LOST]
+    assert len(lost) == (0 if smoothed else 3) and len(states) == len(seen)
+    assert all(state.objects[0].validity is Validity.TRACKED for state in states[20:])
+    assert all(state.marker_ids == rig.markers.ids for state in states)
+    fault, = tracker.diagnostics.all()
+    assert fault.count == 3 and "overflow" in fault.sentence and len(tracker_may_fail) == 1
 
 
 def test_the_window_and_the_outputs_get_objects_too(rig: Rig) -> None:

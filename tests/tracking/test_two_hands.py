@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from modelled_hand import after_s, deviations, model_rig, moving, observations_of, seconds, states_of
-from synthetic_rig import LOST, altered, make_rig
+from synthetic_rig import LOST, altered, make_rig, run
 
 from rhot_app.engine import status
 from rhot_app.engine.advice import hands_advice
@@ -16,6 +16,7 @@ from rhot_app.project import OTHER_HAND, Rig, TrackerSettings, parse_rig
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.extrapolation import Extrapolator
+from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.trackers import make_tracker
 from rhot_app.tracking.two_hands import TwoHands
 from rhot_node.files import resource_path
@@ -100,6 +101,43 @@ def test_one_hand_that_leaves_is_lost_alone():
         assert last.t_master_ns == last.other.t_master_ns
         home = left_truth if gone == "hand" else RIGHT_TRUTH
         assert deviations([present], home).rms_mm < 4.0
+
+
+class Failing(Estimator):
+    """Fails over some frames of one hand."""
+
+    over = range(0)
+    side = "right"
+
+    def __init__(self, rig):
+        super().__init__(rig)
+        self.frames = 0
+
+    def solve(self):
+        self.frames += 1
+        found = super().solve()
+        if self.side == "left" and self.frames in self.over:
+            raise ZeroDivisionError("its length")
+        return found
+
+
+@pytest.mark.parametrize("one_hand", [0, 1])
+def test_a_hand_that_is_failed_over_costs_only_itself(one_hand, tracker_may_fail):
+    made = []
+
+    def make(rig):
+        made.append(Failing(rig))
+        return made[-1]
+    tracker = TwoHands(RIG, make)
+    made[one_hand].side, made[one_hand].over = "left", range(60, 75)
+    found = run(tracker, FRAMES)
+    assert [state.sequence for state in found] == list(range(len(FRAMES)))
+    pairs = [(state, state.other)[::1 if one_hand == 0 else -1] for state in found]
+    assert all(other.condition is Condition.TRACKING for _, other in pairs[40:])
+    failed = [number for number, (hand, _) in enumerate(pairs) if number > 40 and hand.condition is Condition.LOST]
+    assert set(failed) >= set(range(59, 74)) and failed[-1] < 80, "tracked again soon after"
+    fault, = tracker.diagnostics.all()
+    assert fault.count == 15 and "its length" in fault.sentence and len(tracker_may_fail) == 1
 
 
 def test_both_are_predicted_to_one_instant():

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from rhot_app.diagnostics import diagnostics_of
 from rhot_app.engine.status import TOPIC_STATE, decode, encode
 from rhot_app.errors import EngineError, RecordingError
 from rhot_app.objects.observations import ObjectFrame
@@ -21,7 +22,7 @@ from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.smoothing import SmoothedTracker
-from rhot_app.tracking.tracker import CameraObservations, ObjectTracking, Tracker, solve_after
+from rhot_app.tracking.tracker import CameraObservations, ObjectTracking, Tracker, frame_part, solve_after
 
 
 class FrameSmoother(Protocol):
@@ -45,8 +46,9 @@ class FrameSmoother(Protocol):
 
 
 def replay_states(records: Iterable[Record], door: LogValidator, tracker: Tracker) -> Iterator[HandState]:
-    """The states that the engine would have published from these records, one for every frame that completes one."""
-    changes = door.changes
+    """The states that the engine would have published from these records, one for every frame that completes one. A
+    frame over which the tracker fails is lost and counted (`Diagnostics`)."""
+    changes, diagnostics, cameras = door.changes, diagnostics_of(tracker), [link.node.name for link in door.links]
     for record in records:
         frame = door.feed(record)
         if frame is None:
@@ -54,7 +56,9 @@ def replay_states(records: Iterable[Record], door: LogValidator, tracker: Tracke
         if door.changes != changes:
             changes = door.changes
             tracker.reset()
-        state = solve_after(tracker, frame)
+        state = None
+        with frame_part(diagnostics, tracker, frame, cameras):
+            state = solve_after(tracker, frame)
         if state is not None:
             yield state
 
@@ -94,6 +98,8 @@ def summarise(reader: LogReader, rig: Rig, tracker: Tracker | SmoothedTracker) -
         "damaged_header_bytes": reader.losses.header_bytes,
         "missed_records": door.gaps, "unknown_node_records": door.unknown_nodes,
         "smoothed": isinstance(tracker, SmoothedTracker),
+        "diagnostics": [{"level": one.level, "what": one.what, "frames": one.count}
+                        for one in diagnostics_of(tracker).all()],
         "states": len(states), "state_rate_hz": (len(states) - 1) / duration_s if duration_s else 0.0,
         "nodes": {link.node.name: {
             "received": link.door.received, "accepted": link.door.accepted,

@@ -21,6 +21,7 @@ from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
 from rhot_app.barehand.relocalisation import RELOCALISATION_LOG_ODDS, SAME_POSE_M
 from rhot_app.barehand.tracker import START_SD, BareHandTracker
+from rhot_app.diagnostics import Diagnostics
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
@@ -43,6 +44,7 @@ class ContourEstimator:
     def __init__(self, rig: Rig, hands: int = 1) -> None:
         """`hands`: number of hands that share the nodes' requests. Raises RigError when markers are observed and one
         has no position on the hand."""
+        self.diagnostics = Diagnostics()
         self._rig, self._max_slices = rig, SLICES_MAX // hands
         self.occluder: Callable[[int], Capsules | None] = lambda _: None
         self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale)

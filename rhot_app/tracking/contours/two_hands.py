@@ -242,7 +242,7 @@ class TwoBareHands(TwoHands):
 
     def solve(self) -> HandState | None:
         """The state after the frames since the last one; None when they have no new information."""
-        fresh = [hand.solve() for hand in self._both]
+        fresh = [state for state, _ in self._each()]
         self._states = [before if new is None else new for before, new in zip(self._states, fresh, strict=True)]
         hand, other = self._states
         if hand is None or other is None:  # both have states from the first frame on

@@ -13,6 +13,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.diagnostics import Diagnostics
 from rhot_app.estimation.filter import IteratedFilter
 from rhot_app.hand.landmarks import LASTING_M, LASTING_S
 from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
@@ -57,6 +58,7 @@ class Estimator:
 
     def __init__(self, rig: Rig) -> None:
         """Raises RigError when a marker has no place on the hand."""
+        self.diagnostics = Diagnostics()
         self._rig, self._markers = compile_rig(rig), compile_markers(rig)
         self._file_size, prior = self._markers, self._markers.pose_prior
         self._size: HandSize | None = None
