@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 from colour_scenes import PAINTS, box, picture, place
@@ -10,6 +11,7 @@ from rhot_app.calibration.colour.colours import solve_colours
 from rhot_app.calibration.colour.gathering import ColourGathering
 from rhot_app.calibration.colour.samples import VIEWS_MOST
 from rhot_app.calibration.colour.separability import SKIN
+from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 from rhot_node.detect.gate import ColourGate
 from rhot_node.markers import ChromaModel
@@ -108,8 +110,12 @@ def test_bounds_set_by_hand_are_used_and_judged(gathering) -> None:
     learnt = solve_colours(gathering.samples, gathering.views)
     wide = ChromaModel(**{field: getattr(learnt.markers.markers[2].chroma, field) for field in ("cb", "cr")},
                        hue_tolerance_deg=60.0, magnitude_min=10.0, luma_min=0, luma_max=255)
-    report = solve_colours(gathering.samples, gathering.views, given={"middle": wide})
-    assert report.markers.markers[2].chroma == wide
+    wider = msgspec.structs.replace(learnt.markers.markers[4].chroma, hue_tolerance_deg=80.0)
+    report = solve_colours(gathering.samples, gathering.views, given={"middle": wide, "little": wider})
+    assert [report.markers.markers[k].chroma for k in (2, 4)] == [wide, wider]
     assert report.markers.markers[0] == learnt.markers.markers[0]
     passing = [np.count_nonzero(ColourGate(one.markers).labels(picture()) == 3) for one in (learnt, report)]
     assert passing[1] > passing[0]
+    grades = {(one.figure.split()[3], one.grade) for one in report.verdict.findings if one.code == "swallowed"}
+    assert grades >= {("middle", Grade.FAIR), ("little", Grade.POOR)}, "into another's hues, or over the middle of them"
+    assert not report.verdict.acceptable and "swallowed" not in learnt.verdict.codes

@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from colour_scenes import PAINTS, SKIN, box, picture, place
 
+from rhot_app.calibration.colour.colours import solve_colours
 from rhot_app.calibration.colour.paint_region import region_at, region_in
 from rhot_app.calibration.colour.samples import ColourSamples
+from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
+from rhot_node.detect.gate import ColourGate
+from rhot_node.detect.image import YuvImage
 
 
 def test_a_click_takes_the_marker_and_nothing_else() -> None:
@@ -91,3 +95,45 @@ def test_a_marker_may_be_forgotten_and_named_again() -> None:
 def test_a_grey_box_is_refused_with_the_markers_name() -> None:
     with pytest.raises(CalibrationError, match=r"wrist: .*almost grey"):
         ColourSamples().add("wrist", picture(background=(120, 120, 120)), (4, 4, 30, 30))
+
+
+def half_in_other_light(turn_deg: float) -> YuvImage:
+    """The painted hand; right of the middle of "ring" the hue of its paint is turned."""
+    image = picture(seed=3)
+    x, y = (int(part) // 2 for part in place("ring"))
+    part = np.s_[y - 7:y + 8, x:x + 8]
+    turned = (image.u[part] - 128.0 + 1j * (image.v[part] - 128.0)) * np.exp(1j * np.radians(turn_deg))
+    u, v = image.u.copy(), image.v.copy()
+    u[part], v[part] = np.rint(turned.real + 128.0), np.rint(turned.imag + 128.0)
+    return YuvImage(image.y, u, v)
+
+
+def halves() -> list[tuple[int, int, int, int]]:
+    """A large box in the left half of "ring" and a small one in the right half."""
+    x, y = (round(part) for part in place("ring"))
+    return [(x - 7, y - 5, x - 1, y + 5), (x + 2, y - 2, x + 6, y + 4)]
+
+
+def test_a_paint_whose_hue_varies_with_the_light_is_learnt_that_wide_and_it_is_said() -> None:
+    image = half_in_other_light(20.0)
+    collector = ColourSamples()
+    collector.add("ring", image, halves())
+    for name in ("thumb", "index", "middle", "wrist"):
+        collector.add(name, image, box(name))
+    report = solve_colours(collector.samples, collector.views)
+    uneven = next(one for one in report.verdict.findings if one.code == "uneven")
+    assert uneven.grade is Grade.FAIR and "ring" in uneven.figure and report.verdict.acceptable
+    labels = ColourGate(report.markers).labels(image)
+    index = report.markers.ids.index("ring") + 1
+    for x0, y0, x1, y1 in halves():
+        assert np.mean(labels[y0 // 2 + 1:y1 // 2, x0 // 2 + 1:x1 // 2] == index) > 0.8
+
+
+def test_boxes_that_no_light_explains_are_refused_or_not_usable() -> None:
+    with pytest.raises(CalibrationError, match="something else"):
+        ColourSamples().add("ring", half_in_other_light(45.0), halves())
+    collector = ColourSamples()
+    collector.add("ring", picture(), box("ring"))
+    collector.add("ring", picture(seed=1), box("little"))
+    verdict = solve_colours(collector.samples, collector.views).verdict
+    assert "uneven" in verdict.codes and not verdict.acceptable

@@ -112,7 +112,7 @@ def solve_colours(samples: Sequence[PaintSamples], views: Sequence[MarkedPicture
         markers=tuple(learnt.get(marker.id, marker) for marker in base.markers), name=base.name)
     rig = {} if base is None else {marker.id: (marker.chroma,) for marker in base.markers}
     identity = identify(ordered, views, {marker.id: marker.chroma for marker in markers.markers}, (before or {}, rig))
-    verdict = judge_report(ordered, models, separability, room, rehearsal, free, runs_on, identity)
+    verdict = judge_report(ordered, markers, separability, room, rehearsal, free, runs_on, identity)
     return ColourReport(markers, names, tuple(ordered), separability, room, rehearsal, free, verdict)
 
 
@@ -128,7 +128,7 @@ def _in_order(samples: Sequence[PaintSamples], base: MarkerSet | None) -> list[P
 
 def _marker(samples: PaintSamples, model: ChromaModel, base: MarkerSet | None) -> Marker:
     """The marker with its new colour; what else it is comes from the base set or from its name."""
-    bounds = range_of_samples(samples.colours)
+    bounds = range_of_samples(samples)
     if base is not None:
         return msgspec.structs.replace(base.markers[base.ids.index(samples.name)], chroma=model,
                                        display_rgb=samples.rgb, range=bounds)

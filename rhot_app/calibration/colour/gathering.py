@@ -191,9 +191,10 @@ def _box(where: Box | Point) -> Box:
 
 def _joined(own: list[PaintSamples]) -> PaintSamples:
     """One marker as several cameras have seen it; their pictures are numbered on."""
-    frames, first = [], 0
+    frames, boxes, first, shown = [], [], 0, 0
     for one in own:
         frames.append(one.frame + np.int32(first))
-        first += int(one.frame.max()) + 1
+        boxes.append(np.where(one.box < 0, one.box, one.box + np.int32(shown)))
+        first, shown = first + int(one.frame.max()) + 1, shown + int(one.box.max()) + 1
     return PaintSamples(own[0].name, np.concatenate([one.colours for one in own]), np.concatenate(frames),
-                        float(np.mean([one.area for one in own])))
+                        np.concatenate(boxes), float(np.mean([one.area for one in own])))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.colour.illuminant import LAMPS, balanced, relit
+from rhot_app.calibration.colour.paint_region import hue_of, polar
 from rhot_app.calibration.colour.samples import PaintSamples
 from rhot_app.calibration.colour.surroundings import SurroundingColours
 from rhot_node.detect.colour import Colours
@@ -75,7 +76,7 @@ def solve_models(samples: Sequence[PaintSamples], obstacles: Obstacles) -> tuple
     then as much as costs least in lost paint and in what is mistaken for it.
     """
     error = LIGHT_ERROR if len(samples) >= MARKERS_LEAST else UNKNOWN_LIGHT
-    paints = [_paint(one.colours, one.area, error) for one in samples]
+    paints = [_paint(one, error) for one in samples]
     models = []
     for index, paint in enumerate(paints):
         most = min(paint.wanted, _neighbours_leave(index, paints))
@@ -88,16 +89,9 @@ def solve_models(samples: Sequence[PaintSamples], obstacles: Obstacles) -> tuple
     return tuple(models)
 
 
-def typical(colours: Colours) -> Colours:
-    """The samples without glints, edges and whatever else a box held: hue and chroma near the median's."""
-    hue, magnitude, level = _polar(colours, _hue(np.median(colours[:, 1:], axis=0)))
-    spread = 1.4826 * float(np.median(np.abs(hue)))
-    return colours[(np.abs(hue) <= max(5.0 * spread, 12.0)) & (magnitude >= 0.3 * level)]
-
-
-def range_of_samples(colours: Colours) -> RangeModel:
+def range_of_samples(samples: PaintSamples) -> RangeModel:
     """HSV bounds for the thesis's detector (RHOT 7.1): what the typical samples span, and shade."""
-    rgb = np.clip(typical(colours) @ RGB_FROM_YCC.T, 0, 255).astype(np.uint8)
+    rgb = np.clip(samples.typical @ RGB_FROM_YCC.T, 0, 255).astype(np.uint8)
     hsv = cv2.cvtColor(rgb[None], cv2.COLOR_RGB2HSV)[0].astype(np.float64)
     middle = 0.5 * math.degrees(np.angle(np.mean(np.exp(2j * np.radians(hsv[:, 0])))))
     away = np.remainder(hsv[:, 0] - middle + 90.0, 180.0) - 90.0
@@ -107,23 +101,23 @@ def range_of_samples(colours: Colours) -> RangeModel:
                       upper=(round(high) % 180, 255, 255))
 
 
-def _paint(colours: Colours, area: float, error: float) -> _Paint:
-    kept = typical(colours)
+def _paint(samples: PaintSamples, error: float) -> _Paint:
+    kept = samples.typical
     mean = np.median(kept[:, 1:], axis=0)
-    hue = _hue(mean)
+    hue = hue_of(mean)
     kept = kept[::max(1, len(kept) // PIXELS)]
     seen = []
     for lamp in LAMPS:
         for wrong in (-error, 0.0, error):
-            away, magnitude, _ = _polar(balanced(relit(kept, lamp), lamp.temperature_shift + wrong), hue)
+            away, magnitude, _ = polar(balanced(relit(kept, lamp), lamp.temperature_shift + wrong), hue)
             seen.append((np.abs(away), magnitude))
-    now, magnitude, level = _polar(kept, hue)
+    now, magnitude, level = polar(kept, hue)
     weakest = float(np.percentile(magnitude, 5.0))
     core = float(np.percentile(np.abs(now), 100.0 * COVERAGE))
     wanted = max(MARGIN_DEG + max(float(np.percentile(away, 100.0 * COVERAGE)) for away, _ in seen), WANTED_DEG)
     dark, bright = np.percentile(kept[:, 0], (2.0, 98.0))
     return _Paint(hue, core, wanted, seen, level, weakest, (float(mean[0]), float(mean[1])),
-                  (float(dark), float(bright)), area)
+                  (float(dark), float(bright)), samples.area)
 
 
 def _neighbours_leave(index: int, paints: list[_Paint]) -> float:
@@ -167,23 +161,11 @@ def _gate(paint: _Paint, most: float, skin: Colours, room: SurroundingColours) -
 def _by_all_lamps(colours: Colours, hue: float) -> list[tuple[Array, Array]]:
     """(|degrees from `hue`|, magnitude) of colours as the detector sees them by every lamp."""
     few = colours[::max(1, len(colours) // PIXELS)]
-    polar = [_polar(balanced(relit(few, lamp), lamp.temperature_shift), hue) for lamp in LAMPS]
-    return [(np.abs(away), magnitude / lamp.gains[1]) for (away, magnitude, _), lamp in zip(polar, LAMPS, strict=True)]
+    seen = [polar(balanced(relit(few, lamp), lamp.temperature_shift), hue) for lamp in LAMPS]
+    return [(np.abs(away), magnitude / lamp.gains[1]) for (away, magnitude, _), lamp in zip(seen, LAMPS, strict=True)]
 
 
 def _share(seen: list[tuple[Array, Array]], tolerance: float, least: float) -> float:
     """Share of colours that pass, by the lamp where most do."""
     return max(float(np.mean((away <= tolerance) & (magnitude >= least))) if len(away) else 0.0
                for away, magnitude in seen)
-
-
-def _hue(chroma: Array | Colours) -> float:
-    return math.degrees(math.atan2(float(chroma[1]), float(chroma[0])))
-
-
-def _polar(colours: Colours, hue: float) -> tuple[Array, Array, float]:
-    """(N,) degrees from `hue`, -180..180, (N,) magnitudes, and their median."""
-    cb, cr = colours[:, 1].astype(np.float64), colours[:, 2].astype(np.float64)
-    away = np.remainder(np.degrees(np.arctan2(cr, cb)) - hue + 180.0, 360.0) - 180.0
-    magnitude = np.hypot(cb, cr)
-    return away, magnitude, float(np.median(magnitude)) if len(magnitude) else 0.0

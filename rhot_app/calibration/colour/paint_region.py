@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -10,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import CalibrationError
-from rhot_node.detect.colour import MAGNITUDE_LEAST, SAMPLES_MIN, Box, box_mask, colours_of
+from rhot_node.detect.colour import MAGNITUDE_LEAST, SAMPLES_MIN, Box, Colours, box_mask, colours_of
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.region.outline import RING
 
+Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Point = tuple[float, float]
 
@@ -80,7 +82,7 @@ def region_in(image: YuvImage, boxes: list[Box]) -> PaintRegion:
     Boxes that hold few pixels only say where the paint is: what is plainly the same round them is taken too. Raises
     CalibrationError when they lie outside the picture, on different paints, or on less than can be learnt from.
     """
-    sample = box_mask(image, boxes) | _touched(image, [box for box in boxes if not box_mask(image, [box]).any()])
+    sample = box_mask(image, boxes) | touched(image, [box for box in boxes if not box_mask(image, [box]).any()])
     if not sample.any():
         width, height = image.size
         raise CalibrationError(f"the box {boxes[0]} holds no colour pixel of the picture of {width} x {height} px.")
@@ -104,26 +106,47 @@ def region_in(image: YuvImage, boxes: list[Box]) -> PaintRegion:
     return PaintRegion(sample, _grown(flooded | sample, RING), runs_on)
 
 
-def _touched(image: YuvImage, boxes: list[Box]) -> Mask:
-    """The chroma pixels that boxes touch: a box of 2 x 2 px may hold none wholly."""
+def touched(image: YuvImage, boxes: list[Box]) -> Mask:
+    """(H/2, W/2) the chroma pixels that boxes touch: a box of 2 x 2 px may hold none wholly."""
     width, height = image.size
     return box_mask(image, [(x0 - x0 % 2, y0 - y0 % 2, min(x1 + x1 % 2, width), min(y1 + y1 % 2, height))
                             for x0, y0, x1, y1 in boxes])
 
 
 def _require_one_paint(image: YuvImage, boxes: list[Box]) -> None:
-    """Raise CalibrationError when the boxes of one marker have different hues."""
-    hues = []
+    """Raise CalibrationError when the boxes of one marker have hues that no light gives one paint."""
+    chromas = []
     for box in boxes if len(boxes) > 1 else []:
         mask = box_mask(image, [box])
-        _, cb, cr = np.median(colours_of(image, mask if mask.any() else _touched(image, [box])), axis=0)
-        if math.hypot(cb, cr) < MAGNITUDE_LEAST:
+        chromas.append(np.median(colours_of(image, mask if mask.any() else touched(image, [box])), axis=0)[1:])
+        if math.hypot(*chromas[-1]) < MAGNITUDE_LEAST:
             raise CalibrationError(f"the box {box} is almost grey; draw all boxes on the paint.")
-        hues.append(math.degrees(math.atan2(cr, cb)))
-    apart = max((abs(math.remainder(hue - hues[0], 360.0)) for hue in hues), default=0.0)
-    if apart > HUE_REACH_DEG:
+    apart = hues_spread_deg(chromas)
+    if apart > 2.0 * HUE_REACH_DEG:
         raise CalibrationError(f"its boxes in one picture differ in hue by {apart:.0f}°: one of them is on something "
                                "else. Every marker has a name of its own; draw all its boxes on its paint.")
+
+
+def hues_spread_deg(chromas: Sequence[Array | Colours]) -> float:
+    """The angle that the hues of colours (cb, cr) span; 0 for one or none. Within twice HUE_REACH_DEG all are the same
+    paint's middle hue in other light."""
+    if not len(chromas):
+        return 0.0
+    middle = hue_of(sum(chroma / np.hypot(*chroma) for chroma in chromas))
+    return float(np.ptp([math.remainder(hue_of(chroma) - middle, 360.0) for chroma in chromas]))
+
+
+def hue_of(chroma: Array | Colours) -> float:
+    """The angle of a colour (cb, cr), degrees."""
+    return math.degrees(math.atan2(float(chroma[1]), float(chroma[0])))
+
+
+def polar(colours: Colours, hue: float) -> tuple[Array, Array, float]:
+    """(N,) degrees from `hue`, -180..180, (N,) magnitudes, and their median, of colours (N, 3) Y, Cb, Cr."""
+    cb, cr = colours[:, 1].astype(np.float64), colours[:, 2].astype(np.float64)
+    away = np.remainder(np.degrees(np.arctan2(cr, cb)) - hue + 180.0, 360.0) - 180.0
+    magnitude = np.hypot(cb, cr)
+    return away, magnitude, float(np.median(magnitude)) if len(magnitude) else 0.0
 
 
 def _require_enough(sample: Mask, held: int) -> None:

@@ -14,7 +14,18 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.colour.paint_region import PaintRegion, Point, only, region_at, region_in, region_of
+from rhot_app.calibration.colour.paint_region import (
+    PaintRegion,
+    Point,
+    hue_of,
+    hues_spread_deg,
+    only,
+    polar,
+    region_at,
+    region_in,
+    region_of,
+    touched,
+)
 from rhot_app.errors import CalibrationError
 from rhot_node.detect.colour import SAMPLES_MIN, Box, Colours, colours_of, learn_chroma_from_colours
 from rhot_node.detect.fast import DOUBTFUL, FastDetector
@@ -37,13 +48,15 @@ GROWN = 2.0  # of the area since it was seen last: no marker comes so near at on
 class PaintSamples:
     """Pixels of one marker's paint.
 
-    `colours` (N, 3): Y, Cb, Cr, chroma minus 128. `frame` (N,): which picture each is from. `area`: how large the
-    marker is in the pictures, median, chroma px.
+    `colours` (N, 3): Y, Cb, Cr, chroma minus 128. `frame` (N,): which picture each is from. `box` (N,): which click or
+    box of a person each lies in, -1 where the marker was followed. `area`: how large the marker is in the pictures,
+    median, chroma px.
     """
 
     name: str
     colours: Colours
     frame: NDArray[np.int32]
+    box: NDArray[np.int32]
     area: float
 
     @property
@@ -56,6 +69,22 @@ class PaintSamples:
         """The paint's median colour, 0..255."""
         red, green, blue = np.clip(np.rint(RGB_FROM_YCC @ np.median(self.colours, axis=0)), 0, 255).astype(int)
         return int(red), int(green), int(blue)
+
+    @property
+    def typical(self) -> Colours:
+        """The paint without glints, edges and whatever else lies in a box: hue and chroma are near the median of all,
+        or of the same box: a person says that it is this paint, in whatever light."""
+        kept = _near_median(self.colours)
+        for number in np.unique(self.box[self.box >= 0]):
+            own = np.flatnonzero(self.box == number)
+            kept[own] |= _near_median(self.colours[own])
+        return self.colours[kept]
+
+    @property
+    def spread_deg(self) -> float:
+        """By how much the hues of what a person has shown differ, degrees."""
+        return hues_spread_deg([np.median(self.colours[self.box == number, 1:], axis=0)
+                                for number in np.unique(self.box[self.box >= 0])])
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +101,7 @@ class _Observation:
 
     picture: int
     colours: Colours
+    box: NDArray[np.int32]
     x: float
     y: float
     area: float
@@ -88,7 +118,7 @@ class ColourSamples:
     def __init__(self) -> None:
         self._observations: dict[str, list[_Observation]] = {}
         self._views: list[MarkedPicture] = []
-        self._pictures = 0
+        self._pictures = self._boxes = 0
         self._last: YuvImage | None = None
         self._detector: FastDetector | None = None
 
@@ -108,6 +138,7 @@ class ColourSamples:
         return tuple(PaintSamples(
             name=name, colours=np.concatenate([one.colours for one in observations]),
             frame=np.concatenate([np.full(len(one.colours), one.picture, np.int32) for one in observations]),
+            box=np.concatenate([one.box for one in observations]),
             area=float(np.median([one.area for one in observations])))
             for name, observations in self._observations.items())
 
@@ -131,7 +162,7 @@ class ColourSamples:
         except (SettingsError, CalibrationError) as exc:
             raise CalibrationError(f"{name}: {exc}") from exc
         self._make_room()
-        self._keep(image, {name: region})
+        self._keep(image, {name: region}, [cast(Box, box) for box in where] if isinstance(where[0], tuple) else [])
         self._detector = None
         return region
 
@@ -152,7 +183,7 @@ class ColourSamples:
                 if np.count_nonzero(inside) < SAMPLES_MIN:
                     continue
                 region = region_of(inside)
-                if self._adds(name, _observation(0, image, region)):
+                if self._adds(name, _observation(0, image, region, -1)):
                     taken[name] = region
         if taken:
             self._keep(image, taken)
@@ -210,12 +241,16 @@ class ColourSamples:
                          self._views[0])
             self._views = [view for view in self._views if view is not spare]
 
-    def _keep(self, image: YuvImage, regions: dict[str, PaintRegion]) -> None:
+    def _keep(self, image: YuvImage, regions: dict[str, PaintRegion], boxes: Sequence[Box] | None = None) -> None:
+        """`boxes`: in which a person has shown the only region, none for a click; None where it was followed."""
         if image is not self._last:
             self._pictures += 1
             self._last = image
         for name, region in regions.items():
-            self._observations.setdefault(name, []).append(_observation(self._pictures, image, region))
+            first = -1 if boxes is None else self._boxes
+            new = _observation(self._pictures, image, region, first, boxes or ())
+            self._boxes = max(self._boxes, int(new.box.max()) + 1)
+            self._observations.setdefault(name, []).append(new)
         self.keep_view(image)
         for view in self._views:
             if view.image is image:
@@ -228,9 +263,25 @@ def _region(image: YuvImage, where: Box | Point | Sequence[Box]) -> PaintRegion:
     return region_at(image, cast(Point, where)) if len(where) == 2 else region_in(image, [cast(Box, where)])
 
 
-def _observation(picture: int, image: YuvImage, region: PaintRegion) -> _Observation:
+def _observation(picture: int, image: YuvImage, region: PaintRegion, first: int,
+                 boxes: Sequence[Box] = ()) -> _Observation:
+    """What a region adds. Several `boxes`, numbered from `first`, weigh the same, however large each is."""
     colours = colours_of(image, region.sample)
     rows, columns = np.nonzero(region.sample)
     level = float(np.hypot(*np.median(colours[:, 1:], axis=0)))
-    return _Observation(picture, colours[::max(1, len(colours) // PIXELS_A_FRAME)], float(columns.mean()),
-                  float(rows.mean()), region.area, level)
+    parts = [np.flatnonzero(touched(image, [box])[region.sample]) for box in boxes] if len(boxes) > 1 else \
+        [np.arange(len(colours))[::max(1, len(colours) // PIXELS_A_FRAME)]]
+    each = min(max(map(len, parts)), PIXELS_A_FRAME // len(parts) + 1)
+    if len(parts) > 1:
+        parts = [part[np.linspace(0, len(part) - 1, each).astype(int)] for part in parts if len(part)]
+    return _Observation(picture, np.concatenate([colours[part] for part in parts]),
+                        np.concatenate([np.full(len(part), first + k if first >= 0 else -1, np.int32)
+                                        for k, part in enumerate(parts)]),
+                        float(columns.mean()), float(rows.mean()), region.area, level)
+
+
+def _near_median(colours: Colours) -> NDArray[np.bool_]:
+    """(N,) whether a colour's hue and chroma are near those of the median."""
+    hue, magnitude, level = polar(colours, hue_of(np.median(colours[:, 1:], axis=0)))
+    spread = 1.4826 * float(np.median(np.abs(hue)))
+    return np.asarray((np.abs(hue) <= max(5.0 * spread, 12.0)) & (magnitude >= 0.3 * level))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.colour.illuminant import LAMPS, Lamp, balanced, chances, relit
-from rhot_app.calibration.colour.model import WINDOW_LEVEL, typical
+from rhot_app.calibration.colour.model import WINDOW_LEVEL
 from rhot_app.calibration.colour.samples import PaintSamples
 from rhot_node.detect.colour import Colours, directions, sector_table
 from rhot_node.detect.gate import ColourGate
@@ -116,7 +116,7 @@ def judge_colours(markers: MarkerSet, samples: Sequence[PaintSamples], skin: Col
     `samples` in the order of `markers`; `skin` (N, 3) Y, Cb, Cr, none when it is unknown; `rooms`: for every marker the
     colours around it, in pictures where it is known.
     """
-    paints = [typical(one.colours) for one in samples]
+    paints = [one.typical for one in samples]
     judge = Judge(markers, [float(np.median(np.hypot(paint[:, 1], paint[:, 2]))) for paint in paints])
     names = tuple(one.name for one in samples)
     others = ((SKIN,) if len(skin) else ()) + ((ROOM,) if any(len(room) for room in rooms) else ())

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from rhot_app.calibration.colour.cause import JOINED, Cause, Explainer
-from rhot_app.calibration.colour.identity import Identity, name_of_hue
+from rhot_app.calibration.colour.identity import Identity, hues_apart_deg, name_of_hue
 from rhot_app.calibration.colour.illuminant import LAMPS, SAME, Lamp, chances, relit_image
 from rhot_app.calibration.colour.model import COVERAGE
-from rhot_app.calibration.colour.paint_region import PaintRegion
+from rhot_app.calibration.colour.paint_region import HUE_REACH_DEG, PaintRegion
 from rhot_app.calibration.colour.samples import MarkedPicture, PaintSamples
 from rhot_app.calibration.colour.separability import SKIN, Separability
 from rhot_app.calibration.colour.surroundings import SurroundingsReport
@@ -150,6 +150,7 @@ SKIN_COLOUR = 0.75  # of skin taken for a marker: also where that is not in shad
 LOST = 0.1  # of the pictures, over all lamps: more is not only by lamps at the end of the range
 NEVER_FOUND = 0.9  # of the pictures in which a marker is lost, while something else has its colour: it is that
 RIVAL = 0.7  # of the marker's own merit: a thing that is about as good a marker
+_ROUNDED_DEG = 0.2  # two hue tolerances of one decimal
 PALE = 28.0  # grey levels of chroma: less drowns in noise when a hand is in shade
 BURNT, BURNT_SHARE = 253.0, 0.1  # a channel that is cut off falsifies the hue
 DARK, DIM = 25.0, 60.0  # grey levels of luma: too dark; so dark that light helps
@@ -159,16 +160,19 @@ _UNKNOWN_LAMP = (f"Less than {MARKERS_LEAST} markers do not tell a camera which 
 FAIR, GOOD, POOR = Grade.FAIR, Grade.GOOD, Grade.POOR
 
 
-def judge_report(samples: Sequence[PaintSamples], models: Sequence[ChromaModel], separability: Separability,
+def judge_report(samples: Sequence[PaintSamples], markers: MarkerSet, separability: Separability,
                  room: SurroundingsReport, rehearsal: Rehearsal, free: Sequence[str], runs_on: set[str],
                  identity: Identity) -> Verdict:
-    """All findings on a calibration, worst first, and a sentence that sums up."""
+    """All findings on a calibration, worst first, and a sentence that sums up. `markers`: all of the set."""
+    bounds = {marker.id: marker.chroma for marker in markers.markers}
+    models = [bounds[one.name] for one in samples]
     other_paint = f"Use another paint for one of them: {_or(free[:3])} would be free here." if free else \
         "Use fewer markers, or a plainer background: no hue is left free here."
     joined = {one.name for one, lost in zip(samples, rehearsal.lost, strict=True) if lost >= LOST} & runs_on
     findings = [
         *_skin(separability, free, joined, identity), *_pairs(separability, other_paint, identity),
-        *_exchanged(identity), *_rivals(samples, room, free), *_lamps(samples, rehearsal, separability, room),
+        *_swallowed(samples, bounds, identity), *_exchanged(identity), *_rivals(samples, room, free),
+        *_lamps(samples, rehearsal, separability, room),
         *_paints(samples, models),
     ]
     worst = separability.sentences[0] if separability.sentences else "no two colours overlap"
@@ -193,6 +197,27 @@ def _pairs(separability: Separability, remedy: str, identity: Identity) -> Itera
         elif share >= OVERLAP:
             yield Finding("overlap", FAIR, f"{overlap}.", "Their hues are too near each other; where they pass, one "
                           "may take the other's name.", remedy)
+
+
+def _swallowed(samples: Sequence[PaintSamples], bounds: Mapping[str, ChromaModel],
+               identity: Identity) -> Iterator[Finding]:
+    """Markers whose hues reach into another's, or over its middle: where that one's paint is pale or dark, the first
+    one takes it."""
+    sampled, same = {one.name for one in samples}, {frozenset(pair[:2]) for pair in identity.same}
+    for name, model in bounds.items():
+        for other, theirs in bounds.items():
+            if other == name or frozenset((name, other)) in same or not sampled & {name, other}:
+                continue
+            apart, reach = hues_apart_deg(model, theirs), model.hue_tolerance_deg
+            into = sampled >= {name, other} and reach >= theirs.hue_tolerance_deg \
+                and reach + theirs.hue_tolerance_deg > apart + _ROUNDED_DEG
+            if apart > reach and not into:
+                continue
+            yield Finding("swallowed", POOR if apart <= reach and name in sampled else FAIR,
+                          f"The hue of {name} reaches {reach:.0f}° either way, and {other} is only {apart:.0f}° away.",
+                          f"Shaded paint of {other} is taken for {name}.",
+                          f"Narrow {name} to less than {max(apart - theirs.hue_tolerance_deg, 0.5 * apart):.0f}°."
+                          if name in sampled else f"Pick {name} too.")
 
 
 def _skin(separability: Separability, free: Sequence[str], joined: set[str], identity: Identity) -> Iterator[Finding]:
@@ -275,6 +300,12 @@ def _paints(samples: Sequence[PaintSamples], models: Sequence[ChromaModel]) -> I
             yield Finding("burnt", FAIR, f"{100 * burnt:.0f} % of {one.name}'s paint is too bright for the camera.",
                           "A colour channel is cut off there, which falsifies the hue.",
                           "Shorten the exposure or lower the gain, then learn again.")
+        if one.spread_deg > HUE_REACH_DEG:
+            yield Finding("uneven", FAIR if one.spread_deg <= 2.0 * HUE_REACH_DEG else POOR,
+                          f"What was marked as {one.name} differs in hue by {one.spread_deg:.0f}°.",
+                          "Light of another colour falls on a part of it, the cameras' white balances differ, or one "
+                          "mark is on something else.", "It is learnt that wide; light the markers evenly, or mark "
+                          "them again.")
         luma = float(np.median(one.colours[:, 0]))
         if model.magnitude < PALE or luma < DARK:
             figure = f"The colour of {one.name} is weak (chroma {model.magnitude:.0f}, luma {luma:.0f})."
