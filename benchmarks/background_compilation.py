@@ -1,8 +1,8 @@
-"""From kernel to state while the app compiles the rest of the numerical code, and after it: in one run of the app.
+"""Latency from kernel to state while the app compiles the rest of the numerical code, and afterwards.
 
-Start the app first, on a computer that has compiled nothing but the window's part, and this at once: it attaches to the
-app's engine, waits until everything is compiled, and goes on for as long again (at most --seconds). Exit code 1: the
-99th percentile while it compiles is more than 1.5 times that afterwards.
+Start the app on a computer that has compiled the window's part only, then this at once. It attaches to the app's
+engine, waits until everything is compiled, and goes on for as long again (at most --seconds). Exit code 1: the 99th
+percentile while it compiles is more than 1.5 times that afterwards.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from tables import arguments, publish, table
 from rhot_app.api import live
 from rhot_node.compiled import ALL, is_complete
 
-MOST = 1.5
+MOST_RATIO = 1.5
 
 
 def main() -> int:
     parser = arguments(__doc__)
     parser.add_argument("--directory", type=Path, metavar="DIR", help="the engine's private directory")
-    parser.add_argument("--seconds", type=float, default=90.0, metavar="S", help="at most so long after (default 90)")
+    parser.add_argument("--seconds", type=float, default=90.0, metavar="S", help="longest time afterwards (default 90)")
     args = parser.parse_args()
     if is_complete(ALL):
-        print("Everything is compiled already. Start this beside a first start of the app.", file=sys.stderr)
+        print("Everything is compiled already. Start this right after the first start of the app.", file=sys.stderr)
         return 2
     begun_s = time.monotonic()
     done_s = None
@@ -45,8 +45,8 @@ def main() -> int:
     publish(args, {"compiled_s": done_s - begun_s, "rows": rows, "ratio": ratio},
             table(("kernel to state", "states", "p50 ms", "p99 ms", "max ms"), rows),
             f"Everything was compiled {done_s - begun_s:.0f} s after this began. p99 while it compiles is {ratio:.2f} "
-            f"times that afterwards (aim: at most {MOST:g}).")
-    return int(ratio > MOST)
+            f"times that afterwards (aim: at most {MOST_RATIO:g}).")
+    return int(ratio > MOST_RATIO)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
-"""Compiles the numerical code once and leaves it in numba's cache, so that the first start is as quick as any other.
+"""Compiles the numerical code into numba's cache, so that nothing waits for it later.
 
-``python -m rhot_app.warm`` compiles everything, on all processors; it fails, with the reason, when the installation is
-broken. ``python -m rhot_app.warm window`` compiles what the window needs on the simulated rig, or another name of
-`PARTS`. ``--background`` compiles on one processor and takes only time that nobody else wants.
+``python -m rhot_app.warm`` compiles everything, on all processors. ``python -m rhot_app.warm window`` compiles what the
+window needs on the simulated rig, or another of `PARTS`. ``--background`` uses one processor, only while it is idle.
 """
 
 from __future__ import annotations
@@ -73,7 +72,7 @@ def warm_tracker(rig: Rig) -> None:
 
 
 def warm_solvers(_rig: Rig) -> None:
-    """Compile the solvers of both trackers. The first tracker comes to them last, so they are compiled beside it."""
+    """Compile the solvers of both trackers; `warm_tracker` needs them last, so both steps can run side by side."""
     hand, pose = build_model(load_hand(resource_path("hands", "right.json"))), neutral_pose()
     points = forward(hand, pose)
     fit_palm(hand, points.joints[0], points.marker_centres, pose, 1.0 / 30.0)
@@ -88,8 +87,7 @@ def warm_other_solvers(rig: Rig) -> None:
 
 
 def warm_estimator(rig: Rig) -> None:
-    """The same with the estimator, which begins in another way when markers on the palm show how it is turned, and
-    with the search for the hand's size."""
+    """Compile the estimator with the search for the hand's size, initialised with and without palm markers."""
     for markers in ("rhot6", "rhot8"):
         chosen = msgspec.structs.replace(rig, markers=load_markers(resource_path("markers", f"{markers}.json")),
                                          tracker=TrackerSettings(kind="estimator", float_scale=True))
@@ -105,14 +103,14 @@ def warm_twin(_rig: Rig) -> None:
 
 
 def warm_boards(_rig: Rig) -> None:
-    """Compile the search for calibration boards, on the plainest picture of one."""
+    """Compile the search for calibration boards, on a synthetic picture of one."""
     board = STANDARD_BOARD
     squares = np.add.outer(np.arange(board.rows + 1), np.arange(board.cols + 1)) % 2 * 200 + 20
     detect(np.pad(np.kron(squares, np.ones((24, 24))).astype(np.uint8), 48, constant_values=230), board, thorough=False)
 
 
 def warm_calibrations(rig: Rig) -> None:
-    """Compile what bones and filters are calibrated with."""
+    """Compile the calibrations of bones and filters."""
     hand = load_hand(resource_path("hands", "right.json"))
     unknowns = HandUnknowns(hand, (MarkerPlace("index", 1, 2, painted=True), MarkerPlace("back", PALM, PALM)))
     still = Poses(np.eye(4)[None], np.zeros((1, len(ANGLES))))
@@ -126,7 +124,7 @@ def warm_calibrations(rig: Rig) -> None:
 
 
 def warm_bare_hand(rig: Rig) -> None:
-    """Compile what tracks a bare hand, and what fits one to pictures."""
+    """Compile the trackers of a bare hand, and its fit to pictures."""
     # not above: nothing of these files is compiled, so they decide no cache
     from rhot_app.handfit.session import warm_up
     from rhot_app.tracking.contours.two_hands import TwoBareHands
@@ -137,7 +135,7 @@ def warm_bare_hand(rig: Rig) -> None:
 
 
 def warm_outputs(rig: Rig) -> None:
-    """Compile what turns a hand into the joints of other programs."""
+    """Compile the conversion of a hand to the joints of other programs."""
     JointConverter(rig).warm_up()
 
 
@@ -147,20 +145,20 @@ STEPS: dict[str, Callable[[Rig], None]] = {"tracker": warm_tracker, "solvers": w
                                            "estimator": warm_estimator, "bare hand": warm_bare_hand,
                                            "boards": warm_boards, "calibrations": warm_calibrations,
                                            "other solvers": warm_other_solvers}
-"""In this order two processors share them evenly, and neither compiles what the other one is compiling."""
+"""In this order two processes take equally long, and neither compiles what the other is compiling."""
 
 PARTS: dict[str, tuple[str, ...]] = {
     WINDOW: ("tracker", "solvers", "detector", "twin", "searches", "outputs"), ALL: tuple(STEPS),
     "estimator": ("estimator",), "contours": ("bare hand",), "other solvers": ("other solvers",)}
-"""What can be compiled by itself, as steps."""
+"""Steps by the name of what they compile together."""
 
 _COLLECT_EVERY = 100_000
-"""Objects between two searches for garbage, 700 by default: a compiler makes millions that stay, and searching them
-over and over costs 7 % of the time (chosen: a few hundred MB more memory)."""
+"""Threshold of garbage collection, objects; 700 by default. A compiler makes millions of objects that stay, and
+collecting costs 7 % of the time. The price is a few hundred MB of memory."""
 
 
 def warm(name: str) -> str:
-    """Take one of `STEPS` on the example rig; returns a line that says how long it took."""
+    """Run one of `STEPS` on the example rig; returns a line with its duration."""
     begun = time.monotonic()
     gc.set_threshold(_COLLECT_EVERY)
     STEPS[name](load_rig(resource_path("rigs", "two_pis.json")))
@@ -168,7 +166,7 @@ def warm(name: str) -> str:
 
 
 def end_with_parent() -> None:
-    """Have this process end when its parent does, however that ends."""
+    """Have this process end when its parent has ended, for whatever reason."""
     parent = parent_process()
     assert parent is not None
 
@@ -180,7 +178,7 @@ def end_with_parent() -> None:
 
 
 def yield_processor() -> None:
-    """Have this process, and what it starts, run only when no other one wants to. Linux; elsewhere by niceness."""
+    """Have this process, and those it starts, use idle processor time only: SCHED_IDLE on Linux, niceness elsewhere."""
     with contextlib.suppress(OSError):
         os.nice(19)
     with contextlib.suppress(OSError, AttributeError):
@@ -188,10 +186,10 @@ def yield_processor() -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Take the steps of a part, side by side; prints a line after each. Returns the exit code."""
+    """Compile a part; prints a line after each step. Returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m rhot_app.warm", description="Compile the numerical code.")
     parser.add_argument("part", nargs="?", choices=PARTS, default=ALL, help=f"what to compile (default {ALL})")
-    parser.add_argument("--background", action="store_true", help="take only time that nobody else wants")
+    parser.add_argument("--background", action="store_true", help="use one processor, and only while it is idle")
     args = parser.parse_args(arguments)
     if args.background:
         yield_processor()
@@ -210,14 +208,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _compile(steps: Sequence[str], workers: int) -> None:
-    """Take the steps in processes of their own; prints a line after each."""
-    print(f"0 of {len(steps)} compiled", flush=True)
+    """Run the steps in processes of their own; prints a line after each."""
+    print(f"0 of {len(steps)} steps compiled", flush=True)
     with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:
         running = {pool.submit(warm, name): name for name in steps}
         for done, step in enumerate(as_completed(running), 1):
             line = step.result()
             mark_complete(running[step])
-            print(f"{done} of {len(steps)} compiled; {line}", flush=True)
+            print(f"{done} of {len(steps)} steps compiled; {line}", flush=True)
 
 
 if __name__ == "__main__":

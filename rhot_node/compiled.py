@@ -1,12 +1,11 @@
-"""Where compiled code is kept: a folder of its own for every state of the compiled sources.
+"""Where numba keeps compiled code: one folder for each version of the compiled sources.
 
-numba recompiles a function when its own file changes, but not when a function that it calls, in another file, does:
-after an update, old and new code would run mixed and nobody would notice. A folder named by a hash of all sources that
-numba compiles, and of those that these import, whose constants are compiled in, makes that impossible, and it is
-writable where the package is not. The hash is of their place as well: numba does not find what it compiled of the same
-sources in another one.
+numba recompiles a function when its own file changes, but not when a function that it calls, in another file, does.
+After an update, old and new code would run together. So the folder's name is a hash of all sources that numba compiles
+and of all that they import, whose constants are compiled in. The hash covers the path of the sources as well: numba
+finds no code that it compiled of the same sources elsewhere.
 
-A new folder begins with what earlier ones have of modules that are unchanged, with all that they import.
+A new folder starts with the code of all modules that are unchanged, with what they import, since an earlier folder.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from functools import cache
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
-_KEPT = 3  # states of the sources: today's, and those of a checkout or two beside it
+_KEPT = 3  # folders: of this version of the sources, and of two other checkouts
 _IN_USE_S = 3600.0
 _PACKAGES = ("rhot_node", "rhot_app")
 _COMPILER = b"numba"
@@ -35,18 +34,18 @@ _MODULES = "modules.json"
 
 ALL = "all"
 WINDOW = "window"
-"""Parts of the code that are noted as compiled (`mark_complete`); `rhot_app.warm` has more."""
+"""Parts of the code that `mark_complete` marks as compiled; `rhot_app.warm` has more."""
 
 
 def sources_hash(folders: Sequence[Path]) -> str:
-    """16 hex digits that change with any source file in `folders` that is compiled, or imported by one that is, and
-    with where they lie."""
+    """16 hex digits of the paths of `folders` and of all source files in them that are compiled or imported by one that
+    is."""
     texts = _texts(folders)
     return _hash(texts, _with_imports(texts, _compiled(texts)), folders)
 
 
 def module_hashes(folders: Sequence[Path]) -> dict[str, str]:
-    """Of each module in `folders` that is compiled, a hash of its source and of all that it imports."""
+    """By compiled module in `folders`, a hash of its source and of all that it imports."""
     texts = _texts(folders)
     return {module: _hash(texts, _with_imports(texts, [module]), folders) for module in _compiled(texts)}
 
@@ -76,7 +75,7 @@ def _with_imports(texts: dict[str, bytes], modules: Sequence[str]) -> set[str]:
 
 @cache
 def _imports(text: bytes) -> list[str]:
-    """What a source file may import, by dotted names; some are functions and no modules."""
+    """Dotted names of what a source file imports: modules, and functions and classes of them."""
     return [name for package, names in _IMPORTS.findall(text.decode())
             for name in (package, *(f"{package}.{name}" for name in re.findall(r"\w+", names)))]
 
@@ -92,7 +91,7 @@ def _hash(texts: dict[str, bytes], modules: set[str], folders: Sequence[Path]) -
 
 
 def use_own_cache() -> None:
-    """Point numba at the folder of the present sources, unless the environment names one. Call before compiling any."""
+    """Have numba use the folder of the present sources, unless the environment names one. Call before it compiles."""
     if VARIABLE in os.environ:
         return
     name = sources_hash(_packages())
@@ -100,18 +99,17 @@ def use_own_cache() -> None:
         with contextlib.suppress(OSError):  # no home, or one that cannot be written
             folder = base / "numba" / name
             if not folder.is_dir():
-                _begin(folder)
-                _forget_old(folder.parent)
+                _make_folder(folder)
+                _remove_old(folder.parent)
             folder.touch()
             os.environ[VARIABLE] = str(folder)
-            if "numba" in sys.modules:  # it reads the environment when it loads, and a caller may have used it before
+            if "numba" in sys.modules:  # it reads the environment only when it is imported
                 sys.modules["numba"].config.CACHE_DIR = str(folder)
             return
 
 
 def _bases() -> Iterator[Path]:
-    """Where compiled code may be kept: the user's cache, else the virtual environment, else this user's own folder
-    among the temporary ones."""
+    """Where folders of compiled code may lie: the user's cache, the virtual environment, a temporary folder."""
     from platformdirs import user_cache_path
 
     yield user_cache_path("rhot")
@@ -122,7 +120,7 @@ def _bases() -> Iterator[Path]:
         own.mkdir(mode=0o700, exist_ok=True)
         status = own.lstat()
         if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o022:
-            yield own  # code that others could replace would run as this user
+            yield own  # else others could replace code that runs as this user
 
 
 def is_complete(part: str = ALL) -> bool:
@@ -131,22 +129,23 @@ def is_complete(part: str = ALL) -> bool:
 
 
 def announce_compilation(takes: str = "some minutes") -> None:
-    """Have this process say on standard error when it begins to compile, once: whoever waits learns why. It says
-    nothing where all that it calls is compiled. `takes`: how long it takes where nothing is. Loads numba, so check
-    first what can be refused."""
+    """Have this process print one line to standard error when it starts to compile.
+
+    `takes`: how long it takes where nothing is compiled. Imports numba, which is slow: validate arguments first.
+    """
     from numba.core import event
 
     class Notice(event.Listener):
-        said = False
+        printed = False
 
         def on_start(self, event: object) -> None:
-            if not self.said:
-                self.said = True
+            if not self.printed:
+                self.printed = True
                 print("rhot: the numerical code is being compiled, once for these sources; that takes "
                       f"{'some seconds' if is_complete() else takes}.", file=sys.stderr, flush=True)
 
         def on_end(self, event: object) -> None:
-            """Nothing: the next function follows."""
+            """Part of the interface."""
 
     global _announced
     if not _announced:
@@ -154,7 +153,7 @@ def announce_compilation(takes: str = "some minutes") -> None:
         event.register("numba:compile", Notice())
 
 
-_announced = False  # the listener stays registered until the process ends
+_announced = False
 
 
 def is_compiled_in(cache: Path) -> bool:
@@ -163,7 +162,7 @@ def is_compiled_in(cache: Path) -> bool:
 
 
 def mark_complete(part: str = ALL) -> None:
-    """Note that a part has been compiled for the present sources. Raises OSError."""
+    """Mark a part as compiled for the present sources. Raises OSError."""
     if VARIABLE in os.environ:
         (Path(os.environ[VARIABLE]) / f"complete-{part}").touch()
 
@@ -173,8 +172,8 @@ def _packages() -> list[Path]:
     return [root / name for name in _PACKAGES if (root / name).is_dir()]
 
 
-def _begin(folder: Path) -> None:
-    """Make the folder of the present sources, with what the others beside it have of unchanged modules."""
+def _make_folder(folder: Path) -> None:
+    """Make the folder of the present sources, with the code of unchanged modules from the folders beside it."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     hashes = module_hashes(_packages())
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".new-", ignore_cleanup_errors=True) as place:
@@ -184,13 +183,16 @@ def _begin(folder: Path) -> None:
         for old in _newest_first(folder.parent):
             with contextlib.suppress(OSError, ValueError):  # of an older version, or being removed
                 _link_unchanged(old, json.loads((old / _MODULES).read_text()), new, hashes)
-        with contextlib.suppress(OSError):  # another process was quicker
+        with contextlib.suppress(OSError):  # another process has made it meanwhile
             new.rename(folder)
 
 
 def _link_unchanged(old: Path, old_hashes: dict[str, str], new: Path, hashes: dict[str, str]) -> None:
-    """Link what `old` has of modules whose hash is the same. numba keeps ``f`` of ``package/module.py`` in files named
-    ``module.f-LINE...``, in a folder named by the name and the hash of ``package``'s path."""
+    """Link the code in `old` of modules whose hash is the same.
+
+    numba keeps ``f`` of ``package/module.py`` in files named ``module.f-LINE...``. Their folder's name is ``package``
+    and the hash of its path.
+    """
     root = Path(__file__).parent.parent
     for module in {module for module, digest in hashes.items() if old_hashes.get(module) == digest}:
         package = root.joinpath(*module.split(".")[:-1])
@@ -207,7 +209,7 @@ def _newest_first(base: Path) -> list[Path]:
     return sorted(folders, key=lambda path: path.stat().st_mtime, reverse=True)
 
 
-def _forget_old(base: Path) -> None:
+def _remove_old(base: Path) -> None:
     for folder in _newest_first(base)[_KEPT:]:
         if time.time() - folder.stat().st_mtime > _IN_USE_S:  # programs of other checkouts may run on it
             shutil.rmtree(folder, ignore_errors=True)

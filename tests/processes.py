@@ -1,7 +1,7 @@
-"""Programs of RHOT in processes that are forked from one that has imported and compiled them: each starts at once.
+"""Starts RHOT's programs at once, as forks of a server process that has imported them and loaded compiled code.
 
-In a room whose conftest imports `forked_programs`, ``python -m rhot_app ...`` and ``python -m rhot_node ...`` start
-that way when a test or the product calls subprocess. A test that uses `fresh_programs` starts them as users do.
+In a room whose conftest imports `forked_programs`, this is how subprocess starts ``python -m rhot_app ...`` and
+``python -m rhot_node ...``. A test that uses `fresh_programs` starts them as users do.
 """
 
 from __future__ import annotations
@@ -29,21 +29,22 @@ import pytest
 
 PRELOADED = {"rhot_app": ("rhot_app.engine", "rhot_app.outputs", "rhot_app.sources", "rhot_app.tracking"),
              "rhot_node": ("rhot_node",)}
-"""The packages whose modules a server imports, by the package of its programs."""
+"""Packages that a server imports with all their modules, by the package of its programs."""
 
 WORKERS = ("rhot_app.export.batch", "rhot_app.export.process", "rhot_app.simulator.film.film")
-"""What processes of multiprocessing find imported."""
+"""Modules that the fork server of multiprocessing imports."""
 
 Popen = subprocess.Popen
 get_context = multiprocessing.get_context
 SERVER_ENVIRONMENT = dict(os.environ)
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 MESSAGE_BYTES = 1 << 17
+ADOPTED = b"adopted"
 
 
 @pytest.fixture(scope="module", autouse=True)
 def forked_programs() -> Iterator[None]:
-    """subprocess starts RHOT's programs by forks, and multiprocessing its processes."""
+    """subprocess forks RHOT's programs, and multiprocessing forks its processes."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(subprocess, "Popen", ForkingPopen)
         patch.setattr(multiprocessing, "get_context", forking_context)
@@ -52,12 +53,12 @@ def forked_programs() -> Iterator[None]:
 
 @pytest.fixture
 def fresh_programs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """subprocess starts all programs from nothing, as it does outside of tests."""
+    """subprocess starts all programs in new interpreters, as it does outside of tests."""
     monkeypatch.setattr(subprocess, "Popen", Popen)
 
 
 def forking_context(method: str | None = None) -> Any:
-    """multiprocessing.get_context, but processes that would be spawned are forked from one that has `WORKERS`."""
+    """multiprocessing.get_context with a fork server that has imported `WORKERS` in place of "spawn"."""
     context: Any = get_context("forkserver" if method == "spawn" else method)
     if method == "spawn":
         context.set_forkserver_preload(list(WORKERS))
@@ -65,10 +66,10 @@ def forking_context(method: str | None = None) -> Any:
 
 
 class ForkingPopen(Popen):
-    """subprocess.Popen that has ``python -m MODULE ...`` of RHOT forked by a server that has imported it.
+    """subprocess.Popen that has a server fork ``python -m MODULE ...`` of RHOT; the fork becomes a child of this one.
 
-    The program is a child of this process all the same. What its modules read of the environment at their import, they
-    keep. So a program with another cache of compiled code starts from nothing.
+    The server's modules read the environment when they were imported. So a program with another cache of compiled code
+    starts in a new interpreter.
     """
 
     def _execute_child(self, args: Any, executable: Any, preexec_fn: Any, close_fds: bool,
@@ -96,7 +97,7 @@ class ForkingPopen(Popen):
 
 @cache
 def _server(package: str) -> tuple[socket.socket, subprocess.Popen[bytes]]:
-    """The server of a package. It ends when its socket is closed, with this process at the latest."""
+    """The socket and the process of a package's server, which ends when the socket is closed."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with theirs:
         process = Popen([sys.executable, __file__, package, str(theirs.fileno())], stdin=subprocess.DEVNULL,
@@ -105,52 +106,52 @@ def _server(package: str) -> tuple[socket.socket, subprocess.Popen[bytes]]:
 
 
 def start(server: socket.socket, request: bytes, streams: Sequence[int]) -> int:
-    """The process id of a new program; `streams` are its standard ones.
+    """Start a program with these standard streams; returns its process id.
 
-    The server forks twice, and the process between the two ends: its child is then given to this process.
+    The server forks twice. When the intermediate process ends, this process, a subreaper, adopts the program.
     """
     prctl = ctypes.CDLL(None).prctl
     prctl(PR_SET_CHILD_SUBREAPER, 1)
     try:
         socket.send_fds(server, [request], streams)
         pid = int(server.recv(MESSAGE_BYTES))
-        server.recv(MESSAGE_BYTES)
+        server.recv(MESSAGE_BYTES)  # ADOPTED
     finally:
         prctl(PR_SET_CHILD_SUBREAPER, 0)
     return pid
 
 
 def serve(tests: socket.socket) -> dict[str, Any]:
-    """Fork for each request; returns it in the fork. Ends with the tests."""
+    """Fork for each request; returns the request in the fork. Ends when `tests` is closed."""
     while True:
         request, streams, _, _ = socket.recv_fds(tests, MESSAGE_BYTES, 3)
         if not request:
             os._exit(0)
-        ready, given = os.pipe()
-        between = os.fork()
-        if between == 0:
+        ready, adopted = os.pipe()  # the program waits for the end of file, which comes once it is adopted
+        intermediate = os.fork()
+        if intermediate == 0:
             pid = os.fork()
             if pid != 0:
                 tests.send(str(pid).encode())
                 os._exit(0)
             tests.close()
-            os.close(given)
+            os.close(adopted)
             os.read(ready, 1)
             os.close(ready)
             for number, stream in enumerate(streams):
                 os.dup2(stream, number)
                 os.close(stream)
             return dict(json.loads(request))
-        os.waitpid(between, 0)
-        tests.send(b"it is your child")
-        for descriptor in (*streams, ready, given):
+        os.waitpid(intermediate, 0)
+        tests.send(ADOPTED)
+        for descriptor in (*streams, ready, adopted):
             os.close(descriptor)
 
 
 def preload(package: str) -> None:
-    """Import what the package's programs do, and load its compiled code."""
+    """Import the modules of a package's programs, and load compiled code."""
     if package == "rhot_node":
-        sys.modules["scipy"] = None  # as the program does first of all
+        sys.modules["scipy"] = None  # as the program itself does first
     for name in PRELOADED[package]:
         for module in pkgutil.walk_packages(importlib.import_module(name).__path__, f"{name}."):
             importlib.import_module(module.name)
@@ -168,10 +169,10 @@ def preload(package: str) -> None:
 
 
 def main() -> None:
-    """The server of a package; in each of its forks a program."""
+    """Serve a package; in each fork run a program."""
     code: Any = 1
 
-    def leave() -> None:  # after all else that is done at an exit; modules need not be cleared, that takes long
+    def leave() -> None:  # the last exit handler: clearing the modules would take long
         with contextlib.suppress(OSError):
             sys.stdout.flush()
         os._exit(code)
@@ -194,13 +195,13 @@ def main() -> None:
     sys.argv = ["", *request["arguments"]]
     sys.path[:1] = [request["folder"], *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
     for name in (module, f"{module}.__main__"):
-        sys.modules.pop(name, None)  # the program is a module of its own, though it may have been imported
+        sys.modules.pop(name, None)  # else runpy warns of a module that is imported already
     try:
         runpy.run_module(module, run_name="__main__", alter_sys=True)
         code = 0
     except SystemExit as exit:
         code = exit.code if isinstance(exit.code, int) else int(exit.code is not None)
-        raise  # a sentence in place of a code is printed
+        raise  # the interpreter prints a sentence in place of a code
 
 
 if __name__ == "__main__":

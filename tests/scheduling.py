@@ -1,6 +1,6 @@
-"""How long tests take, and in which order they run on several processes: files that take longest come first.
+"""How long tests take, and in which order several processes run them: files that take longest come first.
 
-A plug-in of pytest, which `tests/conftest.py` loads. A run keeps the seconds of each test in pytest's cache, from where
+A plug-in of pytest, which `tests/conftest.py` loads. A run keeps the seconds of each test in pytest's cache.
 ``benchmarks/test_times.py`` prints them and renews `WEIGHTS`, the seconds per file that decide the order.
 """
 
@@ -21,8 +21,8 @@ UNKNOWN_S = 10.0
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """Hands whole files to processes in the order in which they were collected."""
-    from xdist.scheduler import LoadFileScheduling  # which a node's tests do without
+    """Distributes whole files to the processes in the order of their collection."""
+    from xdist.scheduler import LoadFileScheduling  # not installed where only the node's tests run
 
     config.option.loadscopereorder = False
     return LoadFileScheduling(config, log)
@@ -30,7 +30,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """The longest files first, so that all processes end together. Alone, a process keeps pytest's order."""
+    """The longest files first, so that all processes end together. A single process keeps pytest's order."""
     if hasattr(config, "workerinput"):
         seconds = json.loads(WEIGHTS.read_text())
         items.sort(key=lambda item: (-seconds.get(_file(item), UNKNOWN_S), _file(item)))
@@ -41,13 +41,13 @@ def _file(item: pytest.Item) -> str:
 
 
 def _processor_s() -> float:
-    """Seconds of processor that this process and its ended children have used."""
+    """Processor time of this process and its ended children, s."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
 
 
 class TestTimes:
-    """Seconds of every test by the clock and of the processor, kept when the run ends."""
+    """Wall-clock and processor time of every test, s; saved when the run ends."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._config = config

@@ -1,8 +1,8 @@
-"""The marker ``study``: tests that take long and protect something rare. They run when they are asked for.
+"""The marker ``study``: tests that take long and protect something rare. They run with ``--studies`` only.
 
 A plug-in of pytest, which `tests/conftest.py` loads. A study names the files or folders that it covers:
 ``@pytest.mark.study("rhot_app/barehand")``. ``--studies`` adds all of them to a run, ``--studies=REVISION`` those whose
-files differ from that revision. `tests/house/test_studies.py` holds them against the list in CONTRIBUTING.md.
+files differ from that revision. `tests/house/test_studies.py` compares them with the list in CONTRIBUTING.md.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ALL = "all"
 COLLECTED = pytest.StashKey[list[pytest.Item]]()
-"""What pytest found before the studies were left out."""
+"""All tests that pytest collected, with the studies that do not run."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -29,7 +29,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def covers(item: pytest.Item) -> tuple[str, ...] | None:
-    """The files and folders that a study covers; None for a test that is none."""
+    """The files and folders that a study covers; None for a test that is no study."""
     marker = item.get_closest_marker("study")
     return None if marker is None else marker.args
 
@@ -46,26 +46,31 @@ def is_covered(file: str, paths: tuple[str, ...]) -> bool:
     return any(file == path or file.startswith(f"{path}/") for path in paths)
 
 
-def chosen(items: list[pytest.Item], asked: str | None) -> list[pytest.Item]:
-    """The tests to run, without the studies that nobody asked for."""
-    changed = changed_since(asked) or [] if asked not in (None, ALL) else []
-    return [item for item in items if (paths := covers(item)) is None or asked == ALL
-            or any(is_covered(file, paths) for file in changed)]
+def selected(items: list[pytest.Item], option: str | None) -> list[pytest.Item]:
+    """The tests to run by the option ``--studies``: `ALL`, a git revision, or None for no studies."""
+    if option == ALL:
+        return items
+    changed = [] if option is None else changed_since(option) or []
+
+    def runs(item: pytest.Item) -> bool:
+        paths = covers(item)
+        return paths is None or any(is_covered(file, paths) for file in changed)
+
+    return [item for item in items if runs(item)]
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     config.stash[COLLECTED] = list(items)
-    kept = chosen(items, config.getoption("--studies"))
-    running = set(kept)
-    left_out = [item for item in items if item not in running]
-    if left_out:
-        config.hook.pytest_deselected(items=left_out)
+    kept = selected(items, config.getoption("--studies"))
+    deselected = set(items).difference(kept)
+    if deselected:
+        config.hook.pytest_deselected(items=list(deselected))
         items[:] = kept
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
-    asked = config.getoption("--studies")
-    if asked not in (None, ALL) and changed_since(asked) is None:
-        return f"studies: none, as git knows no revision {asked!r} here"
+    option = config.getoption("--studies")
+    if option not in (None, ALL) and changed_since(option) is None:
+        return f"studies: none, as git knows no revision {option!r} here"
     return None

@@ -1,5 +1,5 @@
-"""Compiles the numerical code in processes of its own: what a rig needs before its engine starts, and the rest while
-the window is open, with the time that nobody else wants. No Qt."""
+"""Compiles the numerical code in processes of its own: what a rig needs before its engine starts, and the rest in idle
+time while the window is open. No Qt."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TITLE = "Compiling the numerical code, once; this takes a minute"
 
 
 def part_of(rig: Rig) -> str:
-    """Which part of `rhot_app.warm.PARTS` the tracker of a rig is."""
+    """The part of `rhot_app.warm.PARTS` that the tracker of a rig needs."""
     if rig.tracker.kind == "classic":
         return WINDOW if rig.tracker.ik == "fabrik" else "other solvers"
     return "contours" if rig.tracker.contours else "estimator"
@@ -29,11 +29,11 @@ def part_of(rig: Rig) -> str:
 
 def compile_part(part: str, report: Report, started: Callable[[int], object] = lambda pid: None,
                  command: Sequence[str] = COMMAND) -> None:
-    """Compile a part unless that has been done, and report how far it is; `started` is told the process.
+    """Compile a part unless it is compiled, and report the progress; `started` gets the id of the process.
 
     Raises EngineError when it fails, or when the process is ended.
     """
-    if not _has_to_do(part):
+    if not _is_missing(part):
         return
     report(TITLE, 0.0)
     with _start([*command, part]) as process:
@@ -47,8 +47,8 @@ def compile_part(part: str, report: Report, started: Callable[[int], object] = l
         raise EngineError(f"The numerical code could not be compiled: {reason}")
 
 
-def _has_to_do(part: str) -> bool:
-    """Whether a part is not compiled, and what would be compiled can be kept."""
+def _is_missing(part: str) -> bool:
+    """Whether a part is not compiled yet; False where compiled code cannot be kept."""
     return VARIABLE in os.environ and not is_complete(part)
 
 
@@ -57,16 +57,16 @@ def _start(command: Sequence[str]) -> subprocess.Popen[str]:
                             text=True)
 
 
-def _follow(process: subprocess.Popen[str], step: Callable[[int, int], object]) -> str:
-    """Tell `step` the steps done and to do, until the process ends; returns what it said last besides."""
+def _follow(process: subprocess.Popen[str], progress: Callable[[int, int], object]) -> str:
+    """Call `progress` with the steps done and their number until the process ends; returns its last other line."""
     assert process.stdout is not None
-    said = "the process was ended."
+    last = "the process was ended."
     for line in process.stdout:
-        if match := re.match(r"(\d+) of (\d+) compiled", line):
-            step(int(match[1]), int(match[2]))
+        if match := re.match(r"(\d+) of (\d+) steps compiled", line):
+            progress(int(match[1]), int(match[2]))
         elif line.strip():
-            said = line.strip()
-    return said
+            last = line.strip()
+    return last
 
 
 class BackgroundCompilation:
@@ -74,30 +74,30 @@ class BackgroundCompilation:
 
     def __init__(self, command: Sequence[str] = COMMAND) -> None:
         self.sentence = ""
-        """How far it is, or why it failed; empty when there is nothing to say. Any thread may read it."""
+        """Its progress, or why it failed; empty before and after it. Any thread may read it."""
         self._command = command
         self._process: subprocess.Popen[str] | None = None
 
     def start(self) -> None:
-        """Begin, unless it has begun or there is nothing to do."""
-        if self._process is None and _has_to_do(ALL):
+        """Start, unless it has started or everything is compiled."""
+        if self._process is None and _is_missing(ALL):
             self._process = _start([*self._command, ALL, "--background"])
             threading.Thread(target=self._watch, args=(self._process,), name="compilation", daemon=True).start()
 
     def close(self) -> None:
-        """End it; what has been compiled stays, and the next start goes on."""
+        """End it. The next start goes on where it ended."""
         if self._process is not None and self._process.poll() is None:
             self._process.terminate()
             self._process.wait()
 
     def _watch(self, process: subprocess.Popen[str]) -> None:
         with process:
-            reason = _follow(process, self._say)
+            reason = _follow(process, self._report)
         self.sentence = ""
         if process.returncode > 0:
             self.sentence = (f"The numerical code of other trackers and of calibrations could not be compiled, so that "
                              f"they begin slowly: {reason}")
 
-    def _say(self, done: int, steps: int) -> None:
+    def _report(self, done: int, steps: int) -> None:
         self.sentence = ("The numerical code of other trackers and of calibrations is being compiled, once: "
                          f"{done} of {steps} steps.")

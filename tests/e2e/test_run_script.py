@@ -42,10 +42,10 @@ def test_every_command_with_a_window_gets_a_screen(command: str, tmp_path: Path)
 def test_a_long_step_says_how_far_it_is(tmp_path: Path) -> None:
     program = """LOG=log
 sleep() { [ ! -e asked ] || touch told; until [ -s log ]; do command sleep 0.02; done; touch asked; }
-logged bash -c "echo 1 of 9 compiled; until [ -e told ]; do sleep 0.02; done"; echo ended
+logged bash -c "echo 1 of 9 steps compiled; until [ -e told ]; do sleep 0.02; done"; echo ended
 logged false || echo failed"""
     lines = said(start(program, "say", "logged", cwd=tmp_path)).splitlines()
-    assert re.fullmatch(r" +\d+ s: 1 of 9 compiled", lines[0]), lines
+    assert re.fullmatch(r" +\d+ s: 1 of 9 steps compiled", lines[0]), lines
     assert lines[-2:] == ["ended", "failed"]
 
 

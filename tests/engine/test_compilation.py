@@ -18,7 +18,7 @@ from rhot_app.warm import PARTS
 from rhot_node.compiled import ALL, VARIABLE, WINDOW, mark_complete
 from rhot_node.files import resource_path
 
-STEPS = "print('0 of 2 compiled'); print('a warning'); print('1 of 2 compiled; tracker: 3 s')"
+STEPS = "print('0 of 2 steps compiled'); print('a warning'); print('1 of 2 steps compiled; tracker: 3 s')"
 WAITING = f"import time; {STEPS.replace(')', ', flush=True)')}; time.sleep(1000)"
 
 

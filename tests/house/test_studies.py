@@ -6,10 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
-from studies import COLLECTED, changed_since, chosen, covers, is_covered
+from studies import ALL, COLLECTED, changed_since, covers, is_covered, selected
 
 ROOT = Path(__file__).parents[2]
-MOST = 0.03
+MOST_SHARE = 0.03  # of all tests
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def collected(request: pytest.FixtureRequest) -> list[pytest.Item]:
 
 
 def listed() -> dict[str, tuple[str, ...]]:
-    """By test function, the files that CONTRIBUTING.md says it covers."""
+    """By study, the files that it covers, as CONTRIBUTING.md lists them."""
     rows = re.findall(r"^\| `(test_\w+)` \| (.+) \|$", (ROOT / "CONTRIBUTING.md").read_text(), re.MULTILINE)
     return {name: tuple(re.findall(r"`([^`]+)`", files)) for name, files in rows}
 
@@ -31,17 +31,17 @@ def test_every_study_is_listed(collected: list[pytest.Item]) -> None:
     if {item.path for item in collected} >= set((ROOT / "tests").rglob("test_*.py")):  # a run of all tests
         assert listed().keys() == found.keys(), "what is listed is marked"
         studies = sum(covers(item) is not None for item in collected)
-        assert studies <= MOST * len(collected), f"{studies} of {len(collected)} tests are studies"
+        assert studies <= MOST_SHARE * len(collected), f"{studies} of {len(collected)} tests are studies"
 
 
 def test_what_a_study_covers_exists(collected: list[pytest.Item]) -> None:
-    paths = {path for item in collected for path in covers(item) or ()} | {path for row in listed().values()
-                                                                           for path in row}
+    paths = {path for item in collected for path in covers(item) or ()}
+    paths.update(*listed().values())
     assert not [path for path in sorted(paths) if not (ROOT / path).exists()]
 
 
-class Item:
-    """A test, or a study of the files `paths`."""
+class FakeItem:
+    """A test of pytest, marked as a study where `paths` are given."""
 
     def __init__(self, *paths: str) -> None:
         self.marker = pytest.mark.study(*paths).mark if paths else None
@@ -50,17 +50,17 @@ class Item:
         return self.marker
 
 
-def test_studies_run_when_they_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    test, hand, wire = Item(), Item("rhot_app/hand", "rhot_app/state.py"), Item("rhot_node/wire")
+def test_the_option_selects_studies(monkeypatch: pytest.MonkeyPatch) -> None:
+    test, hand, wire = FakeItem(), FakeItem("rhot_app/hand", "rhot_app/state.py"), FakeItem("rhot_node/wire")
     items: list[object] = [test, hand, wire]
-    assert chosen(items, None) == [test] and chosen(items, "all") == items  # type: ignore[arg-type]
+    assert selected(items, None) == [test] and selected(items, ALL) == items  # type: ignore[arg-type]
     monkeypatch.setattr("studies.changed_since", lambda revision: ["README.md", "rhot_app/hand/dh.py"])
-    assert chosen(items, "HEAD~20") == [test, hand]  # type: ignore[arg-type]
+    assert selected(items, "HEAD~20") == [test, hand]  # type: ignore[arg-type]
     monkeypatch.setattr("studies.changed_since", lambda revision: None)
-    assert chosen(items, "HEAD~20") == [test]  # type: ignore[arg-type]
+    assert selected(items, "HEAD~20") == [test]  # type: ignore[arg-type]
     assert is_covered("rhot_app/state.py", ("rhot_app/state.py",))
     assert not is_covered("rhot_app/handfit/solve.py", ("rhot_app/hand",))
 
 
-def test_git_knows_what_has_changed() -> None:
+def test_an_unknown_revision_is_no_list_of_changes() -> None:
     assert changed_since("no such revision") is None

@@ -1,4 +1,4 @@
-"""What every test of the window needs: one OpenGL platform, no home directory, windows on a fake engine."""
+"""Fixtures of the tests of the window: one OpenGL platform, documents in a temporary folder, a fake engine."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from rhot_app.ui.scene.surface import choose_format  # noqa: E402
 
 
 class Bench(Person):
-    """A person in front of the main window on a fake engine."""
+    """A user of the main window on a fake engine."""
 
     def __init__(self, folder: Path, backend: FakeBackend | None = None, scheme: str = "dark",
                  make_solver: Callable[[], Solver] = InProcessSolver, settings: Settings | None = None) -> None:
@@ -47,43 +47,43 @@ class Bench(Person):
         self.window = MainWindow(self.controller, settings, make_solver)
         if QApplication.palette().color(QPalette.ColorRole.Window).name() != scheme_named(scheme).window:
             self.window.appearance.set_scheme(scheme)
-        self.window.screen_parts.pacer = FramePacer(most_hz=4.0)  # software OpenGL is slow, and few tests look at it
+        self.window.screen_parts.pacer = FramePacer(most_hz=4.0)  # software OpenGL is slow
         super().__init__(self.window)
 
     def clock(self) -> float:
-        """Seconds of the window and its engine."""
+        """The time of the window and its engine, s."""
         return time.monotonic() + self._passed_s
 
     def let_pass(self, seconds: float) -> None:
-        """So much time passes at once."""
+        """Advance the clock."""
         self._passed_s += seconds
 
     def told(self) -> Any:
         return self.window.toolbar.badge.word, self.window.advice.texts
 
     def close_rig(self) -> None:
-        """Back to the first page."""
+        """Go back to the first page."""
         self.window.actions_.close_rig.trigger()
         self.until(lambda: self.window.welcome.twin_button.isVisible() and not self.controller.working)
 
     def see_newer_states(self) -> None:
-        """Two states that come from now on are drawn, and what the engine says now has arrived."""
+        """Wait until two new states are drawn and two new statuses of the engine have arrived."""
         scene, live = self.window.screen_parts.scene, self.controller.live
         for _ in range(2):
             shown, status = scene.state, live.status
             self.until(lambda shown=shown, status=status: scene.state is not shown and live.status is not status)
 
     def said(self, *words: str) -> bool:
-        """Whether one of the sentences at the bottom has all these words."""
+        """Whether one of the sentences at the bottom contains all these words."""
         return any(all(word in text for word in words) for text in self.window.advice.texts)
 
     @property
     def calm(self) -> bool:
-        """Whether nothing is wrong, as the window says."""
+        """Whether the window says that nothing is wrong."""
         return self.said("in order")
 
     def track(self) -> None:
-        """Bring the window to the simulated rig, tracking, with nothing wrong, from wherever it is."""
+        """From any state of the window, track the simulated rig with nothing wrong."""
         self.backend.calm()
         self.window.passing.clear()
         if self.controller.rig is None:
@@ -103,7 +103,7 @@ class Bench(Person):
 
 @pytest.fixture(scope="session")
 def themed(qapp: Any) -> Any:
-    """The application in its own colours."""
+    """The application with its theme."""
     choose_format()
     apply_theme(qapp, scheme_named("dark"))
     return qapp
@@ -111,13 +111,13 @@ def themed(qapp: Any) -> Any:
 
 @pytest.fixture(autouse=True)
 def own_documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Recordings of the tests never land in the user's own folders."""
+    """Recordings of the tests are written to a temporary folder."""
     monkeypatch.setenv("XDG_DOCUMENTS_DIR", str(tmp_path))
 
 
 @pytest.fixture(scope="session", autouse=True)
 def nothing_compiled() -> Iterator[None]:
-    """No process compiles a tracker before an engine uses it: fake ones need none, and real ones do it themselves."""
+    """No tracker is compiled before an engine starts: fake engines need none, and real ones compile themselves."""
     with pytest.MonkeyPatch.context() as patch:
         for module in (proposal, session):
             patch.setattr(module, "compile_part", lambda *args: None)
@@ -125,7 +125,7 @@ def nothing_compiled() -> Iterator[None]:
 
 
 def benches(folder: Path) -> Iterator[Callable[..., Bench]]:
-    """Yields what makes windows that share one settings file; all are closed in the end."""
+    """Yields a function that makes windows with one settings file; all are closed at the end."""
     opened: list[Bench] = []
 
     def make(backend: FakeBackend | None = None, scheme: str = "dark", **options: Any) -> Bench:
@@ -157,7 +157,7 @@ def make_shared_bench(themed: Any, tmp_path_factory: pytest.TempPathFactory) -> 
 
 @pytest.fixture(scope="module")
 def shared_bench(make_shared_bench: Callable[..., Bench]) -> Bench:
-    """One window for all tests of a module; making one takes a second with software OpenGL."""
+    """One window for all tests of a module; with software OpenGL, making one takes a second."""
     return make_shared_bench()
 
 

@@ -1,4 +1,4 @@
-"""A person in front of a window: clicks, keys, and the patience to wait for what the window does."""
+"""A simulated user of a window: clicks, keys, and waiting for what the window does."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ LEFT, NONE = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
 
 
 def pause(seconds: float) -> None:
-    """Let Qt run. `QTest.qWait` would do so as well, but it lets no other thread of Python's run meanwhile."""
+    """Let Qt run. `QTest.qWait` would block the other Python threads meanwhile."""
     loop = QEventLoop()
     QTimer.singleShot(round(1000 * seconds), loop.quit)
     loop.exec()
 
 
 def wait(condition: Callable[[], Any], timeout_s: float = PATIENCE_S, told: Callable[[], Any] = lambda: "") -> None:
-    """Let Qt run until `condition` holds; fails with what `told` gives when it never does."""
+    """Let Qt run until `condition` holds; fails with the message `told` when it never does."""
     end = time.monotonic() + timeout_s
     while time.monotonic() < end and not condition():
         pause(0.005)
@@ -32,7 +32,7 @@ def wait(condition: Callable[[], Any], timeout_s: float = PATIENCE_S, told: Call
 
 
 class Person:
-    """Clicks and keys on one window, which is shown and has the keyboard."""
+    """A user of one window, which is shown and has the keyboard focus."""
 
     def __init__(self, window: Any) -> None:
         self.window = window
@@ -41,25 +41,25 @@ class Person:
         assert QTest.qWaitForWindowActive(window)
 
     def told(self) -> Any:
-        """What a failure says of the window."""
+        """The window's state, for the message of a failure."""
         return self.window.windowTitle()
 
     def until(self, condition: Callable[[], Any], timeout_s: float = PATIENCE_S) -> None:
-        """Let the window run until `condition` holds; the last look happens after the time is up."""
+        """Let the window run until `condition` holds, which is checked once more after the time is up."""
         wait(condition, timeout_s, self.told)
 
     def run(self, seconds: float) -> None:
-        """Let the window run for a while: for what must not happen."""
+        """Let the window run for so long."""
         pause(seconds)
 
     def click(self, widget: QWidget, at: QPoint | None = None) -> None:
-        """Click the middle of a widget, or another place of it."""
+        """Click the centre of a widget, or another point of it."""
         assert widget.isVisible() and widget.isEnabled()
         QTest.mouseClick(widget, LEFT, NONE, at or widget.rect().center())
 
     def keep(self, name: str, least_colours: int, take: Callable[[], QImage] | None = None,
              settle_s: float = 1.0) -> None:
-        """Take a picture for the guide, of the screen where the window stands or by `take`, once it shows enough."""
+        """Take a picture for the guide, of the window on the screen or by `take`, once it has `least_colours`."""
         take = take or (lambda: picture_of(self.window))
         if UPDATE:
             self.run(settle_s)
@@ -67,7 +67,7 @@ class Person:
         check(name, take(), least_colours)
 
     def drag(self, widget: QWidget, *places: QPoint) -> None:
-        """Press at the first place, move over the others, let go at the last."""
+        """Press the button at the first place, move over the others, release it at the last."""
         QTest.mousePress(widget, LEFT, NONE, places[0])
         for place in places[1:]:
             QTest.mouseMove(widget, place)
@@ -78,7 +78,7 @@ class Person:
         QTest.keyClick(widget or self.window, key, modifier)
 
     def type(self, field: Any, text: str) -> None:
-        """Click into a field and type something instead of what stands there."""
+        """Replace the text of a field by typing."""
         self.click(field)
         field.selectAll()
         QTest.keyClicks(field, text)

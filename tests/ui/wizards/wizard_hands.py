@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from patience import PATIENCE_S
 from person import NONE, Person, wait
 from PySide6.QtCore import Qt
 from screen_pictures import SIZE
+
+
+def opened(launcher, window):
+    """The window, "wizard" or "fit", that a launcher is opening."""
+    failures = []
+    launcher.failed.connect(failures.append)
+    wait(lambda: getattr(launcher, window) is not None or failures)
+    assert not failures
+    return getattr(launcher, window)
 
 
 class Hands(Person):
@@ -37,24 +47,28 @@ class Hands(Person):
         self.until(self.frame.next_button.isEnabled)
         self.click(self.frame.next_button)
 
-    def record(self, seconds=0.01):
-        """Space: a movement of so many seconds."""
+    def record(self, seconds=0.01, picture=""):
+        """Space: a movement of so many seconds, with a picture of the page for the guide while it lasts."""
         step = self.window.step
         step.seconds = seconds
         self.frame.middle.setFocus()
         self.key(Qt.Key.Key_Space)
-        self.until(lambda: step.phase == "recorded")
+        if picture:
+            self.until(lambda: step.phase == "recording")
+            self.run(0.6 * seconds)
+            self.keep(picture)
+        self.until(lambda: step.phase == "recorded", seconds + PATIENCE_S)
 
-    def solved(self):
+    def solved(self, timeout_s=PATIENCE_S):
         """Wait for the report of a step that solves."""
         step = self.window.step
-        self.until(lambda: step.report is not None or step.view().hint)
+        self.until(lambda: step.report is not None or step.view().hint, timeout_s)
         assert step.report is not None, step.view().hint
         return step.report
 
     def use(self):
-        """On the last page: use what is proposed."""
-        assert self.window.step.usable
+        """On the last page: use what is proposed, once that is allowed."""
+        self.until(lambda: self.window.step.usable)
         self.next()
         self.until(lambda: self.window.step.state == "used")
 

@@ -6,8 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from paint_scene import other_colours
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtTest import QTest
+from PySide6.QtCore import Qt
 
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.project import FilterSettings, OneEuroSettings
@@ -16,30 +15,7 @@ from rhot_node.config import load_settings
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
 
-
-def use(hands):
-    """The last page: use it, and see that it is used."""
-    hands.until(lambda: hands.window.frame.next_button.text() == "Use this calibration", 60.0)
-    hands.next()
-    hands.until(lambda: hands.window.frame.next_button.text() == "Close", 40.0)
-
-
-def recorded(hands, seconds, picture):
-    """Record a movement with Space, for so long; take a picture meanwhile."""
-    movement = hands.window.page.movement
-    movement.seconds = seconds
-    hands.key(Qt.Key.Key_Space)
-    hands.until(lambda: movement.phase == "recording")
-    hands.run(0.6 * seconds)
-    hands.keep(picture)
-    hands.until(lambda: movement.phase == "recorded", seconds + 30.0)
-
-
-def solved(hands, seconds=120.0):
-    """Wait for the result of the page."""
-    step = hands.window.step
-    hands.until(lambda: step.report is not None or step.view().hint, seconds)
-    assert step.report is not None, step.view().hint
+SOLVING_S = 120.0
 
 
 @pytest.mark.study("rhot_app/ui/wizards", "rhot_app/calibration/time")
@@ -47,15 +23,15 @@ def test_the_time_of_the_cameras_is_found(simulated_rig, open_on_rig):
     truth = simulated_rig.truth
     late = msgspec.structs.replace(truth.nodes[1], time_offset_s=0.02)
     simulated_rig.use(msgspec.structs.replace(truth, nodes=(truth.nodes[0], late)))
-    simulated_rig.stage.show(HandShow("wave"))
+    simulated_rig.twin.show(HandShow("wave"))
     hands = open_on_rig("time")
-    recorded(hands, 15.0, "time-wave")
+    hands.record(15.0, "time-wave")
     hands.next()
-    solved(hands)
+    hands.solved(SOLVING_S)
     hands.keep("time-result")
     hands.next()
     hands.keep("time-accept", 8)
-    use(hands)
+    hands.use()
     assert simulated_rig.saved.nodes[1].time_offset_s == pytest.approx(0.0, abs=0.003)
 
 
@@ -65,21 +41,21 @@ def test_depth_is_found_without_a_board(simulated_rig, open_on_rig):
     page = hands.window.page
     page.marker.setCurrentText("index")
     for number, distance_m in enumerate((0.3, 0.4, 0.55, 0.75, 1.0), 1):
-        simulated_rig.stage.show(MarkerShow(marker="index", distance_m=distance_m))
+        simulated_rig.twin.show(MarkerShow(marker="index", distance_m=distance_m))
         page.distance.setValue(100.0 * distance_m)
         for _ in range(40):
             hands.run(0.5)
             hands.click(page.take_button)
             if len(page.distances.rows) == number:
                 break
-        assert len(page.distances.rows) == number, hands.window.frame.hint.text()
+        assert len(page.distances.rows) == number, hands.frame.hint.text()
     hands.keep("depth-measure")
     hands.next()
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None)
+    hands.until(lambda: hands.frame.verdict.verdict is not None)
     hands.keep("depth-law")
     hands.next()
     hands.keep("depth-accept", 8)
-    use(hands)
+    hands.use()
     left, right = simulated_rig.truth.nodes
     baseline_m = float(np.linalg.norm(np.subtract(right.pose.translation_m, left.pose.translation_m)))
     depth = simulated_rig.saved.depth
@@ -88,21 +64,18 @@ def test_depth_is_found_without_a_board(simulated_rig, open_on_rig):
 
 
 def click_marker(hands, camera, at):
-    view = hands.window.frame.wall.views[camera]
-    place = view._place()
-    QTest.mouseClick(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
-                     QPoint(round(place.target.x() + (at[0] + 0.5) * place.scale),
-                            round(place.target.y() + (at[1] + 0.5) * place.scale)))
+    view = hands.frame.wall.views[camera]
+    hands.click(view, view.to_widget(*at))
 
 
 @pytest.mark.study("rhot_app/ui/wizards", "rhot_app/calibration/colour")
 def test_colours_are_learnt(simulated_rig, open_on_rig):
     truth = simulated_rig.truth
     simulated_rig.use(msgspec.structs.replace(truth, markers=other_colours(truth.markers)))
-    simulated_rig.stage.show(HandShow("still"))
+    simulated_rig.twin.show(HandShow("still"))
     hands = open_on_rig("colours")
     step = hands.window.step
-    hands.until(lambda: step._masked and hands.window.feed.newest("left") is not None)
+    hands.until(lambda: step.masked and hands.window.feed.newest("left") is not None)
     hands.run(1.0)
     image = from_bgr(hands.window.feed.newest("left").bgr)
     seen = {truth.markers.ids[mark.index]: (mark.x, mark.y) for mark in FastDetector(truth.markers).detect(image)}
@@ -112,19 +85,19 @@ def test_colours_are_learnt(simulated_rig, open_on_rig):
         assert name in step.gathering.names, step.problem
     assert step.chosen == SKIN
     click_marker(hands, "left", (seen["wrist"][0], seen["wrist"][1] + 40.0))
-    simulated_rig.stage.show(HandShow("grasp"))
+    simulated_rig.twin.show(HandShow("grasp"))
     hands.until(lambda: step.view().may_go_on, 90.0)
     hands.keep("colours-pick")
     hands.next()
-    solved(hands)
+    hands.solved(SOLVING_S)
     hands.run(1.0)
     hands.keep("colours-mask")
     hands.next()
-    solved(hands)
+    hands.solved(SOLVING_S)
     hands.keep("colours-apart")
     hands.next()
     hands.keep("colours-accept", 10)
-    use(hands)
+    hands.use()
     saved = simulated_rig.saved.markers
     for name in ("left", "right"):
         assert load_settings(simulated_rig.session.directory / f"{name}.node.json").markers == saved
@@ -132,13 +105,12 @@ def test_colours_are_learnt(simulated_rig, open_on_rig):
     for mark in found:
         x, y = seen[saved.ids[mark.index]]
         assert mark.found and np.hypot(mark.x - x, mark.y - y) < 3.0, saved.ids[mark.index]
-    hands.click(hands.window.page.restore_button)
-    hands.until(lambda: hands.sentence == "The old one is back.", 40.0)
+    hands.restore()
 
 
 @pytest.mark.study("rhot_app/ui/wizards", "rhot_app/calibration/hand")
 def test_bones_are_measured(simulated_rig, open_on_rig):
-    simulated_rig.stage.show(HandShow("sweep"))
+    simulated_rig.twin.show(HandShow("sweep"))
     hands = open_on_rig("bones")
     for bone, length_mm in (("index.proximal", 44.0), ("index.medial", 25.5)):
         hands.window.page.boxes[bone].setValue(length_mm)
@@ -146,13 +118,13 @@ def test_bones_are_measured(simulated_rig, open_on_rig):
     for _ in range(2):
         hands.key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     hands.next()
-    recorded(hands, 25.0, "bones-movement")
+    hands.record(25.0, "bones-movement")
     hands.next()
-    solved(hands)
+    hands.solved(SOLVING_S)
     hands.keep("bones-hand", 12)
     hands.next()
     hands.keep("bones-accept", 8)
-    use(hands)
+    hands.use()
     true, found = (rig.hand.fingers["index"] for rig in (simulated_rig.truth, simulated_rig.saved))
     assert sum(found.bones_mm) == pytest.approx(sum(true.bones_mm), rel=0.1)
 
@@ -161,17 +133,17 @@ def test_bones_are_measured(simulated_rig, open_on_rig):
 def test_filters_are_tuned(simulated_rig, open_on_rig):
     lazy = OneEuroSettings(min_cutoff_hz=0.05, beta=0.0)
     simulated_rig.use(msgspec.structs.replace(simulated_rig.truth, filters=FilterSettings(pixel=lazy, position=lazy)))
-    simulated_rig.stage.show(HandShow("still"))
+    simulated_rig.twin.show(HandShow("still"))
     hands = open_on_rig("filters")
-    recorded(hands, 12.0, "filters-still")
+    hands.record(12.0, "filters-still")
     hands.next()
-    simulated_rig.stage.show(HandShow("wave"))
-    recorded(hands, 20.0, "filters-fast")
+    simulated_rig.twin.show(HandShow("wave"))
+    hands.record(20.0, "filters-fast")
     hands.next()
-    solved(hands)
+    hands.solved(SOLVING_S)
     hands.keep("filters-result")
     hands.next()
     hands.keep("filters-accept", 8)
-    use(hands)
+    hands.use()
     saved = simulated_rig.saved.filters
     assert saved.position.min_cutoff_hz > 0.05 and saved.position.beta > 0.0, "a fast hand is followed"

@@ -1,4 +1,4 @@
-"""Wizards from start to saved rig on the simulated rig: real processes, real pictures, a board that is moved about."""
+"""Wizards that need a board or only the cameras, from start to saved rig on the simulated rig, by real processes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_cameras_are_put_together(simulated_rig, open_on_rig):
     right = msgspec.structs.replace(truth.nodes[1], pose=CameraPose(translation_m=(0.06, 0.0, 0.0)))
     simulated_rig.use(msgspec.structs.replace(truth, nodes=(truth.nodes[0], right)))
     hands = open_on_rig("stereo")
-    simulated_rig.stage.show(BoardShow())
+    simulated_rig.twin.show(BoardShow())
     hands.type(hands.window.page.square, "25")
     hands.until(lambda: hands.sentence == "Seen by left and right: this is the board.", 60.0)
     hands.keep("stereo-board")
@@ -41,22 +41,21 @@ def test_cameras_are_put_together(simulated_rig, open_on_rig):
     hands.window.page.baseline.setValue(75.0)
     hands.keep("stereo-length")
     hands.next()
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None, 60.0)
+    hands.until(lambda: hands.verdict is not None, 60.0)
     hands.keep("stereo-result")
-    assert hands.window.frame.verdict.verdict.acceptable, hands.window.frame.verdict.verdict
+    assert hands.verdict.acceptable, hands.verdict
     hands.next()
-    simulated_rig.stage.show(BoardShow(on_table=True))
+    simulated_rig.twin.show(BoardShow(on_table=True))
     for _ in range(20):  # pictures of before may still be on their way
         hands.run(0.5)
         hands.key(Qt.Key.Key_Space)
         if hands.sentence == "The table is known: press Next.":
             break
-    assert hands.sentence == "The table is known: press Next.", hands.window.frame.hint.text()
+    assert hands.sentence == "The table is known: press Next.", hands.hint
     hands.keep("stereo-table")
     hands.next()
     hands.keep("stereo-accept", 8)
-    hands.next()
-    hands.until(lambda: hands.window.frame.next_button.text() == "Close", 40.0)
+    hands.use()
     saved = simulated_rig.saved
     assert saved.up == "z" and saved.nodes[0].pose.translation_m[2] > 0.1
     assert baseline_of(saved) == pytest.approx(baseline_of(truth), abs=0.0005)
@@ -68,7 +67,7 @@ def saved_exposures(simulated_rig):
 
 
 def obeyed_exposures(simulated_rig):
-    return [camera.exposure_us for camera in simulated_rig.stage.state().cameras.values()]
+    return [camera.exposure_us for camera in simulated_rig.twin.state().cameras.values()]
 
 
 def test_cameras_are_set_and_the_nodes_keep_it(simulated_rig, open_on_rig):
@@ -77,15 +76,13 @@ def test_cameras_are_set_and_the_nodes_keep_it(simulated_rig, open_on_rig):
     hands.window.page.rows["exposure_us"].box.setValue(6.0)
     hands.until(lambda: obeyed_exposures(simulated_rig) == [6000.0, 6000.0])
     assert saved_exposures(simulated_rig) == before, "nothing is saved before it is used"
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None)
+    hands.until(lambda: hands.verdict is not None)
     hands.keep("cameras-settings")
     hands.next()
     hands.keep("cameras-accept", 8)
-    hands.next()
-    hands.until(lambda: hands.window.frame.next_button.text() == "Close")
+    hands.use()
     assert saved_exposures(simulated_rig) == [6000.0, 6000.0]
-    hands.click(hands.window.page.restore_button)
-    hands.until(lambda: hands.sentence == "The old one is back.")
+    hands.restore()
     assert saved_exposures(simulated_rig) == before
     hands.until(lambda: obeyed_exposures(simulated_rig) == before)
 
@@ -97,7 +94,7 @@ def test_a_lens_is_found(simulated_rig, open_on_rig):
     left = msgspec.structs.replace(truth.nodes[0], intrinsics=lens)
     simulated_rig.use(msgspec.structs.replace(truth, nodes=(left, truth.nodes[1])))
     hands = open_on_rig("lens")
-    simulated_rig.stage.show(BoardShow())
+    simulated_rig.twin.show(BoardShow())
     hands.type(hands.window.page.square, "25")
     hands.until(lambda: hands.sentence == "Seen by left: this is the board.", 60.0)
     hands.keep("lens-board")
@@ -106,12 +103,11 @@ def test_a_lens_is_found(simulated_rig, open_on_rig):
     hands.keep("lens-show")
     hands.until(lambda: len(hands.window.step.views) >= 17, 120.0)  # the twin never brings the board really near
     hands.next()
-    hands.until(lambda: hands.window.frame.verdict.verdict is not None, 60.0)
+    hands.until(lambda: hands.verdict is not None, 60.0)
     hands.keep("lens-result")
-    assert hands.window.frame.verdict.verdict.acceptable, hands.window.frame.verdict.verdict
+    assert hands.verdict.acceptable, hands.verdict
     hands.next()
     hands.keep("lens-accept", 8)
-    hands.next()
-    hands.until(lambda: hands.window.frame.next_button.text() == "Close", 40.0)
+    hands.use()
     found, true = simulated_rig.saved.nodes[0].intrinsics, truth.nodes[0].intrinsics
     assert found.fx == pytest.approx(true.fx, rel=0.01) and found.cx == pytest.approx(true.cx, abs=4.0)
