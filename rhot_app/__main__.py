@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import importlib
 import os
 import sys
@@ -13,7 +12,7 @@ from importlib.metadata import version
 from types import ModuleType
 
 from rhot_app.errors import RhotError, take_losses
-from rhot_node.errors import NodeError, printable_lines
+from rhot_node.errors import NodeError, nearest, printable_lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +135,8 @@ def _options(parser: argparse.ArgumentParser) -> list[str]:
 
 def _meant(strange: str, known: Iterable[str]) -> str:
     """The one of what is known that somebody may have meant by something strange, as the end of a sentence."""
-    near = difflib.get_close_matches(strange, known, n=1)
-    return f"; did you mean {near[0]}?" if near else ". See --help."
+    near = nearest(strange, known)
+    return f"; did you mean {near}?" if near else ". See --help."
 
 
 def _load(name: str) -> ModuleType:

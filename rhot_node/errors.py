@@ -1,5 +1,10 @@
 """Every error a node raises on purpose. A message says what was wrong, where, and what to do next."""
 
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
 
 def printable(text: str, limit: int = 400) -> str:
     """What somebody else wrote, safe for a terminal and a log: one line, control characters as escapes, cut off at
@@ -11,6 +16,11 @@ def printable(text: str, limit: int = 400) -> str:
 def printable_lines(text: str) -> str:
     """A sentence of our own, safe for a terminal whatever file names and answers it repeats."""
     return "\n".join(printable(line, 10_000) for line in text.split("\n"))
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """The one of what is `known` that somebody may have meant by `word`; "" where none is alike."""
+    return next(iter(difflib.get_close_matches(word[:80], known, n=1, cutoff=0.7)), "")
 
 
 class NodeError(Exception):

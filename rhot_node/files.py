@@ -20,7 +20,7 @@ from typing import Any, BinaryIO, Final, TypeVar
 
 import msgspec
 
-from rhot_node.errors import printable
+from rhot_node.errors import nearest, printable
 
 T = TypeVar("T")
 
@@ -38,11 +38,10 @@ _OTHER_FILES = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_I
 
 _PLACE = re.compile(r"(?P<what>.*) - at `\$\.?(?P<place>[^`]*)`", re.DOTALL)
 _COMPLAINTS = (
-    (re.compile(r"^Object contains unknown field `(.*)`$"),
-     r'there is no field "\1"; is it misspelt, or in the wrong place?'),
     (re.compile(r"^Object missing required field `(.*)`$"), r'the field "\1" is missing.'),
     (re.compile(r"^Invalid (?:enum )?value (.*)$"), r"\1 is not one of the values that this field can have."),
 )
+_UNKNOWN_FIELD = re.compile(r"^Object contains unknown field `(.*)`$", re.DOTALL)
 _KIND = re.compile(r"`([^`]*)`")
 _KINDS = {"int": "a whole number", "float": "a number", "str": "text", "bool": "true or false", "null": "null",
           "array": "a list", "object": "an object {...}"}
@@ -148,6 +147,11 @@ def _in_words(message: str, kind: type) -> str:
     match = _PLACE.fullmatch(message)
     what, place = (match["what"], match["place"]) if match else (message, "")
     values = _values_at(kind, place) if what.startswith("Invalid") else []
+    unknown = _UNKNOWN_FIELD.match(what)
+    if unknown:
+        near = nearest(unknown[1], _fields_at(kind, place))
+        what = f'there is no field "{unknown[1]}"; ' + (f'did you mean "{near}"?' if near else
+                                                         "is it misspelt, or in the wrong place?")
     for pattern, words in _COMPLAINTS:
         what = pattern.sub(words, what)
     if what.startswith("Expected `"):
@@ -159,13 +163,24 @@ def _in_words(message: str, kind: type) -> str:
 
 def _values_at(kind: type, place: str) -> list[str]:
     """The values that a field can have, as JSON, if they are few and known; `place` as in `nodes[...].kind`."""
-    kinds = [msgspec.inspect.type_info(kind)]
-    for name in [re.sub(r"\[.*", "", part) for part in place.split(".")]:
-        kinds = [inner for one in kinds for inner in _members(one)]
-        kinds = [field.type for one in kinds if isinstance(one, msgspec.inspect.StructType)
-                 for field in one.fields if field.encode_name == name]
-    return [json.dumps(value) for one in kinds for inner in _members(one)
-            if isinstance(inner, msgspec.inspect.LiteralType) for value in inner.values]
+    return [json.dumps(value) for one in _types_at(kind, place)
+            if isinstance(one, msgspec.inspect.LiteralType) for value in one.values]
+
+
+def _fields_at(kind: type, place: str) -> list[str]:
+    """The fields that an object can have there."""
+    return [field.encode_name for one in _types_at(kind, place)
+            if isinstance(one, msgspec.inspect.StructType) for field in one.fields]
+
+
+def _types_at(kind: type, place: str) -> list[msgspec.inspect.Type]:
+    """What can stand at a place of a document, those of unions and lists each for itself."""
+    kinds = _members(msgspec.inspect.type_info(kind))
+    for name in [re.sub(r"\[.*", "", part) for part in place.split(".") if part]:
+        fields = [field.type for one in kinds if isinstance(one, msgspec.inspect.StructType)
+                  for field in one.fields if field.encode_name == name]
+        kinds = [inner for one in fields for inner in _members(one)]
+    return kinds
 
 
 def _members(kind: msgspec.inspect.Type) -> list[msgspec.inspect.Type]:

@@ -26,6 +26,7 @@ from rhot_app.engine.status import Advice, EngineStatus
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig
 from rhot_app.recording.bookmarks import Bookmark, bookmark_record
+from rhot_app.recording.raw_log import begun_now
 from rhot_app.recording.recorder import Recorder
 from rhot_app.rig_history import accept
 from rhot_app.sources.links import new_session
@@ -108,10 +109,9 @@ class Engine:
             if self.recorder is not None:
                 raise EngineError(f"already recording to {self.recorder.path}; stop that recording first.")
             self._notice = ""
-            now = datetime.now(UTC)
             video = video and self._source.live
-            name = f"{now:%Y%m%dT%H%M%SZ}-{secrets.token_hex(4)}" if video else ""
-            about = {"created": now.isoformat(timespec="seconds"), **({"video": name} if video else {})}
+            name = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(4)}" if video else ""
+            about = begun_now(time.monotonic_ns()) | ({"video": name} if video else {})
             recorder = Recorder(path, self.rig, about)
             try:
                 self._source.record_to(recorder)

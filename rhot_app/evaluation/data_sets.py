@@ -48,15 +48,13 @@ what was found in them."""
 @dataclass(frozen=True, eq=False)
 class Order:
     """What a take shall show: a motion (name or file) in a scene, for how long, and over which network it is sent.
-    `sketched`: without pictures (`rhot_app.simulator.film.ideal_observations`), a hundred times faster. `missing`: ids
-    of markers that the hand does not wear."""
+    `sketched`: without pictures (`rhot_app.simulator.film.ideal_observations`), a hundred times faster."""
 
     scene: Scene
     motion: str
     seconds: float
     network: Network = CABLE
     sketched: bool = False
-    missing: frozenset[str] = frozenset()
 
     @property
     def title(self) -> str:
@@ -69,8 +67,6 @@ class Order:
                  asdict(ORDINARY) if self.sketched else False, _motion_digest(self.motion)]
         if self.scene.settings.markers.endswith(".json"):  # a file may say something else the next time
             facts.append(msgspec.to_builtins(self.scene.markers))
-        if self.missing:
-            facts.append(sorted(self.missing))
         digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
         kind = "sketched" if self.sketched else Path(self.scene.settings.markers).stem
         return f"{Path(self.motion).stem}-{self.seconds:g}s-{kind}-{self.scene.seed}-{digest[:12]}"
@@ -121,7 +117,7 @@ def data_set(order: Order, folder: Path, watch: Watch = lambda title: None) -> D
 
 
 def _film(order: Order, place: Path, progress: Progress | None) -> None:
-    shot = make_shot(order.scene, order.motion, order.seconds, order.missing)
+    shot = make_shot(order.scene, order.motion, order.seconds)
     with new_folder(place) as work:
         save_shot(shot, work)
         rig = load_rig(work / RIG_NAME)

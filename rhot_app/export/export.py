@@ -55,8 +55,10 @@ class Exported:
 
 
 def format_of(name: str | None, out: Path | None) -> str:
-    """The format that is asked for by name, or by the ending of the file to write. Raises ExportError."""
+    """The format that is asked for by its name or ending, or by the ending of the file to write. Raises
+    ExportError."""
     if name is not None:
+        name = next((found for found, one in FORMATS.items() if f".{name}" in one.endings), name)
         if name not in FORMATS:
             raise ExportError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}.")
         if out is not None and out.suffix.lower() not in FORMATS[name].endings:
@@ -152,7 +154,8 @@ def _prepared(tracked: TrackedLog, name: str, options: ExportOptions,
             rate_hz = options.rate_hz or max(float(round(camera_hz)), 1.0)
             resampler = Resampler(rate_hz, 1.0 / camera_hz) if uniform else None
             plan = Plan(path, tracked.rig, options.frame, options.units or FORMATS[name].units, options.hand,
-                        rate_hz if uniform else None, tracked.path.name, tracked.created, first_ns, options.smooth)
+                        rate_hz if uniform else None, tracked.path.name, tracked.created, first_ns, options.smooth,
+                        tracked.wall_clock_offset_ns)
         for states in held:
             given = states if resampler is None else resampler.take(states)
             if given is not None:

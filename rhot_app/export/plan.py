@@ -104,6 +104,7 @@ class Plan:
     created: str  # when it was begun, UTC
     first_ns: int  # master's time of the first state
     smooth: bool = False  # whether states use what came after them
+    wall_clock_offset_ns: int | None = None  # ns since 1970 less the master's clock; None: unknown
 
     @property
     def scale(self) -> float:

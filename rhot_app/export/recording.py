@@ -18,7 +18,7 @@ from rhot_app.export.states import HandStates, in_blocks
 from rhot_app.objects.observations import ObjectFrame
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, TrackerKind, load_rig, with_tracker
-from rhot_app.recording.raw_log import LogReader, Record
+from rhot_app.recording.raw_log import LogReader, Record, wall_clock_offset_ns
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
 from rhot_app.tracking.tracker import CameraObservations, ImageTracking, ObjectTracking, Tracker
@@ -49,6 +49,7 @@ class TrackedLog:
         self.losses: list[str] = []
         self.count = 0  # of states so far
         self.tracked = 0  # of them, with a hand
+        self._first_t_master_ns = 0
         self._progress = progress
         self._reader = LogReader(path)
         try:
@@ -68,6 +69,11 @@ class TrackedLog:
     def created(self) -> str:
         """When the log was begun, UTC, as it says itself; empty when it does not."""
         return str(self._reader.about.get("created", ""))
+
+    @property
+    def wall_clock_offset_ns(self) -> int | None:
+        """ns since 1970 less the master's clock, once there are states; None when the log does not say."""
+        return wall_clock_offset_ns(self._reader.about, self._first_t_master_ns)
 
     @property
     def camera_rate_hz(self) -> float:
@@ -101,6 +107,7 @@ class TrackedLog:
         done, reported = 0, 0
         try:
             for record in self._reader:
+                self._first_t_master_ns = self._first_t_master_ns or record.t_master_ns
                 done += _RECORD_BYTES + len(record.data)
                 if done - reported >= _REPORT_BYTES:
                     reported = done

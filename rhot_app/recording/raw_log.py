@@ -14,6 +14,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, BinaryIO, Final, Protocol
 
@@ -95,6 +96,24 @@ class Losses:
         records = "1 record" if self.places == 1 else f"{self.places} records"
         skipped = f"{places} skipped ({self.skipped_bytes} bytes, at least {records})"
         return f"{header}; {skipped}" if header else skipped
+
+
+def begun_now(t_master_ns: int) -> dict[str, Any]:
+    """What a log's header says of its beginning: now, which is `t_master_ns` by the master's clock."""
+    return {"created": datetime.now(UTC).isoformat(timespec="milliseconds"), "created_t_master_ns": t_master_ns}
+
+
+def wall_clock_offset_ns(about: dict[str, Any], first_t_master_ns: int) -> int | None:
+    """ns since 1970, UTC, less the master's clock, by a log's header; None when it does not say when it was begun.
+    `first_t_master_ns`: of its first record, which stands for its beginning in older logs."""
+    at_ns = about.get("created_t_master_ns", first_t_master_ns)
+    try:
+        created = datetime.fromisoformat(about.get("created", ""))
+    except (ValueError, TypeError):
+        return None
+    since = (created if created.tzinfo else created.replace(tzinfo=UTC)) - datetime.fromtimestamp(0, UTC)
+    since_ns = since // timedelta(microseconds=1) * 1000
+    return since_ns - at_ns if type(at_ns) is int and 0 <= at_ns <= since_ns < 2**62 else None
 
 
 def encode_header(rig: Rig, about: dict[str, Any]) -> bytes:

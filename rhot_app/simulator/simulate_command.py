@@ -25,7 +25,6 @@ MOST_PICTURES = 999
 POINT_SIGMA_PX = 0.12
 
 
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot simulate``."""
     add_scene_arguments(parser)
@@ -39,11 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "each place where it is held still")
     parser.add_argument("--points", type=float, nargs="?", const=POINT_SIGMA_PX, default=None, metavar="PX",
                         help="no pictures: a raw log (DIR/points.log) of every marker's position in both, with a noise "
-                             f"of PX (default {POINT_SIGMA_PX:g}); nothing hides anything, and no cube's tags")
+                             f"of PX (default {POINT_SIGMA_PX:g}); only --hide hides anything, and no cube's tags")
     parser.add_argument("--depth-table", default=None, metavar="CM,CM,...",
                         help="no pictures: a table (DIR/table.csv) of disparities of a marker held at these distances")
     parser.add_argument("--hide", action="append", default=[], metavar="ID",
-                        help="leave a marker unpainted; repeatable")
+                        help="leave a marker of the hand unpainted; repeatable")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
 
 
@@ -80,6 +79,9 @@ def _check(args: argparse.Namespace) -> None:
 
     if not 0.0 < args.seconds <= SECONDS_MAX:
         raise SimulatorError(f"--seconds is a number above 0 and up to {SECONDS_MAX:.0f}, not {args.seconds:g}.")
+    if args.depth_table is not None and (args.hide or args.pictures is not None):
+        raise SimulatorError(f"--depth-table and --{'hide' if args.hide else 'pictures'} exclude each other: the table "
+                             "is of a single marker, without pictures.")
     if args.pictures is not None and args.points is not None:
         raise SimulatorError("--pictures and --points exclude each other: points are seen without pictures.")
     if args.pictures is not None and not 1 <= args.pictures <= MOST_PICTURES:

@@ -59,6 +59,7 @@ def test_mistakes_end_with_a_sentence_and_2(tmp_path: Path) -> None:
         (("--motoin", "wave"), "there is no option '--motoin' here"),
         (("--frobnicate",), "there is no option '--frobnicate' here"),
         (("exprt", "no.log"), "there is no command 'exprt'; did you mean export?"),
+        (("nonsense",), "there is no command 'nonsense'. See --help."),
         (("dance",), "there is no command 'dance'"), (("engine",), "--rig"), (("engine", "--rig"), "--rig"),
         (("replay",), "LOG"),
     ]:

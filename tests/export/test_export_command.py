@@ -39,6 +39,13 @@ def test_every_format_by_its_ending(name: str, log: Path, tmp_path: Path, capsys
     assert left(tmp_path) == [out.name] and out.stat().st_size > 10_000
 
 
+def test_a_binary_gltf_file_by_the_formats_ending(log: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.rhotlog"
+    path.symlink_to(log)
+    assert main(["export", str(path), "--format", "glb", "--tracker", "classic"]) == 0
+    assert (tmp_path / "a.glb").read_bytes().startswith(b"glTF")
+
+
 def test_smoothed_states_are_exported_and_the_file_says_so(log: Path, tmp_path: Path,
                                                            capsys: pytest.CaptureFixture[str]) -> None:
     for name, more in (("a", ()), ("b", ("--smooth",))):

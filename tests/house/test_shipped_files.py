@@ -31,14 +31,20 @@ def test_shipped_files_load(path: Path) -> None:
         assert kind, f"{path} does not say its format"
 
 
+def test_the_example_nodes_run_on_one_machine_and_the_first_has_the_ports_of_a_pi() -> None:
+    ports = [(settings.udp_port, settings.control_port, settings.preview_port, settings.pairing_port)
+             for settings in (load_settings(resource_path("nodes", f"{name}.json")) for name in ("left", "right"))]
+    assert len({*ports[0], *ports[1]}) == 8
+    assert {(node.udp_port, node.control_port, node.preview_port, node.pairing_port)
+            for node in load_rig(resource_path("rigs", "two_pis.json")).nodes} == {ports[0]}
+
+
 def test_the_nodes_of_the_example_are_those_of_its_rig() -> None:
     rig = load_rig(resource_path("rigs", "two_pis.json"))
     assert [node.name for node in rig.nodes] == ["left", "right"]
     for node in rig.nodes:
         settings = load_settings(resource_path("nodes", f"{node.name}.json"))
         assert settings.node_id == node.node_id
-        assert (settings.udp_port, settings.control_port, settings.preview_port) == (
-            node.udp_port, node.control_port, node.preview_port)
         assert settings.broadcast_port == rig.broadcast.port
         assert (settings.camera.width, settings.camera.height) == (node.intrinsics.width, node.intrinsics.height)
         assert settings.markers == rig.markers == load_markers(resource_path("markers", "rhot6.json"))

@@ -52,7 +52,8 @@ BROKEN: list[tuple[dict[str, Any], str]] = [
 
 
 SAID: list[tuple[dict[str, Any], str]] = [
-    ({"camera": {"exposure_ms": 4}}, 'camera: there is no field "exposure_ms"; is it misspelt, or in the wrong place?'),
+    ({"camera": {"exposure_ms": 4}}, 'camera: there is no field "exposure_ms"; did you mean "exposure_us"?'),
+    ({"bind_adress": "x"}, 'there is no field "bind_adress"; did you mean "bind_address"?'),
     ({"prot": 1}, 'there is no field "prot"; is it misspelt, or in the wrong place?'),
     ({"markers": {}}, 'markers: the field "markers" is missing.'),
     ({"node_id": "a"}, "node_id: expected a whole number, not text."),

@@ -18,7 +18,16 @@ from patience import eventually
 from rhot_app.__main__ import main
 from rhot_app.errors import RecordingError, RhotError
 from rhot_app.project import save_rig
-from rhot_app.recording.raw_log import LogReader, Losses, Record, RecordKind, encode_header, encode_record
+from rhot_app.recording.raw_log import (
+    LogReader,
+    Losses,
+    Record,
+    RecordKind,
+    begun_now,
+    encode_header,
+    encode_record,
+    wall_clock_offset_ns,
+)
 from rhot_app.recording.recorder import Recorder
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 
@@ -306,3 +315,19 @@ def test_a_command_tells_losses_from_nothing_read(tmp_path: Path, capsys: pytest
         if code == 3:
             assert "1 damaged place was skipped" in said.err
             assert json.loads(said.out)["damaged_places"] == 1
+
+
+@pytest.mark.parametrize(("about", "offset"), [
+    ({"created": "1970-01-01T00:01:40.5+00:00", "created_t_master_ns": 7}, 100_500_000_000 - 7),
+    ({"created": "1970-01-01T00:01:40"}, 99_000_000_000),  # an older log: its first record stands for its beginning
+    ({"created": "1970-01-01T01:01:40+01:00", "created_t_master_ns": 0}, 100_000_000_000),
+    ({}, None), ({"created": "today"}, None), ({"created": 5}, None), ({"created": "0001-01-01T00:00:00"}, None),
+    ({"created": "9999-01-01T00:00:00"}, None), ({"created": "1970-01-02", "created_t_master_ns": "0"}, None),
+    ({"created": "1970-01-02", "created_t_master_ns": -1}, None),
+])
+def test_the_wall_clock_is_known_by_the_logs_beginning(about: dict[str, object], offset: int | None) -> None:
+    assert wall_clock_offset_ns(about, 1_000_000_000) == offset
+
+
+def test_a_log_that_begins_now_says_so() -> None:
+    assert wall_clock_offset_ns(begun_now(5), 0) == pytest.approx(time.time_ns(), abs=60e9)

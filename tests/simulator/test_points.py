@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from rhot_app.__main__ import main
 from rhot_app.calibration.recorded_observations import read_observations
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
@@ -45,6 +46,23 @@ def test_every_marker_is_seen_where_it_was_at_its_own_rows_time(tmp_path: Path) 
         assert np.abs(every.mean(axis=0)).max() < 0.02
         lost = 1.0 - len(every) / (80 * 19)
         assert 0.02 < lost < 0.15
+
+
+def test_a_hidden_marker_is_in_no_log(tmp_path: Path) -> None:
+    write_points(make_shot(scene("rhot6"), "grasp", 0.5, frozenset({"ring", "wrist"})), tmp_path / "take", PointNoise())
+    rig, table = read_observations(tmp_path / "take" / LOG_NAME)
+    hidden = [rig.markers.ids.index(name) for name in ("ring", "wrist")]
+    truth = load_truth(tmp_path / "take" / "truth.npz")
+    for seen, frames in zip(table.cameras, truth.cameras, strict=True):
+        found = np.isfinite(seen.pixels[:, :, 0]).any(axis=0)
+        assert not found[hidden].any() and found.sum() == 4 and not frames.visible[:, hidden].any()
+
+
+@pytest.mark.parametrize("arguments", [["--show", "marker"], ["--show", "board"], ["--bare"], ["--depth-table", "40"]])
+def test_what_has_no_markers_to_hide_is_refused(arguments: list[str], tmp_path: Path,
+                                                capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", *arguments, "--hide", "thumb", "--seconds", "0.1", "--out", str(tmp_path / "take")]) == 2
+    assert "--hide" in capsys.readouterr().err and list(tmp_path.iterdir()) == []
 
 
 def test_a_single_marker_has_a_log_too(tmp_path: Path) -> None:

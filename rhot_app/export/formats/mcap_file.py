@@ -99,14 +99,17 @@ OF_HAND: Final = tuple(name for name in hand_state(0)["properties"]
 
 
 class McapWriter:
-    """Streams messages in compressed chunks; their time is the master's monotonic clock."""
+    """Streams messages in compressed chunks; their time is the wall clock's, of logs that say when they were begun."""
 
     def __init__(self, plan: Plan) -> None:
         require("mcap", "an MCAP file")
         from mcap.writer import Writer
 
         self.notes: list[str] = []
+        if plan.wall_clock_offset_ns is None:
+            self.notes.append("the log does not say when it was begun; the file's times are of the master's own clock")
         self._plan = plan
+        self._offset_ns = plan.wall_clock_offset_ns or 0
         self._frame_id = "rig" if plan.frame == "rig" else "palm"
         self._encode = msgspec.json.Encoder().encode
         self._file = plan.path.open("wb")
@@ -120,8 +123,9 @@ class McapWriter:
             "/hand/state": self._channel("/hand/state", "rhot.HandState", hand_state(len(plan.rig.markers.ids)))}
         if plan.rig.objects:
             self._channels["/objects/state"] = self._channel("/objects/state", "rhot.ObjectStates", OBJECT_STATES)
-        self._send("/tf_static", plan.first_ns, {"transforms": [
-            _transform(plan.first_ns, f"camera_{node.name}", node.pose.translation_m, node.pose.rotation_wxyz)
+        first_ns = plan.first_ns + self._offset_ns
+        self._send("/tf_static", first_ns, {"transforms": [
+            _transform(first_ns, f"camera_{node.name}", node.pose.translation_m, node.pose.rotation_wxyz)
             for node in plan.rig.nodes]})
 
     def _channel(self, topic: str, name: str, schema: Message) -> int:
@@ -137,7 +141,8 @@ class McapWriter:
             {"name": [one.name] * len(states), **{name: getattr(one, name).tolist() for name in OBJECT_ARRAYS},
              "validity": list(one.validities)} for one in states.objects]
         tables = [_rows(states, with_markers=True)] + [_rows(hand) for _, hand in hands[1:]]
-        for number, t_ns in enumerate(states.t_master_ns.tolist()):
+        for number, t_master_ns in enumerate(states.t_master_ns.tolist()):
+            t_ns = t_master_ns + self._offset_ns
             rows = [{name: column[number] for name, column in table.items()} for table in tables]
             self._send("/hand/state", t_ns, rows[0] | ({"other": rows[1]} if len(rows) > 1 else {}))
             shown = [hand.tracked[number] and row["joint_positions"][0][0] == row["joint_positions"][0][0]
@@ -154,7 +159,7 @@ class McapWriter:
                        for one, turn in zip(states.objects, object_turns, strict=True)
                        if np.isfinite(one.world_from_object[number]).all()]
             if states.objects:
-                self._send("/objects/state", t_ns, {"t_master_ns": t_ns, "objects": [
+                self._send("/objects/state", t_ns, {"t_master_ns": t_master_ns, "objects": [
                     {name: column[number] for name, column in table.items()} for table in object_tables]})
             if frames:
                 self._send("/tf", t_ns, {"transforms": frames})

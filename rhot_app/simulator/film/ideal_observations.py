@@ -59,6 +59,8 @@ def ideal_observations(shot: Shot, index: int,
     body = shot.scene_object.thing
     if not isinstance(body, HandBody):
         raise SimulatorError(f"a {shot.scene_object.name} is not seen without pictures; show a hand.")
+    if shot.hidden:
+        raise SimulatorError("a hand with unpainted markers is not seen without pictures; render them.")
     eye = _Eye(shot, body, index, noise)
     frames = [[eye.observation(number, marker) for marker in range(body.marker_count)]
               for number in range(len(eye.times_s))]

@@ -134,8 +134,8 @@ class _Stream:
         centres = np.full((len(times), ways.shape[1], 3), np.nan)
         pixels = np.full((len(times), ways.shape[1], 2), np.nan)
         size = self._camera.width, self._camera.height
-        for marker in range(ways.shape[1]):
-            if np.isfinite(ways[:, marker]).all():
+        for marker, name in enumerate(self._scene.markers.ids):
+            if name not in shot.hidden and np.isfinite(ways[:, marker]).all():
                 centres[:, marker], pixels[:, marker] = at_own_rows(
                     CubicSpline(grid, ways[:, marker]), self._camera.project, times, row_time_s, size)
         return centres, pixels

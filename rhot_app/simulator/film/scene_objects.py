@@ -63,6 +63,8 @@ def make_object(show: Show, scene: Scene, hidden: frozenset[str] = frozenset()) 
 
     Raises SimulatorError, RigError, CalibrationError when there is no such motion, marker or board.
     """
+    if hidden and not isinstance(show, HandShow):
+        raise SimulatorError("only a hand with markers can leave some unpainted; leave out --hide, or show one.")
     match show:
         case HandShow():
             model, motion, settings = *_moved_hand(show.motion, scene), scene.settings
