@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,7 +136,7 @@ class LiveFeed:
     def step(self, camera: str, asker: Asker) -> None:
         """Ask for one picture and keep it; a failure becomes the camera's problem."""
         try:
-            picture = ask_picture(asker, camera, self._node_ids[camera])
+            picture = ask_picture(asker.command, camera, self._node_ids[camera])
         except RhotError as exc:
             with self._lock:
                 self._problems[camera] = str(exc)
@@ -153,9 +154,9 @@ def _overtaken(picture: Picture, newest: Picture) -> bool:
     return picture.number <= newest.number and newest.t_node_ns - picture.t_node_ns < _OVERTAKEN_NS
 
 
-def ask_picture(asker: Asker, camera: str, node_id: int) -> Picture:
-    """One still of one node; raises EngineError when the node or the engine gives none."""
-    answer = asker.command("still", node_id=node_id, format="jpeg")
+def ask_picture(command: Callable[..., dict[str, Any]], camera: str, node_id: int) -> Picture:
+    """One still of one node by the engine's `command`; raises EngineError when the node or the engine gives none."""
+    answer = command("still", node_id=node_id, format="jpeg")
     received_ns = time.monotonic_ns()
     jpeg, about = answer.get("jpeg"), answer.get("answer", {})
     try:

@@ -123,6 +123,7 @@ def test_centimetres_are_found_out(hands):
     enter(hands.window.page.boxes["middle.proximal"], "4.9")
     verdict = hands.verdict
     assert verdict is not None and not verdict.acceptable and "centimetres" in verdict.findings[0].sentence
+    assert "Next" not in hands.sentence and not hands.frame.next_button.isEnabled()
 
 
 def test_the_coach_counts_what_each_finger_has_done():

@@ -12,7 +12,7 @@ from wizard_rig import FakeRigAsker
 from rhot_app.errors import EngineError
 from rhot_app.ui.wizards.foreground import make_plan
 from rhot_app.ui.wizards.steps import foreground_steps
-from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, SkinStep, findings_of, mask_of, propose
+from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, SceneWatch, SkinStep, findings_of, mask_of, propose
 from rhot_node.foreground_store import ForegroundStore
 from rhot_node.network.pictures import PictureBox
 
@@ -103,15 +103,40 @@ def test_from_an_empty_scene_to_what_the_nodes_keep(hands, nodes):
     assert not any(store.report(640, 480)["background"] for store in nodes.stores.values())
 
 
-def test_a_hand_that_was_there_all_the_time_is_not_found(hands, nodes):
+def test_a_hand_that_was_there_all_the_time_is_noticed_and_not_found(hands, nodes):
     nodes.hand = True
     hands.click(hands.window.page.learn_button)
-    hands.until(lambda: hands.sentence.startswith("Learnt"))
+    hands.until(lambda: hands.verdict is not None)
+    assert hands.verdict.codes == {"skin"} and not hands.window.step.view().done
+    assert "empty?" in hands.sentence
     hands.next()
     hands.click(hands.window.page.learn_button)
     hands.until(lambda: hands.verdict is not None and "No skin" in hands.hint)
     assert "0.5%" in hands.verdict.findings[0].sentence
     assert not hands.frame.next_button.isEnabled()
+
+
+def scene(number, kind):
+    """The desk in noise: empty, with a still thing of wood, or with something that moves."""
+    rng = np.random.default_rng(number)
+    rows = np.linspace(60, 130, 480)[:, None, None]
+    bgr = rows * (1.1, 1.0, 0.8) * np.ones((1, 640, 1)) + rng.normal(0.0, 3.0, (480, 640, 3))
+    if kind == "wood":
+        bgr[100:250, 200:400] = (70, 104, 142)
+    if kind == "moving":
+        cv2.circle(bgr, (200 + 15 * number, 240), 40, (120, 40, 30), -1)
+    if kind == "flicker":
+        bgr *= 1.0 + 0.1 * (-1) ** number
+    return np.clip(bgr, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize(("kind", "codes"), [("empty", set()), ("flicker", set()), ("wood", {"skin"}),
+                                             ("moving", {"moves"})])
+def test_a_scene_in_which_something_moves_or_is_of_skins_colour_is_not_called_empty(kind, codes):
+    watch = SceneWatch()
+    for number in range(8):
+        watch.add(scene(number, kind))
+    assert {finding.code for finding in watch.findings("left")} == codes
 
 
 def test_closing_without_use_forgets_what_was_tried_out(hands, nodes):

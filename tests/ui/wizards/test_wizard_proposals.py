@@ -15,7 +15,7 @@ from rhot_app.errors import EngineError, RigError
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui.models.proposal import NodeChange, Proposal, RigChange, Row, age_text, in_force
 from rhot_app.ui.models.words import Remaining
-from rhot_app.ui.wizards.models.step import AcceptStep
+from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep, StepView
 
 
 @pytest.fixture
@@ -105,6 +105,16 @@ def test_only_what_a_rigs_file_keeps_is_said_to_come_back_at_any_time(tmp_path):
     unsaved = [RigChange(change.before, change.after, path, "calibration") for path in (None, tmp_path / "gone.json")]
     for nothing_kept in ((), (node,), *((one,) for one in unsaved)):
         assert "any time" not in ways_back(*nothing_kept)
+
+
+@pytest.mark.parametrize("grade", list(Grade))
+def test_no_step_is_done_or_says_next_beside_a_verdict_that_forbids(grade):
+    verdict = judge("rms 9 px", [Finding("rms", grade, "rms 9 px")])
+    view = StepView("Enough: press Next.", done=True, verdict=verdict)
+    assert view.done == view.may_go_on == ("Next" in view.sentence) == verdict.acceptable
+    solve = SolveStep(lambda: None, lambda report: verdict)
+    solve.take_result(object())
+    assert solve.view().done == ("go on" in solve.view().sentence) == verdict.acceptable
 
 
 def test_the_last_step_refuses_a_poor_result_and_comes_back(asker):

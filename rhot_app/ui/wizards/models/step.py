@@ -53,9 +53,10 @@ class Task:
 class StepView:
     """Everything that is shown of a step at one moment.
 
-    `done` ticks it off and lets the person go on; `passable` lets them go on although more would be better. `hint` says
-    why Next must wait. `overlays` are by camera; `pictures` by camera are shown instead of the live ones. `kept` counts
-    what was captured: the pictures light up when it grows.
+    `done` ticks it off and lets the person go on, never with a `verdict` that forbids to use the result: the sentence
+    then says so. `passable` lets them go on although more would be better. `hint` says why Next must wait. `overlays`
+    are by camera; `pictures` by camera are shown instead of the live ones. `kept` counts what was captured: the
+    pictures light up when it grows.
     """
 
     sentence: str
@@ -67,6 +68,11 @@ class StepView:
     pictures: Mapping[str, Picture] = field(default_factory=dict)
     kept: int = 0
     passable: bool = False
+
+    def __post_init__(self) -> None:
+        if self.done and self.verdict is not None and not self.verdict.acceptable:
+            object.__setattr__(self, "done", False)
+            object.__setattr__(self, "sentence", "Mend what the verdict says.")
 
     @property
     def may_go_on(self) -> bool:
@@ -205,7 +211,7 @@ class SolveStep(ChartedStep):
                             "It did not work out." if self._problem else "One moment.", hint=self._problem)
         verdict = self._verdict_of(self.report)
         sentence = "Look at the result, then go on." if verdict.acceptable else "Read what is wrong, then go back."
-        return StepView(sentence, done=True, verdict=verdict)
+        return StepView(sentence, done=verdict.acceptable, verdict=verdict)
 
 
 # -- Step: accept or restore, the last of every wizard -----------------------------------------------------------------

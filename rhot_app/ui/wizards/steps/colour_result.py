@@ -250,7 +250,7 @@ class ApartStep(ChartedStep):
         hint = "; ".join(apart[:3]) + "." if apart else "No two colours overlap."
         sentence = "Read what may be mistaken for a marker, then go on." if judged.verdict.acceptable else \
             "Read what is wrong, then go back."
-        return StepView(sentence, done=True, hint=hint, verdict=judged.verdict)
+        return StepView(sentence, done=judged.verdict.acceptable, hint=hint, verdict=judged.verdict)
 
 
 def hue_chart(report: ColourReport) -> Chart:

@@ -13,11 +13,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
+from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, judged_anew
 from rhot_app.errors import EngineError, RhotError
+from rhot_app.ui.backend.feed import ask_picture
 from rhot_app.ui.models.proposal import Command, Proposal, Row
 from rhot_app.ui.wizards.models.drawing import Layer, Overlay
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView
+from rhot_node.detect.foreground import BackgroundSums, no_foreground, skin_mask
 from rhot_node.errors import PictureError
 from rhot_node.pictures import decode_picture
 
@@ -34,6 +36,7 @@ WHOLE = 0.8
 
 _WAIT_S = 10.0  # beyond SECONDS, for a slow node
 _LOOK_S = 0.2
+_MOVES = 6.0  # times the median standard deviation of a pixel: no noise of a pixel in other light varies so
 _TINT = (60, 200, 255)
 
 
@@ -88,6 +91,41 @@ class LearningStep(Step):
         return self.learnt
 
 
+class SceneWatch:
+    """Looks at pictures of one camera while its node learns the empty scene: whether it is empty."""
+
+    def __init__(self) -> None:
+        self._sums = BackgroundSums()
+        self._skin = 0.0
+
+    @property
+    def seen(self) -> bool:
+        """Whether it has a picture."""
+        return self._sums.count > 0
+
+    def add(self, bgr: NDArray[np.uint8]) -> None:
+        """Take one picture (H, W, 3) BGR."""
+        small = np.asarray(cv2.resize(bgr, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+        self._sums.add(np.asarray(cv2.GaussianBlur(small, (3, 3), 0.0), np.uint8))
+        skin = cv2.morphologyEx(skin_mask(small[..., ::-1]).astype(np.uint8), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
+        count, _, stats, _ = cv2.connectedComponentsWithStats(skin, connectivity=8)
+        pieces = stats[1:, cv2.CC_STAT_AREA] / skin.size if count > 1 else np.zeros(0)
+        self._skin = max(self._skin, float(pieces[(pieces >= LEAST) & (pieces <= MOST)].max(initial=0.0)))
+
+    def findings(self, camera: str) -> list[Finding]:
+        """What may be a hand: what moves, and what has the colours of skin."""
+        sd = self._sums.learnt(no_foreground()).sd.max(axis=2)
+        moving = float(np.mean(sd > _MOVES * np.median(sd)))
+        if moving >= LEAST:
+            return [Finding("moves", Grade.POOR, f"{camera}: something moved in {moving:.1%} of the picture.",
+                            "What moves is no background.", "Keep out of the picture and learn it again.")]
+        if self._skin > 0.0:
+            return [Finding("skin", Grade.FAIR, f"{camera}: something in {self._skin:.1%} of the picture has the "
+                            "colours of skin.", "A hand that is learnt as background is not found there.",
+                            "If it is a hand or a face, take it away and learn again; if it is wood or cloth, go on.")]
+        return []
+
+
 class EmptyStep(LearningStep):
     """The scene without a hand."""
 
@@ -96,11 +134,13 @@ class EmptyStep(LearningStep):
     def __init__(self, cameras: Mapping[str, int]) -> None:
         super().__init__(cameras)
         self.before: dict[str, dict[str, Any]] = {}
+        self.verdict: Verdict | None = None
         self._until_s = 0.0
 
     def begin(self) -> None:
         """See `LearningStep`; the time runs from when the nodes have been asked."""
         super().begin()
+        self.verdict = None
         self._until_s = math.inf
 
     def learn(self, command: Command) -> str:
@@ -112,7 +152,10 @@ class EmptyStep(LearningStep):
                 if not self._stopped:
                     ask_node(command, node_id, "learn_background", seconds=SECONDS, save=False)
         self._until_s = time.monotonic() + SECONDS
+        watches = {name: SceneWatch() for name in self.nodes}
         while not self._stopped:
+            for name, watch in watches.items():
+                watch.add(ask_picture(command, name, self.nodes[name]).bgr)
             waiting = [name for name, node_id in self.nodes.items() if not self._has_learnt(command, node_id)]
             if not waiting:
                 break
@@ -120,6 +163,9 @@ class EmptyStep(LearningStep):
                 raise EngineError(f"{' and '.join(waiting)}: the background was not learnt in time. Look at the Nodes "
                                   "panel, then learn it again.")
             time.sleep(_LOOK_S)
+        if all(watch.seen for watch in watches.values()):
+            self.verdict = judge("the scene is learnt.", [finding for name, watch in watches.items()
+                                                          for finding in watch.findings(name)])
         return ""
 
     def _has_learnt(self, command: Command, node_id: int) -> bool:
@@ -137,11 +183,15 @@ class EmptyStep(LearningStep):
         done = 1.0 if self.learnt else 0.0
         if self.learning:
             done = min(max(1.0 - (self._until_s - time.monotonic()) / SECONDS, 0.0), 1.0)
+        verdict = self.verdict if self.learnt and not self.learning else None
         sentence = ("Keep out of the pictures." if self.learning else
-                    "Learnt. Go on, or learn it again after anything in the pictures has changed." if self.learnt else
+                    "Learnt. Go on, or learn it again after anything in the pictures has changed."
+                    if verdict is not None and verdict.grade is Grade.GOOD else
+                    "Is the scene empty? Read what was seen, and learn it again." if verdict is not None else
                     "Take the hand out of both pictures and leave everything as it will be. Then press Learn.")
-        return StepView(sentence, done=self.learnt and not self.learning, hint=self.problem,
-                        bars=(Bar("empty scene", done, f"{SECONDS:g} s of every camera"),))
+        return StepView(sentence, done=verdict is not None and verdict.grade is Grade.GOOD, hint=self.problem,
+                        bars=(Bar("empty scene", done, f"{SECONDS:g} s of every camera"),), verdict=verdict,
+                        passable=verdict is not None and verdict.acceptable)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -300,8 +350,9 @@ class ForegroundChange:
 def propose(empty: EmptyStep, skin: SkinStep) -> Proposal | None:
     """What both steps have learnt; None before."""
     verdict = skin.verdict
-    if not (empty.learnt and skin.learnt) or verdict is None:
+    if not (empty.learnt and skin.learnt) or verdict is None or empty.verdict is None:
         return None
+    verdict = judged_anew(verdict, empty.verdict.findings)
     rows = [row for name in empty.nodes for row in (
         Row(f"{name}: background", _background(empty.before.get(name, {})), "learnt now"),
         Row(f"{name}: skin", str(empty.before.get(name, {}).get("skin", "none")), "learnt now"))]
