@@ -33,7 +33,7 @@ def compile_part(part: str, report: Report, started: Callable[[int], object] = l
 
     Raises EngineError when it fails, or when the process is ended.
     """
-    if not _is_missing(part):
+    if not is_missing(part):
         return
     report(TITLE, 0.0)
     with _start([*command, part]) as process:
@@ -47,7 +47,7 @@ def compile_part(part: str, report: Report, started: Callable[[int], object] = l
         raise EngineError(f"The numerical code could not be compiled: {reason}")
 
 
-def _is_missing(part: str) -> bool:
+def is_missing(part: str) -> bool:
     """Whether a part is not compiled yet; False where compiled code cannot be kept."""
     return VARIABLE in os.environ and not is_complete(part)
 
@@ -80,7 +80,7 @@ class BackgroundCompilation:
 
     def start(self) -> None:
         """Start, unless it has started or everything is compiled."""
-        if self._process is None and _is_missing(ALL):
+        if self._process is None and is_missing(ALL):
             self._process = _start([*self._command, ALL, "--background"])
             threading.Thread(target=self._watch, args=(self._process,), name="compilation", daemon=True).start()
 
@@ -99,5 +99,5 @@ class BackgroundCompilation:
                              f"they begin slowly: {reason}")
 
     def _report(self, done: int, steps: int) -> None:
-        self.sentence = ("The numerical code of other trackers and of calibrations is being compiled, once: "
+        self.sentence = ("The code of other trackers and of calibrations is being compiled in the background, once: "
                          f"{done} of {steps} steps.")

@@ -97,7 +97,18 @@ def test_an_ended_run_says_nothing_and_leaves_nothing(script, how):
     assert screens(folder) == [] and not folder.exists()
 
 
+def test_a_client_that_leaves_before_the_window_opens_leaves_the_screen(script):
+    window = f"{sys.executable} {script.parent}/window.py"
+    client = f"{sys.executable} -c 'from PySide6.QtWidgets import QApplication; QApplication([])'"
+    script.write_text(script.read_text().replace(window, f'bash -c "{client}; exec {window}"'))
+    process, _folder = start(script)
+    process.terminate()
+    out, err = process.communicate(timeout=PATIENCE_S)
+    assert (out, err) == ("ended well\n", "")
+
+
 def test_a_killed_run_takes_window_and_screen_along(script):
+    script.write_text(script.read_text().replace("-terminate 30", "-terminate 1"))  # s to wait for other clients
     process, folder = start(script)
     process.kill()
     out, err = process.communicate(timeout=PATIENCE_S)

@@ -17,6 +17,7 @@ from rhot_app.hand.anthropometry import hand_length
 from rhot_app.project import DepthSettings, TrackerSettings, load_rig, save_rig
 from rhot_app.rig_history import versions
 from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
+from rhot_app.ui.models import proposal
 from rhot_app.ui.models.rows import rig_rows
 from rhot_app.ui.models.words import scale_text, settings_text, size_text
 from rhot_node.files import resource_path
@@ -87,11 +88,13 @@ def test_the_estimator_is_one_click_away_and_taken_back_with_one_key(opened):
     assert dialog.kinds["classic"].isChecked() and not dialog.undo_button.isEnabled()
 
 
-def test_it_stays_open_until_the_engine_has_changed_over(opened, qtbot):
+def test_it_stays_open_until_the_engine_has_changed_over(opened, qtbot, monkeypatch):
+    monkeypatch.setattr(proposal, "is_missing", lambda part: part == "estimator")
     go_on = threading.Event()
     desk = opened(synthetic_rig(), wait=lambda: None if go_on.wait(PATIENCE_S) else pytest.fail("never went on"))
     click_on_word(desk.dialog.kinds["estimator"])
     assert not desk.dialog.close_button.isEnabled()
+    assert "Compiling" in desk.dialog.sentence.text(), "whoever waits a minute learns why"
     desk.dialog.close()
     QTest.keyClick(desk.dialog, Qt.Key.Key_Escape)
     assert desk.dialog.isVisible()

@@ -27,7 +27,7 @@ from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, e
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.models.proposal import RigChange
+from rhot_app.ui.models.proposal import RigChange, progress_text
 from rhot_app.ui.models.words import (
     FLAT_MEANING,
     IK_METHODS,
@@ -192,14 +192,14 @@ class TrackerDialog(QDialog):
         """Take the last change back."""
         if self._job is None and self._made:
             change = self._made[-1]
-            self._start(lambda asker: change.restore(asker.command), lambda: self._undone(change))
+            self._start(change.before, lambda asker: change.restore(asker.command), lambda: self._undone(change))
 
     def _change(self, rig: Rig, reason: str) -> None:
         if self._job is None:
             change = RigChange(self._rig, rig, self._path, reason)
-            self._start(lambda asker: change.use(asker.command), lambda: self._done(change))
+            self._start(rig, lambda asker: change.use(asker.command), lambda: self._done(change))
 
-    def _start(self, work: Callable[[Asker], None], done: Callable[[], None]) -> None:
+    def _start(self, rig: Rig, work: Callable[[Asker], None], done: Callable[[], None]) -> None:
         def with_engine() -> None:
             asker = self._connect()
             try:
@@ -207,7 +207,7 @@ class TrackerDialog(QDialog):
             finally:
                 asker.close()
 
-        self.sentence.setText("The engine changes over …")
+        self.sentence.setText(progress_text(rig))
         self._fit()
         self._job = Job(lambda progress: with_engine(), lambda _: done(), self._failed, None, self).start()
         self._enable()

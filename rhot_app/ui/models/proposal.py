@@ -12,7 +12,7 @@ import msgspec
 
 from rhot_app import rig_history
 from rhot_app.calibration.verdict import Verdict
-from rhot_app.engine.compilation import compile_part, part_of
+from rhot_app.engine.compilation import TITLE, compile_part, is_missing, part_of
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
 
@@ -163,6 +163,11 @@ class Proposal:
         """The rig that a restore brings back; None when the rig stays as it is."""
         rigs = [change.before for change in self.changes if isinstance(change, RigChange)]
         return rigs[0] if rigs else None
+
+
+def progress_text(rig: Rig) -> str:
+    """What happens while `set_rig` runs."""
+    return f"{TITLE}. Then the engine changes over." if is_missing(part_of(rig)) else "The engine changes over …"
 
 
 def set_rig(command: Command, rig: Rig) -> None:
