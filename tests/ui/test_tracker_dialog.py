@@ -105,6 +105,15 @@ def test_it_stays_open_until_the_engine_has_changed_over(opened, qtbot, monkeypa
     assert not desk.dialog.isVisible()
 
 
+def test_it_stays_on_the_screen_when_it_grows(opened):
+    desk = opened(synthetic_rig())
+    dialog, screen = desk.dialog, desk.dialog.screen().availableGeometry()
+    dialog.move(0, screen.bottom() - dialog.height())
+    click_on_word(dialog.kinds["estimator"])
+    desk.settled("In force")
+    assert dialog.frameGeometry().bottom() <= screen.bottom()
+
+
 def test_fingers_and_limits_are_chosen_from_lists(opened):
     desk = opened(with_tracker(MODEL))
     dialog = desk.dialog

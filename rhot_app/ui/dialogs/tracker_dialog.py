@@ -268,7 +268,7 @@ class TrackerDialog(QDialog):
         self._fit()
 
     def _fit(self) -> None:
-        """As tall as its sentences, which wrap, need it."""
+        """As tall as its sentences, which wrap, need it; moved up where it would leave the screen."""
         layout = self.layout()
         if layout is not None:
             for part in (self.solver, self.details):
@@ -278,6 +278,9 @@ class TrackerDialog(QDialog):
                     inner.activate()
             layout.activate()
             self.setFixedHeight(layout.totalHeightForWidth(_WIDTH_PX))
+            below_px = self.frameGeometry().bottom() - self.screen().availableGeometry().bottom()
+            if self.isVisible() and below_px > 0:
+                self.move(self.x(), self.y() - below_px)
 
     def _enable(self) -> None:
         resting = self._job is None
