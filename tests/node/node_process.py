@@ -91,10 +91,11 @@ class Node:
         return heard
 
     def clock(self, session: int = 0) -> ClockReply:
-        self.say(ClockRequest(3, session, 5, time.monotonic_ns()))
+        asked_ns = time.monotonic_ns()
+        self.say(ClockRequest(3, session, 5, asked_ns))
         while True:
             message = self.hear()
-            if isinstance(message, ClockReply):
+            if isinstance(message, ClockReply) and message.t1_master_ns == asked_ns:  # none to an earlier request
                 return message
 
     def wait_for(self, state: NodeState, session: int = 0) -> None:
