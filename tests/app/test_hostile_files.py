@@ -10,12 +10,12 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from shipped_markers import RHOT6
 
 from rhot_app.__main__ import main
 from rhot_node.config import NodeSettings, load_settings
 from rhot_node.errors import SettingsError
 from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
 
 RIG = resource_path("rigs", "two_pis.json")
 PATIENCE_S = 20
@@ -111,7 +111,7 @@ def test_a_time_that_never_ends_is_refused(command: str, seconds: str, tmp_path:
 
 
 def test_a_rate_that_never_gives_a_frame_is_refused(tmp_path: Path) -> None:
-    settings = NodeSettings(1, "left", load_markers(resource_path("markers", "rhot6.json")))
+    settings = NodeSettings(1, "left", RHOT6)
     document = msgspec.to_builtins(settings)
     document["camera"]["fps"] = 1e-300
     (tmp_path / "node.json").write_text(json.dumps(document))

@@ -6,26 +6,21 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from shipped_rig import TWO_PIS
 
 from rhot_app import rig_history
 from rhot_app.errors import RigError
 from rhot_app.project import Rig, load_rig
-from rhot_node.files import resource_path
 
 
-@pytest.fixture
-def rig() -> Rig:
-    return load_rig(resource_path("rigs", "two_pis.json"))
+def named(name: str) -> Rig:
+    return msgspec.structs.replace(TWO_PIS, name=name)
 
 
-def named(rig: Rig, name: str) -> Rig:
-    return msgspec.structs.replace(rig, name=name)
-
-
-def test_what_was_there_can_be_brought_back(tmp_path: Path, rig: Rig) -> None:
+def test_what_was_there_can_be_brought_back(tmp_path: Path) -> None:
     path = tmp_path / "desk.json"
-    assert rig_history.accept(path, named(rig, "one"), "setting up") is None
-    rig_history.accept(path, named(rig, "two"), "Stereo calibration")
+    assert rig_history.accept(path, named("one"), "setting up") is None
+    rig_history.accept(path, named("two"), "Stereo calibration")
     (kept,) = rig_history.versions(path)
     assert kept.replaced_by == "stereo calibration"
     assert load_rig(kept.path).name == "one"
@@ -34,34 +29,34 @@ def test_what_was_there_can_be_brought_back(tmp_path: Path, rig: Rig) -> None:
     assert load_rig(rig_history.versions(path)[0].path).name == "two"  # restoring can be undone as well
 
 
-def test_the_same_rig_makes_no_version(tmp_path: Path, rig: Rig) -> None:
+def test_the_same_rig_makes_no_version(tmp_path: Path) -> None:
     path = tmp_path / "desk.json"
-    rig_history.accept(path, rig, "a")
-    assert rig_history.accept(path, rig, "b") is None
+    rig_history.accept(path, TWO_PIS, "a")
+    assert rig_history.accept(path, TWO_PIS, "b") is None
     assert rig_history.versions(path) == []
 
 
-def test_versions_are_newest_first_and_limited(tmp_path: Path, rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_versions_are_newest_first_and_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rig_history, "KEPT", 3)
     path = tmp_path / "desk.json"
     for number in range(6):
-        rig_history.accept(path, named(rig, f"rig {number}"), f"change {number}")
+        rig_history.accept(path, named(f"rig {number}"), f"change {number}")
     names = [load_rig(version.path).name for version in rig_history.versions(path)]
     assert names == ["rig 4", "rig 3", "rig 2"]
 
 
-def test_a_rig_broken_by_hand_is_kept_as_it_is(tmp_path: Path, rig: Rig) -> None:
+def test_a_rig_broken_by_hand_is_kept_as_it_is(tmp_path: Path) -> None:
     path = tmp_path / "desk.json"
     path.write_text("{ broken")
-    kept = rig_history.accept(path, rig, "repair")
+    kept = rig_history.accept(path, TWO_PIS, "repair")
     assert kept is not None
     assert kept.path.read_text() == "{ broken"
 
 
-def test_a_folder_that_cannot_be_written_changes_nothing(tmp_path: Path, rig: Rig) -> None:
+def test_a_folder_that_cannot_be_written_changes_nothing(tmp_path: Path) -> None:
     path = tmp_path / "desk.json"
-    rig_history.accept(path, rig, "first")
+    rig_history.accept(path, TWO_PIS, "first")
     path.with_name("desk.json.history").write_text("a file where the folder should be")
     with pytest.raises(RigError, match="nothing was changed"):
-        rig_history.accept(path, named(rig, "two"), "second")
-    assert load_rig(path) == rig
+        rig_history.accept(path, named("two"), "second")
+    assert load_rig(path) == TWO_PIS

@@ -5,14 +5,12 @@ import math
 import numpy as np
 import pytest
 from marker_rendering import SKIN, Canvas, capsule, disc
+from shipped_markers import RHOT6
 
 from rhot_node.detect.colour import learn_chroma, learn_chroma_from_pixels
 from rhot_node.detect.fast import FastDetector
 from rhot_node.errors import SettingsError
-from rhot_node.files import resource_path
-from rhot_node.markers import Marker, MarkerSet, load_markers
-
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
+from rhot_node.markers import Marker, MarkerSet
 
 
 @pytest.mark.parametrize("marker", RHOT6.markers, ids=RHOT6.ids)

@@ -6,14 +6,13 @@ import msgspec
 import numpy as np
 import pytest
 from marker_rendering import SKIN, Canvas, Rgb, band, capsule, disc
+from shipped_markers import RHOT6
 
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage
-from rhot_node.files import resource_path
-from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
 CLOTH: Rgb = (60, 90, 130)
 GREY: Rgb = (120, 122, 118)
 Offset = tuple[float, float]

@@ -5,13 +5,12 @@ import math
 import numpy as np
 import pytest
 from marker_rendering import SKIN, Canvas, Rgb, capsule, disc
+from shipped_markers import RHOT6
 
 from rhot_node.detect.fast import FastDetector
-from rhot_node.files import resource_path
-from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
 RGB: dict[str, Rgb] = {marker.id: marker.display_rgb for marker in RHOT6.markers}
 DOUBTS = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
 

@@ -9,17 +9,16 @@ import msgspec
 import numpy as np
 import pytest
 from marker_rendering import SKIN, Canvas, Rgb, disc
+from shipped_markers import RHOT6
 
 from rhot_node.detect.fast import GLANCE, FastDetector
 from rhot_node.detect.illuminant import Illuminant, gains_of
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.tracks import contour_pixels
 from rhot_node.detect.tracks.contour_pixels import COSINES, HALF_COSINES, HALF_SINES, NODES, SINES
-from rhot_node.files import resource_path
-from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag
 
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
 TIPS = MarkerSet(markers=RHOT6.markers[:5])
 PLACES = [(40.0 + 55.0 * k, 60.0 + 20.0 * (k % 2)) for k in range(5)]
 GREY: Rgb = (120, 122, 118)

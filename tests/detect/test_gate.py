@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from marker_rendering import SKIN, Canvas, capsule, disc
+from shipped_markers import RHOT6
 
 from rhot_node.detect.gate import ColourGate
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.search import AREA, LABEL
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
-
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
 
 
 def picture() -> YuvImage:

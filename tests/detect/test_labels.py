@@ -5,12 +5,10 @@ import math
 import numpy as np
 import pytest
 from marker_rendering import to_yuv
+from shipped_markers import RHOT6
 
 from rhot_node.detect.colour import acquisition_table, sector_table
-from rhot_node.files import resource_path
-from rhot_node.markers import ChromaModel, Marker, MarkerSet, load_markers
-
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
+from rhot_node.markers import ChromaModel, Marker, MarkerSet
 
 
 def label_of(table: np.ndarray, rgb: tuple[float, float, float]) -> int:

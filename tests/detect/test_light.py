@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from marker_rendering import SKIN, Canvas, capsule, disc, to_yuv
+from shipped_markers import RHOT6
 
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.illuminant import (
@@ -16,10 +17,8 @@ from rhot_node.detect.illuminant import (
     paint_rgb,
 )
 from rhot_node.detect.image import YuvImage
-from rhot_node.files import resource_path
-from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.markers import MarkerSet
 
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
 PLACES = {name: (40.0 + 47 * k, 60.0 + 31 * (k % 3)) for k, name in enumerate(RHOT6.ids)}
 
 # Encoded gains of red, green and blue: Planck's law through sRGB with its gamma, from 4100 K, luma of grey kept.

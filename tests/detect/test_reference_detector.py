@@ -5,13 +5,11 @@ import math
 import numpy as np
 import pytest
 from marker_rendering import SKIN, Canvas, capsule, disc
+from shipped_markers import RHOT6
 
 from rhot_node.detect import reference as r
-from rhot_node.files import resource_path
-from rhot_node.markers import Marker, MarkerSet, RangeModel, load_markers
+from rhot_node.markers import Marker, MarkerSet, RangeModel
 from rhot_node.wire.messages import MarkerFlag
-
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
 
 
 def scene(x: float, y: float, radius: float = 10.0, name: str = "ring") -> Canvas:

@@ -3,13 +3,11 @@
 import cv2
 import numpy as np
 import pytest
+from shipped_markers import RHOT6
 
 from rhot_node.detect import search as s
 from rhot_node.detect.colour import acquisition_table
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
 
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
 ANY_LUMA = np.tile(np.array([0, 255], dtype=np.uint8), (6, 1))
 ALL = np.array([False] + 6 * [True])
 

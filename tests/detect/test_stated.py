@@ -9,15 +9,14 @@ import msgspec
 import numpy as np
 import pytest
 from marker_rendering import SKIN, to_yuv
+from shipped_markers import RHOT6
 
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.tracks import track as st
-from rhot_node.files import resource_path
-from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerObservation
 
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
 GREY = np.array([96.0, 104.0, 118.0])
 LAMPS = {"above left": (-0.42, -0.62, 0.66), "right": (0.8, 0.1, 0.6), "in front": (0.0, -0.1, 1.0)}
 FINE = 4

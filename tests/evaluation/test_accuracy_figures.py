@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shipped_rig import TWO_PIS
 from synthetic_track import LATE_S, WORN, make_track, make_truth
 
 from rhot_app.evaluation.accuracy import accuracy, deviations, display_error, pooled, predicted, ratio, squares, worn_by
 from rhot_app.evaluation.compare import COLUMNS, Comparison, Judged, Run, consistency_table, table
 from rhot_app.evaluation.track import Predicted, TrackedStates
-from rhot_app.project import load_rig
 from rhot_app.simulator.film.truth import Truth
 from rhot_app.state import Knowledge
-from rhot_node.files import resource_path
 
 TIMES = np.arange(0.5, 3.5, 0.025)
 
@@ -101,6 +100,6 @@ def test_tables_put_trackers_side_by_side() -> None:
 
 
 def test_a_rig_says_which_fingers_wear_what() -> None:
-    worn = worn_by(load_rig(resource_path("rigs", "two_pis.json")))
+    worn = worn_by(TWO_PIS)
     assert worn.tips.tolist() == worn.tip_fingers.tolist() == [0, 1, 2, 3, 4]
     assert worn.angles.tolist() == list(range(21))

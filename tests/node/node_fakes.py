@@ -5,17 +5,25 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from shipped_markers import RHOT6
 
 from rhot_node.capture.camera import EndOfRecording, Frame
 from rhot_node.clock import NodeClock
+from rhot_node.config import NodeSettings, save_settings
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import CameraError
+from rhot_node.network.requests import SettingsStore
 from rhot_node.network.session import Stream
 from rhot_node.wire.messages import MarkerObservation, Observations
 
 SIZE = (64, 48)
+OF_ANY_PORT: dict[str, Any] = {"bind_address": "127.0.0.1", "udp_port": 0, "control_port": 0, "preview_port": 0,
+                               "pairing_port": 0, "broadcast_port": None}
+"""Settings of a node of this machine alone."""
 
 
 def grey_image(level: int = 128) -> YuvImage:
@@ -90,3 +98,15 @@ class FakeSender:
 
 
 LOST_CAMERA = CameraError("the plug was pulled")
+
+
+def node_settings(**changes: Any) -> NodeSettings:
+    """Those of node 3, which looks for rhot6."""
+    return NodeSettings(**{"node_id": 3, "name": "left", "markers": RHOT6, **changes})
+
+
+def saved_settings(path: Path, **changes: Any) -> SettingsStore:
+    """The settings of a running node, and their file."""
+    settings = node_settings(**changes)
+    save_settings(path, settings)
+    return SettingsStore(path, settings)

@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 import zmq
+from node_fakes import OF_ANY_PORT, saved_settings
 from patience import PATIENCE_S, eventually
+from shipped_markers import RHOT6
 
 from rhot_node.capture.stream import StreamHeader, pack_header
-from rhot_node.config import CameraSettings, ClockSettings, NodeSettings, save_settings
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
+from rhot_node.config import CameraSettings, ClockSettings
 from rhot_node.warm_up import warm_up_image
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import (
@@ -38,22 +38,17 @@ SIZE = (320, 240)
 PERIOD_NS = 25_000_000
 OFFSET_S = 5000.0
 READY_S = 400.0  # a first start compiles the detector, beside whatever else there is to do
-MARKERS = load_markers(resource_path("markers", "rhot6.json"))
 
 
 def i420() -> np.ndarray:
-    image = warm_up_image(MARKERS, SIZE)
+    image = warm_up_image(RHOT6, SIZE)
     return np.concatenate([image.y.ravel(), image.u.ravel(), image.v.ravel()])
 
 
 def write_settings(folder: Path, **changes: Any) -> Path:
-    values: dict[str, Any] = {
-        "node_id": 3, "name": "left", "markers": MARKERS, "bind_address": "127.0.0.1", "udp_port": 0,
-        "control_port": 0, "preview_port": 0, "pairing_port": 0, "broadcast_port": None, "trust": "open",
-        "camera": CameraSettings(width=SIZE[0], height=SIZE[1], fps=40), "clock": ClockSettings(OFFSET_S, 20.0)}
-    path = folder / "left.json"
-    save_settings(path, NodeSettings(**{**values, **changes}))
-    return path
+    camera, clock = CameraSettings(width=SIZE[0], height=SIZE[1], fps=40), ClockSettings(OFFSET_S, 20.0)
+    return saved_settings(folder / "left.json", **{**OF_ANY_PORT, "trust": "open", "camera": camera, "clock": clock,
+                                                   **changes}).path
 
 
 class Node:

@@ -9,25 +9,22 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import msgspec
 import numpy as np
 import pytest
 import zmq
-from node_fakes import grey_image
+from node_fakes import OF_ANY_PORT, grey_image, node_settings, saved_settings
 from patience import PATIENCE_MS, eventually, settled
 
 from rhot_node.capture.camera import Frame
 from rhot_node.clock import NodeClock
-from rhot_node.config import NodeSettings, load_settings, save_settings
+from rhot_node.config import load_settings
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import LinkError
-from rhot_node.files import resource_path
 from rhot_node.foreground_store import ForegroundStore
-from rhot_node.markers import load_markers
 from rhot_node.network.control import ControlServer
 from rhot_node.network.pairing import OfferFile, Reception
 from rhot_node.network.pictures import PictureBox
-from rhot_node.network.requests import Responder, SettingsStore
+from rhot_node.network.requests import Responder
 from rhot_node.network.session import Sessions
 
 RNG = np.random.default_rng(3)
@@ -42,13 +39,10 @@ class Served:
     """A control server in its thread, with a client."""
 
     def __init__(self, folder: Path) -> None:
-        settings = NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")), "127.0.0.1", 0, 0, 0,
-                                None, preview_hz=20.0, pairing_port=0, trust="open")
-        self.store = SettingsStore(folder / "node.json", settings)
-        save_settings(self.store.path, settings)
+        self.store = saved_settings(folder / "node.json", **OF_ANY_PORT, preview_hz=20.0, trust="open")
         self.sessions = Sessions()
         self.foreground = ForegroundStore(folder / "node.foreground.npz")
-        self.server = ControlServer(settings, None)
+        self.server = ControlServer(self.store.current, None)
         self.server.start(Responder(self.store, self.sessions, self.server.pictures, NodeClock(),
                                     lambda: {"state": "ready"}, lambda: {"frames": 12}, None,
                                     foreground=self.foreground),
@@ -225,9 +219,8 @@ def test_previews_keep_their_rate(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("setting", ["control_port", "preview_port", "pairing_port"])
 def test_a_taken_port_is_named_with_its_setting(served: Served, setting: str) -> None:
     port = getattr(served.server, setting)
-    free = NodeSettings(4, "right", served.store.current.markers, "127.0.0.1", 0, 0, 0, None, pairing_port=0)
     with pytest.raises(LinkError, match=f"{setting}: TCP port {port}"):
-        ControlServer(msgspec.structs.replace(free, **{setting: port}), None)
+        ControlServer(node_settings(**{**OF_ANY_PORT, setting: port}), None)
 
 
 def test_an_open_node_says_so_and_has_no_keys(served: Served) -> None:

@@ -10,18 +10,16 @@ from typing import Any
 
 import pytest
 from machine_fake import machine
+from node_fakes import saved_settings
 
 import rhot_node.commands.doctor_command
 import rhot_node.compiled
 from rhot_node.capture.pi_camera import CameraStack
 from rhot_node.commands.doctor_command import check_camera, check_compiled, check_service, check_settings, examine, run
 from rhot_node.compiled import sources_hash
-from rhot_node.config import NodeSettings, save_settings
 from rhot_node.errors import CameraError
-from rhot_node.files import resource_path
 from rhot_node.health.checks import Check, worst
 from rhot_node.keys import Master, NodeTrust, keys_path, new_key_pair
-from rhot_node.markers import load_markers
 
 SHOW = "systemctl show rhot-node.service --property=LoadState,ActiveState,NRestarts"
 
@@ -41,9 +39,7 @@ def service(load: str, active: str, restarts: int) -> dict[str, str]:
 
 @pytest.fixture
 def settings(tmp_path: Path) -> Path:
-    path = tmp_path / "left.json"
-    save_settings(path, NodeSettings(1, "left", load_markers(resource_path("markers", "rhot6.json")), trust="paired"))
-    return path
+    return saved_settings(tmp_path / "left.json", trust="paired").path
 
 
 def test_a_well_pi_has_nothing_to_complain_of(tmp_path: Path, settings: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,6 +64,7 @@ def test_everything_wrong_is_named_with_its_remedy(tmp_path: Path) -> None:
     for code in ("power", "heat", "memory", "network", "camera", "service"):
         assert checks[code].level == "error" and checks[code].remedy, code
     assert checks["compiled"].level == checks["memory_limit"].level == "warning"
+    assert "cgroup_enable=memory" in checks["memory_limit"].remedy
     assert "apt install" in checks["camera"].remedy and "7 times" in checks["service"].text
 
 

@@ -11,32 +11,15 @@ import time
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
 import pytest
 from patience import PATIENCE_S
-from test_plugins import install
+from shipped_markers import LANDMARKS21
 
-from rhot_node.config import NodeSettings
-from rhot_node.detect.image import from_bgr
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
-from rhot_node.plugins import DetectorChoice
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import ClockReply, ClockRequest, NodeState, Observations, Start, StartEntry, Stop
 
-MARKERS = load_markers(resource_path("markers", "landmarks21.json"))
 NODE, SESSION = 3, 77
 
-PLUGIN = """
-class Landmarks:
-    def __init__(self, markers):
-        self.count = len(markers.markers)
-    def detect(self, image):
-        from rhot_node.wire.messages import MarkerObservation
-        return tuple(MarkerObservation(k, 10.0 + k, 20.0, 1.0, 0.25, 0.0, 0.25, 0.9) for k in range(self.count))
-    def reset(self):
-        pass
-"""
 
 
 @pytest.fixture
@@ -50,7 +33,7 @@ def example() -> ModuleType:
 
 
 def test_the_example_speaks_the_wire(example: ModuleType) -> None:
-    assert MARKERS.ids == example.JOINTS and MARKERS.checksum == example.CHECKSUM
+    assert LANDMARKS21.ids == example.JOINTS and LANDMARKS21.checksum == example.CHECKSUM
     assert "mediapipe" not in sys.modules
     node = example.LandmarkNode(NODE, 0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as master:
@@ -75,7 +58,7 @@ def test_the_example_speaks_the_wire(example: ModuleType) -> None:
             found = decode(master.recv(2048))
             assert isinstance(found, Observations)
             assert (found.node_id, found.session, found.sequence) == (NODE, SESSION, sequence)
-            assert found.marker_checksum == MARKERS.checksum and found.marker_count == 21
+            assert found.marker_checksum == LANDMARKS21.checksum and found.marker_count == 21
             assert [one.index for one in found.markers if one.found] == (
                 [k for k in range(21) if k != 4] if sent else [])
             if sent:
@@ -83,18 +66,3 @@ def test_the_example_speaks_the_wire(example: ModuleType) -> None:
         say(Stop(SESSION, 1))
         assert node.master is None
     node.socket.close()
-
-
-def test_a_plug_in_serves_landmarks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    install(tmp_path, "rhot_landmark_example", PLUGIN,
-            "[rhot.detectors]\nlandmarks = rhot_landmark_example:Landmarks\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
-
-    def otherwise(_: NodeSettings) -> None:
-        raise AssertionError("the plug-in is there")
-
-    choice = DetectorChoice(otherwise)
-    detector = choice.make(NodeSettings(node_id=1, name="left", markers=MARKERS, detector="plug:landmarks"))
-    found = detector.detect(from_bgr(np.zeros((48, 64, 3), np.uint8)))
-    assert [one.index for one in found] == list(range(21)) and all(one.found for one in found)
-    assert choice.troubles() == []

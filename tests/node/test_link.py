@@ -5,15 +5,14 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
+from node_fakes import OF_ANY_PORT, node_settings
 from patience import PATIENCE_S, eventually
 
 from rhot_node.clock import NodeClock
-from rhot_node.config import NodeSettings
 from rhot_node.errors import LinkError
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
 from rhot_node.network.link import ANSWERS_PER_S, UdpLink
 from rhot_node.network.presence import Presence
 from rhot_node.network.session import LinkKeys, Sessions, Stream
@@ -41,10 +40,8 @@ MakeLink = Callable[..., UdpLink]
 def make_link() -> Iterator[MakeLink]:
     links: list[UdpLink] = []
 
-    def make(node_id: int = 3, udp_port: int = 0, broadcast_port: int | None = None,
-             bind_address: str = "127.0.0.1", keys: LinkKeys | None = None) -> UdpLink:
-        settings = NodeSettings(node_id, "left", load_markers(resource_path("markers", "rhot6.json")), bind_address,
-                                udp_port, 0, 0, broadcast_port)
+    def make(keys: LinkKeys | None = None, **changes: Any) -> UdpLink:
+        settings = node_settings(**{**OF_ANY_PORT, **changes})
         links.append(UdpLink(settings, CLOCK, Sessions(), 0xB007, lambda: NodeState.READY, keys))
         return links[-1]
 
@@ -117,7 +114,7 @@ def test_start_and_stop_set_the_session_and_the_reply_names_it(make_link: MakeLi
 
 def test_two_nodes_of_one_machine_hear_one_broadcast(make_link: MakeLink, master: socket.socket) -> None:
     port = free_port()
-    links = [make_link(node_id, broadcast_port=port) for node_id in (3, 4)]
+    links = [make_link(node_id=node_id, broadcast_port=port) for node_id in (3, 4)]
     start = Start(77, 0, tuple(StartEntry(node_id, 5000 + node_id, 0) for node_id in (3, 4)))
     master.sendto(encode(start), ("127.255.255.255", port))
     for link, data_port in zip(links, (5003, 5004), strict=True):
@@ -154,12 +151,6 @@ def test_a_flood_of_questions_is_not_turned_upon_somebody(make_link: MakeLink, m
     assert link.dropped == {"find_often": 2 * ANSWERS_PER_S}
     for _ in range(ANSWERS_PER_S):
         assert len(master.recv(2048)) < len(encode(Find(0, 7, 99)))
-
-
-def test_observations_arrive(make_link: MakeLink, master: socket.socket) -> None:
-    observations = Observations(3, 77, 0, 10, 20, 5, 4, 3, 640, 480, 9, 1, ())
-    assert make_link().send(observations, Stream(77, master.getsockname(), 0))
-    assert decode(master.recv(2048)) == observations
 
 
 def test_what_cannot_be_sent_costs_one_frame_only(make_link: MakeLink) -> None:

@@ -15,7 +15,6 @@ from rhot_node.health.checks import (
     check_clock,
     check_heat,
     check_memory,
-    check_memory_limit,
     check_network,
     check_power,
     check_speed,
@@ -80,12 +79,6 @@ def test_heat(celsius: float | None, flags: int, level: str) -> None:
 def test_memory(megabytes: int, level: str) -> None:
     check = check_memory(megabytes << 20)
     assert check.level == level and f"{megabytes} MB" in check.text
-
-
-def test_a_kernel_without_memory_limits_is_named(tmp_path: Path) -> None:
-    pi = machine(tmp_path, {"sys/fs/cgroup/cgroup.controllers": "cpuset cpu io pids\n"})
-    check = check_memory_limit(pi.limits_memory())
-    assert check.level == "warning" and "cgroup_enable=memory" in check.remedy
 
 
 def test_clocks(tmp_path: Path) -> None:

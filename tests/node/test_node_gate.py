@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 import zmq
@@ -19,13 +17,6 @@ from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import Stop
 
 REFUSED_S = 0.3  # an admitted master is answered within a few milliseconds
-
-
-@pytest.fixture
-def node(tmp_path: Path) -> Iterator[TrustedNode]:
-    node = TrustedNode(tmp_path)
-    yield node
-    node.close()
 
 
 def test_a_paired_master_is_answered(node: TrustedNode) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import secrets
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -26,13 +24,6 @@ from rhot_node.network.pairing import (
 )
 
 NAME = "desk"
-
-
-@pytest.fixture
-def node(tmp_path: Path) -> Iterator[TrustedNode]:
-    node = TrustedNode(tmp_path)
-    yield node
-    node.close()
 
 
 def try_to_pair(node: TrustedNode, code: str, own: KeyPair, hello: dict[str, Any] | None = None,

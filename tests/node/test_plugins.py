@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import socket
-import subprocess
 import sys
 from pathlib import Path
 
 import msgspec
 import pytest
-import zmq
+from node_process import Node, write_settings
+from shipped_markers import LANDMARKS21, RHOT6
 
 from rhot_node.capture.camera import Frame
 from rhot_node.capture.open import PluginCamera, open_camera
 from rhot_node.clock import NodeClock
-from rhot_node.config import CameraSettings, NodeSettings, load_settings, parse_settings, save_settings
+from rhot_node.config import CameraSettings, NodeSettings, load_settings, parse_settings
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import CameraError, SettingsError
 from rhot_node.files import resource_path
+from rhot_node.markers import MarkerSet
 from rhot_node.plugins import DetectorChoice, PluginDetector, plugin_names
 from rhot_node.warm_up import warm_up_image
-from rhot_node.wire.codec import decode
-from rhot_node.wire.messages import MarkerFlag, Observations
+from rhot_node.wire.messages import MarkerFlag
 
 PAGE = (Path(__file__).parents[2] / "docs" / "plugins.md").read_text()
 SETTINGS = CameraSettings(fps=200.0)
@@ -126,12 +124,12 @@ def test_a_camera_that_fails_later_is_a_sentence(broken: None, spec: str, senten
     camera.close()
 
 
-def test_the_example_detector_is_chosen_by_name(example: Path) -> None:
+@pytest.mark.parametrize(("markers", "count"), [(RHOT6, 6), (LANDMARKS21, 21)], ids=["markers", "landmarks"])
+def test_the_example_detector_is_chosen_by_name(example: Path, markers: MarkerSet, count: int) -> None:
     choice = DetectorChoice(lambda settings: pytest.fail("not asked for"))
-    chosen = settings("plug:middle")
-    detector = choice.make(chosen)
-    found = detector.detect(warm_up_image(chosen.markers, (640, 480)))
-    assert [(one.index, one.x, one.y) for one in found] == [(k, 320.0, 240.0) for k in range(6)]
+    detector = choice.make(msgspec.structs.replace(settings("plug:middle"), markers=markers))
+    found = detector.detect(warm_up_image(RHOT6, (640, 480)))
+    assert [(one.index, one.x, one.y) for one in found] == [(k, 320.0, 240.0) for k in range(count)]
     assert choice.troubles() == []
 
 
@@ -174,30 +172,14 @@ def test_settings_name_a_detector_that_can_be(detector: str) -> None:
         parse_settings(msgspec.json.encode(document), "settings")
 
 
-def test_a_node_runs_on_both(example: Path, tmp_path: Path) -> None:
-    path = tmp_path / "node.json"
-    save_settings(path, msgspec.structs.replace(
-        settings("plug:middle"), udp_port=0, control_port=0, preview_port=0, pairing_port=0, broadcast_port=None,
-        trust="open", bind_address="127.0.0.1", camera=SETTINGS))
-    command = [sys.executable, "-m", "rhot_node", "--settings", str(path), "--camera", "plug:grey:60"]
-    environment = os.environ | {"PYTHONPATH": str(example)}
-    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as node, \
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as master, zmq.Context() as context, \
-            context.socket(zmq.REQ) as control:
-        try:
-            assert node.stdout is not None
-            ready = json.loads(node.stdout.readline())
-            assert (ready["width"], ready["height"]) == (640, 480)
-            master.bind(("127.0.0.1", 0))
-            master.settimeout(20.0)
-            control.connect(f"tcp://127.0.0.1:{ready['control_port']}")
-            control.send_json({"request": "start", "session": 7, "host": "127.0.0.1", "port": master.getsockname()[1]})
-            assert control.recv_json()["verdict"] == "started"
-            message = decode(master.recv(65536))
-            assert isinstance(message, Observations)
-            assert [(one.x, one.y) for one in message.markers] == [(320.0, 240.0)] * 6
-            control.send_json({"request": "state"})
-            assert control.recv_json()["detector"] == "plug:middle"
-        finally:
-            node.terminate()
-            node.wait(20)
+def test_a_node_runs_on_both(example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(example))
+    node = Node(write_settings(tmp_path, detector="plug:middle", camera=SETTINGS), "plug:grey:60")
+    try:
+        assert (node.ready["width"], node.ready["height"]) == (640, 480)
+        node.start(7)
+        (observations,) = node.observations(1)
+        assert [(one.x, one.y) for one in observations.markers] == [(320.0, 240.0)] * 6
+        assert json.loads(node.ask(request="state")[0])["detector"] == "plug:middle"
+    finally:
+        node.end()

@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from shipped_markers import RHOT6
 
 from rhot_node.config import NodeSettings, load_settings, save_settings
 from rhot_node.errors import NodeError
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
 from rhot_node.service.install import Host, Service, Wish, install, uninstall, unit_text
 from rhot_node.service.notify import ServiceManager
 
@@ -113,7 +112,7 @@ def test_installing_again_keeps_user_and_settings(tmp_path: Path) -> None:
 
 def test_settings_are_taken_over(tmp_path: Path) -> None:
     own = tmp_path / "mine.json"
-    save_settings(own, NodeSettings(9, "mine", load_markers(resource_path("markers", "rhot6.json"))))
+    save_settings(own, NodeSettings(9, "mine", RHOT6))
     pi = Pi(tmp_path / "pi")
     pi.install(settings=own)
     assert load_settings(pi.settings).node_id == 9 and own.exists()

@@ -13,15 +13,6 @@ def start(sessions: Sessions, session: int, address: tuple[str, int] = MASTER, t
     return sessions.start(session, address, t_start, now_node_ns=10**12, now_s=now_s)
 
 
-def test_start_stop_and_start_anew() -> None:
-    sessions = Sessions()
-    assert sessions.current is None
-    assert start(sessions, 1) == "started"
-    assert sessions.current is not None and sessions.current.address == MASTER
-    assert sessions.stop(1) and sessions.current is None
-    assert start(sessions, 2) == "started"
-
-
 def test_a_repeated_start_changes_nothing() -> None:
     sessions = Sessions()
     start(sessions, 1)

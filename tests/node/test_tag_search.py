@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from node_fakes import FakeCamera, FakeDetector, FakeSender
+from node_fakes import FakeCamera, FakeDetector, FakeSender, node_settings
 
 from rhot_node.clock import NodeClock
-from rhot_node.config import NodeSettings, TagSettings, changed_settings, save_settings
+from rhot_node.config import NodeSettings, TagSettings, changed_settings
 from rhot_node.daemon import NodeDaemon
 from rhot_node.errors import SettingsError
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
 from rhot_node.network.pictures import PictureBox
 from rhot_node.network.requests import SettingsStore
 from rhot_node.network.session import Stream
@@ -26,8 +24,7 @@ STREAM = Stream(7, ("10.0.0.1", 5000), 0)
 
 
 def settings(**tags: Any) -> NodeSettings:
-    return NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")),
-                        tags=TagSettings(**{"enabled": True, **tags}))
+    return node_settings(tags=TagSettings(**{"enabled": True, **tags}))
 
 
 class Search:
@@ -108,11 +105,10 @@ def test_an_unknown_dictionary_is_a_sentence() -> None:
 
 def test_the_daemon_sends_both(tmp_path: Path) -> None:
     clock, sender = NodeClock(offset_ns=10**15), FakeSender()
-    store = SettingsStore(tmp_path / "node.json", settings())
-    save_settings(store.path, store.current)
     camera = FakeCamera(range(1000), clock)
     camera.began_ns -= 10**12
     camera.luma = warm_up_picture(DICTIONARY)
+    store = SettingsStore(tmp_path / "node.json", settings())
     daemon = NodeDaemon(store, clock, lambda _: camera, lambda _: FakeDetector())
     daemon.prepare()
     try:

@@ -13,17 +13,14 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from node_fakes import FakeCamera, FakeDetector, FakeSender
+from node_fakes import FakeCamera, FakeDetector, FakeSender, node_settings
 from patience import eventually, settled
 
 from rhot_node.capture.camera import Frame
 from rhot_node.clock import NodeClock
-from rhot_node.config import NodeSettings, save_settings
 from rhot_node.daemon import NodeDaemon
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import VideoError
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
 from rhot_node.network.pictures import PictureBox
 from rhot_node.network.requests import Responder, SettingsStore
 from rhot_node.network.session import LinkKeys, Sessions
@@ -116,10 +113,9 @@ def test_a_slow_disk_drops_the_oldest_frames_and_keeps_nobody_waiting(
 
 
 def test_observations_are_sent_before_the_video_sees_a_frame(tmp_path: Path) -> None:
-    settings = NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")))
     clock, sender = NodeClock(), FakeSender()
     seen: list[tuple[int, int]] = []
-    daemon = NodeDaemon(SettingsStore(tmp_path / "node.json", settings), clock,
+    daemon = NodeDaemon(SettingsStore(tmp_path / "node.json", node_settings()), clock,
                         lambda camera: FakeCamera(range(5), clock, 0), lambda settings: FakeDetector(),
                         video=lambda frame: seen.append((frame.number, len(sender.sent))))
     daemon.prepare()
@@ -190,9 +186,7 @@ def test_a_camera_that_changes_its_size_ends_the_video(make: MakeRecorder) -> No
 
 @pytest.fixture
 def ask(make: MakeRecorder, tmp_path: Path) -> Callable[..., dict[str, Any]]:
-    settings = NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")))
-    store = SettingsStore(tmp_path / "node.json", settings)
-    save_settings(store.path, settings)
+    store = SettingsStore(tmp_path / "node.json", node_settings())
     responder = Responder(store, Sessions(), PictureBox(4.0), NodeClock(), dict, dict, None, make())
 
     def ask_node(**request: Any) -> dict[str, Any]:
@@ -229,10 +223,9 @@ def test_requests_are_answered_or_refused_in_a_sentence(ask: Callable[..., dict[
 
 
 def test_a_node_that_forgets_its_masters_ends_its_video(make: MakeRecorder, tmp_path: Path) -> None:
-    settings = NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")))
     recorder = make()
-    responder = Responder(SettingsStore(tmp_path / "node.json", settings), Sessions(), PictureBox(4.0), NodeClock(),
-                          dict, dict, LinkKeys(), recorder)
+    store = SettingsStore(tmp_path / "node.json", node_settings())
+    responder = Responder(store, Sessions(), PictureBox(4.0), NodeClock(), dict, dict, LinkKeys(), recorder)
     responder.answer([b'{"request": "video_start", "name": "a"}'], "")
     responder.revoke(lambda public_key: False)
     wait_until_done(recorder, "a")

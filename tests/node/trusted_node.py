@@ -7,16 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import zmq
+from node_fakes import OF_ANY_PORT, saved_settings
 from patience import PATIENCE_S
 
 from rhot_node.clock import NodeClock
-from rhot_node.config import NodeSettings, save_settings
-from rhot_node.files import resource_path
 from rhot_node.keys import KeyPair, Master, NodeTrust, connect_with, new_key_pair
-from rhot_node.markers import load_markers
 from rhot_node.network.control import ControlServer
 from rhot_node.network.pairing import OfferFile, Reception
-from rhot_node.network.requests import Responder, SettingsStore
+from rhot_node.network.requests import Responder
 from rhot_node.network.session import LinkKeys, Sessions
 
 ABOUT = {"node_id": 3, "name": "left", "state": "ready"}
@@ -38,17 +36,15 @@ class TrustedNode:
 
     def __init__(self, folder: Path, address: str = "127.0.0.1") -> None:
         self.address = address
-        settings = NodeSettings(3, "left", load_markers(resource_path("markers", "rhot6.json")), address, 0, 0, 0, None,
-                                preview_hz=20.0, pairing_port=0, trust="paired")
+        changes = {**OF_ANY_PORT, "bind_address": address}
+        store = saved_settings(folder / "left.json", **changes, preview_hz=20.0, trust="paired")
         self.keys_path = folder / "left.keys.json"
         self.clock = FakeBoot()
         self.offers = OfferFile(folder / "left.pairing.json", self.clock)
         self.trust = NodeTrust(self.keys_path)
         self.keys = LinkKeys()
         self.sessions = Sessions()
-        self.server = ControlServer(settings, self.trust)
-        store = SettingsStore(folder / "left.json", settings)
-        save_settings(store.path, settings)
+        self.server = ControlServer(store.current, self.trust)
         self.responder = Responder(store, self.sessions, self.server.pictures, NodeClock(),
                                    lambda: {"state": "ready"}, dict, self.keys)
         self.server.start(self.responder, Reception(self.trust, self.offers, lambda: ABOUT))
