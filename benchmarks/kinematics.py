@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "hand"))
 
-from dh_oracle import frames_of, jacobian_of, lever_jacobian, points_of
+from dh_oracle import frames_of, jacobian_of, points_of
 from tables import arguments, publish, table
 
 from rhot_app.hand.anatomy import load_hand
@@ -45,6 +45,25 @@ Array = NDArray[np.float64]
 
 TARGET_US = 15.0
 BATCH = 200
+
+
+def lever_jacobian(document, state):
+    """(P, 3, 6 + A) for the root's translation, its turns about world axes and the angles, by cross products."""
+    frames = frames_of(document, state)
+    angles = [angle.name for angle in document.angles]
+    rows = {frame.name: frame for frame in document.frames}
+    out = np.zeros((len(document.points), 3, 6 + len(angles)))
+    for jacobian, point, at in zip(out, document.points, points_of(document, state), strict=True):
+        jacobian[:, :3] = np.eye(3)
+        jacobian[:, 3:6] = np.cross(np.eye(3), at - frames[document.root.name][:3, 3]).T
+        frame = rows.get(point.frame)
+        while frame is not None:
+            if frame.angle is not None:
+                parent = frames[frame.parent]
+                axis = frame.sign * parent[:3, 2]
+                jacobian[:, 6 + angles.index(frame.angle)] += np.cross(axis, at - parent[:3, 3])
+            frame = rows.get(frame.parent)
+    return out
 
 
 @dataclass(frozen=True)

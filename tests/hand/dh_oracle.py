@@ -47,25 +47,6 @@ def points_of(document, state):
                      for point in document.points]).reshape(-1, 3)
 
 
-def lever_jacobian(document, state):
-    """(P, 3, 6 + A) for the root's translation, its turns about world axes and the angles, by cross products."""
-    frames = frames_of(document, state)
-    angles = [angle.name for angle in document.angles]
-    rows = {frame.name: frame for frame in document.frames}
-    out = np.zeros((len(document.points), 3, 6 + len(angles)))
-    for jacobian, point, at in zip(out, document.points, points_of(document, state), strict=True):
-        jacobian[:, :3] = np.eye(3)
-        jacobian[:, 3:6] = np.cross(np.eye(3), at - frames[document.root.name][:3, 3]).T
-        frame = rows.get(point.frame)
-        while frame is not None:
-            if frame.angle is not None:
-                parent = frames[frame.parent]
-                axis = frame.sign * parent[:3, 2]
-                jacobian[:, 6 + angles.index(frame.angle)] += np.cross(axis, at - parent[:3, 3])
-            frame = rows.get(frame.parent)
-    return out
-
-
 def jacobian_of(points, state, step=1e-6):
     """(P, 3, N): central differences of a function of the state."""
     columns = [(points(state + step * unit) - points(state - step * unit)) / (2 * step) for unit in np.eye(len(state))]

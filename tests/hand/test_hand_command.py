@@ -8,6 +8,7 @@ import shutil
 import cv2
 import msgspec
 import pytest
+from shipped_rig import RIGHT_HAND
 
 from rhot_app.__main__ import main
 from rhot_app.hand.anatomy import load_hand
@@ -19,7 +20,6 @@ from rhot_node.files import resource_path
 
 DIGITEYES = str(resource_path("hands", "digiteyes.json"))
 RIG = resource_path("rigs", "two_pis.json")
-ADULT = load_hand(resource_path("hands", "right.json"))
 
 
 def test_a_left_hand_of_190_mm(tmp_path, capsys):
@@ -37,9 +37,9 @@ def test_proportions_of_the_file_stay(tmp_path):
     out = tmp_path / "mine.json"
     assert main(["hand", "--length", "200", "--proportions", "file", "--name", "me", "--out", str(out)]) == 0
     hand = load_hand(out)
-    factor = 0.2 / hand_length(ADULT)
+    factor = 0.2 / hand_length(RIGHT_HAND)
     assert hand.name == "me"
-    assert hand.fingers["ring"].bones_mm[0] == pytest.approx(factor * ADULT.fingers["ring"].bones_mm[0], abs=1e-5)
+    assert hand.fingers["ring"].bones_mm[0] == pytest.approx(factor * RIGHT_HAND.fingers["ring"].bones_mm[0], abs=1e-5)
 
 
 def test_rows_and_picture(tmp_path):

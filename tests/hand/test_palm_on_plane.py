@@ -5,18 +5,16 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
+from shipped_rig import RIGHT_MODEL as MODEL
 
 from rhot_app.geometry.transforms import exp_so3
-from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.model import build_model, with_locked
+from rhot_app.hand.model import with_locked
 from rhot_app.hand.motion.hand_process import FASTEST, PALM_SPREAD, SLOWEST, HandProcess
 from rhot_app.hand.motion.palm_on_plane import HEIGHT_SD_M, TILT_SD_RAD, PalmOnPlane
 from rhot_app.hand.skeleton import ANGLES
 from rhot_app.project import PalmPlane, TrackerSettings
-from rhot_node.files import resource_path
 
-MODEL = build_model(load_hand(resource_path("hands", "right.json")))
 PLANE = PalmOnPlane(PalmPlane((0.3, -2.0, 0.7), 0.2))
 
 

@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from hand_samples import random_pose
+from shipped_markers import RHOT6
 
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, neutral_pose
@@ -13,10 +14,7 @@ from rhot_app.hand.places import patch_of, place_of, segment_axis, with_markers
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS, HandPose
 from rhot_app.hand.solvers.finger_ik import solve_finger, solve_fingers
 from rhot_app.hand.solvers.palm_fit import fit_palm
-from rhot_node.files import resource_path
-from rhot_node.markers import Marker, MarkerSet, load_markers
-
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
+from rhot_node.markers import Marker, MarkerSet
 
 
 def worn(patch: str, **fields: object) -> MarkerSet:
