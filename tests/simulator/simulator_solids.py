@@ -7,18 +7,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.model import neutral_pose
 from rhot_app.simulator.render.body import PALM_GROUP, SKIN
 from rhot_app.simulator.render.camera_controls import Controls, Lamp
 from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.painter import Solids
 from rhot_app.simulator.render.render import Exposure, FrameRenderer, Optics
 from rhot_app.simulator.render.solids_painter import SolidsPainter
+from rhot_app.simulator.scene.motion import FACING
 from rhot_app.simulator.scene.rigid_target import RigidTarget
 
 Array = NDArray[np.float64]
 
 FOCAL = 530.5
 CAMERA = CameraModel(640, 480, np.array([FOCAL, FOCAL, 319.5, 239.5, -0.05, 0.0, 0.0, 0.0, 0.0]), np.eye(4), np.eye(4))
+RELAXED = neutral_pose().angles
 NEUTRAL, STEADY = Controls(), Lamp()
 STILL = Shutter(0.004, 48e-6)
 OPTICS = Optics(psf_sigma_px=0.7, noise_mid_grey=3.0, noise_read=1.5)
@@ -34,6 +37,19 @@ class Gliding:
         transforms = np.tile(np.eye(4), (len(times_s), 1, 1))
         transforms[:, :3, 3] = self._start + times_s[:, None] * self._velocity
         return transforms, np.zeros((len(times_s), 21))
+
+
+class Shown:
+    """A still hand that shows the cameras its palm, or its back."""
+
+    def __init__(self, place_m: tuple[float, float, float] = (0.0, 0.085, 0.6), *, back: bool = False,
+                 angles: Array = RELAXED) -> None:
+        self._pose, self._angles = np.eye(4), angles
+        self._pose[:3, :3] = FACING @ np.diag([1.0, -1.0, -1.0]) if back else FACING
+        self._pose[:3, 3] = place_m
+
+    def sample(self, times_s: Array) -> tuple[Array, Array]:
+        return np.tile(self._pose, (len(times_s), 1, 1)), np.tile(self._angles, (len(times_s), 1))
 
 
 def balls(radii: list[float], places: list[tuple[float, float, float]], painted: list[bool]) -> RigidTarget:

@@ -10,10 +10,11 @@ import cv2
 import msgspec
 import numpy as np
 import pytest
+from shipped_rig import RIGHT_HAND as RIGHT
 
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.anatomy import HandAnatomy, load_hand
+from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import build_model, neutral_pose
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.simulator.bare_hand.sequence import (
@@ -40,9 +41,7 @@ from rhot_app.simulator.film.truth import load_truth
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_arguments, show_of
 from rhot_app.simulator.scene.scene_description import BareHandShow
-from rhot_node.files import resource_path
 
-RIGHT = load_hand(resource_path("hands", "right.json"))
 WIDTH = 160
 NEAR = BareHandOptions(distance_m=0.4, tone=4.0, mesh_m=5e-3)
 

@@ -52,7 +52,6 @@ def test_the_motion_for_it_shows_all_that_an_alignment_needs(scene) -> None:
     tracker = ForeignTracker(scene.seed)
     reported, true = poses_of(tracker.rows(shown, marker, TIMES_S)), world_from_body(shown, marker, TIMES_S)
     coverage = coverage_of_motion(reported[:, :3, :3], true[:, :3, 3], np.gradient(true[:, :3, 3], TIMES_S, axis=0))
-    print(coverage)
     assert coverage.turn[0] > LASTING_M / FAIR_M
     assert np.linalg.norm(coverage.spread_m[1:]) > LASTING_M * REACH_M / FAIR_M and coverage.speed_m_s > 0.25
     report = calibrate_alignment(MotionStream.of_poses(TIMES_S, reported), MotionStream(TIMES_S, true[:, :3, 3]))

@@ -8,32 +8,24 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from simulator_solids import CAMERA, renderer
-from test_worn_markers import Shown
+from shipped_markers import NAILS6, RHOT6
+from shipped_rig import RIGHT_MODEL
+from simulator_solids import CAMERA, Shown, renderer
 
-from rhot_app.hand.anatomy import load_hand
-from rhot_app.hand.model import HandModel, build_model
+from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES
 from rhot_app.simulator.film.ideal_observations import ObservationNoise, ideal_observations
 from rhot_app.simulator.film.shot import make_shot
 from rhot_app.simulator.film.truth import true_object
 from rhot_app.simulator.render.body import Appearance, build_body
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
-from rhot_node.files import resource_path
-from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag
 
-RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
-NAILS = load_markers(resource_path("markers", "nails6.json"))
 FLAT = {"shape": "disc", "radius_mm": None}
 STRAIGHT = np.array([0.2 if name.startswith("thumb") else 0.02 for name in ANGLES])
 FINGERS = slice(1, 5)
 GREY = (128, 128, 128)
-
-
-@pytest.fixture(scope="module", params=["right", "left"])
-def model(request: pytest.FixtureRequest) -> HandModel:
-    return build_model(load_hand(resource_path("hands", f"{request.param}.json")))
 
 
 def worn(tips: dict[str, Any] | None = None, wrist: dict[str, Any] | None = None) -> MarkerSet:
@@ -62,11 +54,11 @@ class Picture:
 
 
 def test_a_nail_shows_on_the_back_where_the_marker_is(model: HandModel) -> None:
-    whole, nails = Picture(model, RHOT6, back=True), Picture(model, NAILS, back=True)
+    whole, nails = Picture(model, RHOT6, back=True), Picture(model, NAILS6, back=True)
     np.testing.assert_allclose(nails.found[FINGERS], nails.places[FINGERS], atol=0.5)
     assert (nails.areas[FINGERS] < 0.6 * whole.areas[FINGERS]).all() and nails.areas[FINGERS].min() > 20
     assert nails.visible.min() > 0.98
-    palm = Picture(model, NAILS, back=False)
+    palm = Picture(model, NAILS6, back=False)
     assert not palm.areas[FINGERS].any() and not palm.visible[FINGERS].any(), "no nail shows on the palm's side"
 
 
@@ -132,12 +124,10 @@ def test_a_glove_covers_the_hand_and_not_the_forearm(model: HandModel) -> None:
 
 
 def test_fields_that_say_what_was_always_so_change_no_bit() -> None:
-    right = build_model(load_hand(resource_path("hands", "right.json")))
     told = worn({"patch": "segment", "gap_deg": 0.0})
-    one, other = Picture(right, RHOT6, back=False), Picture(right, told, back=False)
+    one, other = (Picture(RIGHT_MODEL, markers, back=False) for markers in (RHOT6, told))
     np.testing.assert_array_equal(one.image, other.image)
-    body = build_body(right, RHOT6)
-    assert not body.paint.any(), "no ray asks where the paint of a whole segment is"
+    assert not build_body(RIGHT_MODEL, RHOT6).paint.any(), "no ray asks where the paint of a whole segment is"
 
 
 def scene(**settings: Any) -> Scene:

@@ -2,49 +2,23 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import pytest
-from simulator_solids import CAMERA, STILL, Gliding, ball_image, balls, brightness_centroid, renderer
+from shipped_markers import RHOT6
+from shipped_rig import RIGHT_MODEL as MODEL
+from simulator_solids import CAMERA, STILL, Gliding, Shown, ball_image, balls, brightness_centroid, renderer
 
 from rhot_app.errors import RigError
-from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.model import build_model, neutral_pose
+from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.shape import segments
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.simulator.render.body import CAPSULE, SKIN, build_body
 from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.rays import ray_table
 from rhot_app.simulator.scene.background import background_image
-from rhot_app.simulator.scene.motion import FACING
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
 
-MODEL = build_model(load_hand(resource_path("hands", "right.json")))
-MARKERS = load_markers(resource_path("markers", "rhot6.json"))
 SHADING = 0.25
-
-
-class StillHand:
-    """A relaxed hand that shows its palm."""
-
-    def __init__(self, place_m: tuple[float, float, float], angles: np.ndarray | None = None) -> None:
-        self._transform = np.eye(4)
-        self._transform[:3, :3], self._transform[:3, 3] = FACING, place_m
-        self._angles = neutral_pose().angles if angles is None else angles
-
-    def sample(self, times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return np.tile(self._transform, (len(times_s), 1, 1)), np.tile(self._angles, (len(times_s), 1))
-
-
-def test_rays_are_what_opencv_undistorts() -> None:
-    table = ray_table(CAMERA)[1:-1, 1:-1]
-    pixels = np.array([(0, 0), (639, 479), (5, 300), (320, 240)], dtype=np.float64)
-    expected = cv2.undistortPointsIter(pixels[:, None], CAMERA.matrix, CAMERA.intrinsics[4:9], None, None,
-                                       (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12))[:, 0]
-    ours = np.array([table[int(y), int(x)] for x, y in pixels])
-    np.testing.assert_allclose(ours, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("place", [(0.0, 0.0, 0.6), (0.21, -0.13, 0.61), (-0.1304, 0.1517, 0.6), (0.0501, 0.1, 1.0)])
@@ -110,14 +84,14 @@ def test_visible_fraction_counts_what_others_hide_and_what_the_border_cuts() -> 
 
 
 def test_open_hand_shows_every_marker_whole_in_its_colour() -> None:
-    body = build_body(MODEL, MARKERS)
+    body = build_body(MODEL, RHOT6)
     background = background_image("cloth", CAMERA, 0.6, 1)
     camera = renderer(body, background=background, shading=SHADING)
-    hand = StillHand((0.0375, 0.085, 0.6))
+    hand = Shown((0.0375, 0.085, 0.6))
     image, box, visible = camera.radiance(hand, 0.0, 0)
     assert visible.min() > 0.98
     centres = CAMERA.project(body.marker_positions(*hand.sample(np.zeros(1)))[0])
-    for marker, (x, y) in zip(MARKERS.markers, centres, strict=True):
+    for marker, (x, y) in zip(RHOT6.markers, centres, strict=True):
         seen = image[:, round(y), round(x)]
         colour = np.array(marker.display_rgb, dtype=np.float64)
         shade = seen @ colour / (colour @ colour)
@@ -129,8 +103,8 @@ def test_open_hand_shows_every_marker_whole_in_its_colour() -> None:
 def test_solids_ride_on_their_bones_as_the_hands_shape_says() -> None:
     rng = np.random.default_rng(5)
     angles = rng.uniform(MODEL.limits[:, 0], MODEL.limits[:, 1])
-    pose = HandPose(StillHand((0.1, 0.2, 0.5)).sample(np.zeros(1))[0][0], angles)
-    body = build_body(MODEL, MARKERS)
+    pose = HandPose(Shown((0.1, 0.2, 0.5)).sample(np.zeros(1))[0][0], angles)
+    body = build_body(MODEL, RHOT6)
     placed = body.place(pose.world_from_palm[None], pose.angles[None])[0]
     shape = segments(MODEL, pose, forward(MODEL, pose))
     skin = np.flatnonzero((body.marker == SKIN) & (body.kind == CAPSULE))
@@ -143,32 +117,29 @@ def test_solids_ride_on_their_bones_as_the_hands_shape_says() -> None:
 def test_a_finger_before_another_hides_its_marker() -> None:
     angles = neutral_pose().angles.copy()
     angles[[6, 7, 8]] = np.radians([75.0, 85.0, 60.0])  # index curled: its tip lies before the palm
-    body = build_body(MODEL, MARKERS)
+    body = build_body(MODEL, RHOT6)
     background = np.zeros((3, 480, 640), np.float32)
     camera = renderer(body, background=background, shading=SHADING)
-    _, _, from_palm = camera.radiance(StillHand((0.0, 0.085, 0.6), angles), 0.0, 0)
-    behind = StillHand((0.0, 0.085, 0.6), angles)
-    behind._transform[:3, :2] *= 1.0
-    behind._transform[:3, :3] = FACING @ np.diag([1.0, -1.0, -1.0])
-    _, _, from_back = camera.radiance(behind, 0.0, 0)
-    index = MARKERS.ids.index("index")
+    from_palm, from_back = (camera.radiance(Shown(back=back, angles=angles), 0.0, 0)[2].copy()
+                            for back in (False, True))
+    index = RHOT6.ids.index("index")
     assert from_palm[index] > 0.6
     assert from_back[index] < 0.05
 
 
 def test_hidden_markers_are_bare_skin() -> None:
-    body = build_body(MODEL, MARKERS, frozenset({"thumb"}))
+    body = build_body(MODEL, RHOT6, frozenset({"thumb"}))
     assert 0 not in body.marker and body.marker_count == 6
     camera = renderer(body, shading=SHADING)
-    _, visible = camera.render(StillHand((0.0, 0.085, 0.6)), 0.0, 0)
+    _, visible = camera.render(Shown(), 0.0, 0)
     assert visible[0] == 0.0 and visible[1:].min() > 0.9
     with pytest.raises(RigError, match="toe"):
-        build_body(MODEL, MARKERS, frozenset({"toe"}))
+        build_body(MODEL, RHOT6, frozenset({"toe"}))
 
 
 def test_frames_repeat_by_seed_and_differ_by_number() -> None:
-    body, background = build_body(MODEL, MARKERS), background_image("clutter", CAMERA, 0.6, 1)
-    hand = StillHand((0.0, 0.085, 0.6))
+    body, background = build_body(MODEL, RHOT6), background_image("clutter", CAMERA, 0.6, 1)
+    hand = Shown()
     first, again = (renderer(body, seed=4, background=background) for _ in range(2))
     one = first.render(hand, 0.0, 0)[0].copy()
     np.testing.assert_array_equal(one, again.render(hand, 0.0, 0)[0])

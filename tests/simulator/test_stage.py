@@ -182,12 +182,6 @@ def test_remote_and_door_understand_each_other(rig: Rig, tmp_path: Path) -> None
     assert not (tmp_path / "twin.ipc").exists()
 
 
-def test_no_twin_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rhot_app.simulator.nodes.remote.STATE_S", 0.05)
-    with TwinRemote(tmp_path) as twin, pytest.raises(SimulatorError, match="gave no answer"):
-        twin.state()
-
-
 def test_the_foreign_tracker_is_where_the_hand_is_and_goes_on(rig: Rig) -> None:
     def rows(since_ns: int = 0) -> list[tuple[int, list[float]]]:
         return rig.stage.perform(TrackerRequest(since_ns))["poses"]

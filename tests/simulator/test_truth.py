@@ -9,7 +9,7 @@ import pytest
 
 from rhot_app.errors import SimulatorError
 from rhot_app.simulator.film.shot import make_shot
-from rhot_app.simulator.film.truth import FrameTruth, Truth, load_truth, save_truth, true_object
+from rhot_app.simulator.film.truth import FrameTruth, Truth, load_truth, true_object
 from rhot_app.simulator.render.body import HandBody
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 
@@ -46,16 +46,6 @@ def test_wrist_marker_is_the_wrist_joint_and_tips_lie_on_their_fingers() -> None
 def test_visible_is_the_worst_camera_in_the_nearest_frames() -> None:
     seen = some_truth().visible_at(np.array([0.0, 0.09, 0.19]))
     np.testing.assert_allclose(seen, [[0.9, 0.5], [0.2, 0.9], [0.8, 0.8]])
-
-
-def test_file_gives_back_what_was_written(tmp_path: Path) -> None:
-    truth = some_truth()
-    save_truth(tmp_path / "truth.npz", truth)
-    back = load_truth(tmp_path / "truth.npz")
-    np.testing.assert_array_equal(back.markers, truth.markers)
-    np.testing.assert_allclose(back.joints, truth.joints, atol=1e-7)
-    assert len(back.cameras) == 2
-    np.testing.assert_array_equal(back.cameras[1].visible, truth.cameras[1].visible)
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no truth at all"])

@@ -4,46 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from simulator_solids import CAMERA, renderer
+from shipped_rig import RIGHT_MODEL
+from simulator_solids import CAMERA, RELAXED, Shown, renderer
 
 from rhot_app.errors import RigError
-from rhot_app.hand.anatomy import load_hand
-from rhot_app.hand.model import HandModel, build_model, neutral_pose
+from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, JOINTS
 from rhot_app.simulator.render.body import build_body
-from rhot_app.simulator.scene.motion import FACING
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers
 
 RHOT8, RICH = (load_markers(resource_path("markers", f"{name}.json")) for name in ("rhot8", "rich"))
-ANGLES_RAD = neutral_pose().angles
 
 
-@pytest.fixture(scope="module", params=["right", "left"])
-def model(request: pytest.FixtureRequest) -> HandModel:
-    return build_model(load_hand(resource_path("hands", f"{request.param}.json")))
-
-
-class Shown:
-    """A relaxed hand; its back is towards the cameras when `back`."""
-
-    def __init__(self, *, back: bool, angles: np.ndarray = ANGLES_RAD) -> None:
-        self._pose, self._angles = np.eye(4), angles
-        self._pose[:3, :3] = FACING @ np.diag([1.0, -1.0, -1.0]) if back else FACING
-        self._pose[:3, 3] = (0.0, 0.085, 0.6)
-
-    def sample(self, times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return np.tile(self._pose, (len(times_s), 1, 1)), np.tile(self._angles, (len(times_s), 1))
-
-
-def centres(model: HandModel, markers: MarkerSet, angles: np.ndarray = ANGLES_RAD) -> tuple[dict, dict]:
+def centres(model: HandModel, markers: MarkerSet, angles: np.ndarray = RELAXED) -> tuple[dict, dict]:
     """Joints and markers by name, m in the palm frame."""
     joints, worn = build_body(model, markers).joints_and_markers(np.eye(4)[None], angles[None])
     return dict(zip(JOINTS, joints[0], strict=True)), dict(zip(markers.ids, worn[0], strict=True))
 
 
 def test_inner_markers_sit_half_way_along_their_bones_on_the_back(model: HandModel) -> None:
-    for angles in (np.zeros(21), ANGLES_RAD):
+    for angles in (np.zeros(21), RELAXED):
         joints, worn = centres(model, RICH, angles)
         for finger, inner in (("index", ("mcp", "pip", "dip")), ("little", ("mcp", "pip", "dip")),
                               ("thumb", ("cmc", "mcp", "ip"))):
@@ -61,7 +42,7 @@ def test_inner_markers_sit_half_way_along_their_bones_on_the_back(model: HandMod
 
 def test_palm_markers_do_not_move_with_the_fingers(model: HandModel) -> None:
     joints, open_hand = centres(model, RHOT8)
-    fist = ANGLES_RAD + 0.6 * np.array(["flexion" in name for name in ANGLES])
+    fist = RELAXED + 0.6 * np.array(["flexion" in name for name in ANGLES])
     _, closed = centres(model, RHOT8, fist)
     for name, joint in (("index_knuckle", "index_mcp"), ("little_knuckle", "little_mcp")):
         np.testing.assert_allclose(open_hand[name], joints[joint], atol=1e-9)
@@ -73,8 +54,7 @@ def test_palm_markers_do_not_move_with_the_fingers(model: HandModel) -> None:
 
 
 def test_knuckles_of_rhot8_show_to_cameras_that_see_the_palm() -> None:
-    right = build_model(load_hand(resource_path("hands", "right.json")))
-    body = build_body(right, RHOT8)
+    body = build_body(RIGHT_MODEL, RHOT8)
     image, _, visible = renderer(body, shading=0.0).radiance(Shown(back=False), 0.0, 0)
     for name in ("index_knuckle", "little_knuckle"):
         index = RHOT8.ids.index(name)
@@ -84,8 +64,7 @@ def test_knuckles_of_rhot8_show_to_cameras_that_see_the_palm() -> None:
 
 
 def test_glued_balls_show_only_from_the_back() -> None:
-    right = build_model(load_hand(resource_path("hands", "right.json")))
-    body = build_body(right, RICH)
+    body = build_body(RIGHT_MODEL, RICH)
     glued = [k for k, name in enumerate(RICH.ids) if name.startswith(("hand_", "index_m", "middle_p", "ring_m"))]
     front = renderer(body).radiance(Shown(back=False), 0.0, 0)[2]
     back = renderer(body).radiance(Shown(back=True), 0.0, 0)[2]
@@ -99,6 +78,5 @@ def test_colours_of_a_set_are_apart(markers: MarkerSet, apart: float) -> None:
 
 
 def test_a_role_that_is_no_place_on_the_hand_is_named() -> None:
-    right = build_model(load_hand(resource_path("hands", "right.json")))
     with pytest.raises(RigError, match=r"'red' has no role.*palm_index"):
-        build_body(right, load_markers(resource_path("markers", "trifinger_cube.json")))
+        build_body(RIGHT_MODEL, load_markers(resource_path("markers", "trifinger_cube.json")))
