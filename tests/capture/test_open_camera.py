@@ -142,21 +142,16 @@ def test_recordings_and_twins_bring_their_own_settings() -> None:
     assert not data_set_settings("yuv:folder")
 
 
-def test_an_image_of_another_size_ends_in_an_error(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("image", "words"), [
+    (cv2.imencode(".png", np.zeros((48, 32, 3), np.uint8))[1].tobytes(),
+     "frame 1 has 32 x 48 px, the first one has 64 x 48"),
+    (b"\x89PNG and then nothing", r"001\.png is not a picture")], ids=["another size", "broken"])
+def test_an_image_that_does_not_fit_is_named(tmp_path: Path, image: bytes, words: str) -> None:
     write_images(tmp_path / "images", 2)
-    cv2.imwrite(str(tmp_path / "images" / "001.png"), np.zeros((48, 32, 3), np.uint8))
+    (tmp_path / "images" / "001.png").write_bytes(image)
     camera = open_camera(f"{tmp_path / 'images'}?rate=max", SETTINGS, CLOCK)
     camera.read(1.0)
-    with pytest.raises(CameraError, match="frame 1 has 32 x 48 px, the first one has 64 x 48"):
-        camera.read(1.0)
-
-
-def test_a_broken_image_is_named(tmp_path: Path) -> None:
-    write_images(tmp_path / "images", 2)
-    (tmp_path / "images" / "001.png").write_bytes(b"\x89PNG and then nothing")
-    camera = open_camera(f"{tmp_path / 'images'}?rate=max", SETTINGS, CLOCK)
-    camera.read(1.0)
-    with pytest.raises(CameraError, match=r"001\.png is not a picture"):
+    with pytest.raises(CameraError, match=words):
         camera.read(1.0)
 
 

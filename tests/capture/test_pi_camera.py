@@ -12,17 +12,17 @@ import numpy as np
 import picamera2_fake
 import pytest
 from picamera2_fake import GLOBAL_SHUTTER, Sensor, libcamera, plug_in
+from shipped_markers import RHOT6
 
 import rhot_node.capture.pi_camera
 import rhot_node.detect.image
+from rhot_node.capture.camera import Frame
 from rhot_node.capture.open import open_camera
 from rhot_node.capture.pi_camera import CameraStack, PiCamera, load_stack
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.fast import FastDetector
 from rhot_node.errors import CameraError
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
 from rhot_node.warm_up import warm_up_image
 
 CLOCK = NodeClock(offset_ns=10**14)
@@ -47,6 +47,13 @@ def plug() -> Iterator[Open]:
 
 def with_preset(**changes: Any) -> CameraSettings:
     return CameraSettings(**{"fps": 40, "exposure_us": 4000, "gain": 2.0, "red_gain": 1.5, "blue_gain": 1.8, **changes})
+
+
+def next_frame(camera: PiCamera, fake: Any, frames: int = 1) -> Frame:
+    fake.complete(frames)
+    frame = camera.read(1.0)
+    assert frame is not None
+    return frame
 
 
 def test_the_stream_is_yuv420_alone_in_full_range_without_a_queue(plug: Open) -> None:
@@ -88,9 +95,8 @@ def test_presets_tell_their_rate_view_and_row_time(plug: Open, preset: str | Non
     assert (report["preset"], report["sensor"], report["sensor_mode"]) == (preset or "wide", "imx219", mode)
     assert report["fps_max"] == pytest.approx(fps_max, abs=0.01)
     assert report["view_angle_deg"] == pytest.approx(angle, abs=0.05)
-    fake.complete()
-    frame = camera.read(1.0)
-    assert frame is not None and frame.row_time_ns == pytest.approx(1000 * row_us, rel=2e-3)
+    frame = next_frame(camera, fake)
+    assert frame.row_time_ns == pytest.approx(1000 * row_us, rel=2e-3)
     assert report["row_time_us"] == frame.row_time_ns / 1000
 
 
@@ -105,18 +111,16 @@ def test_a_slower_driver_is_believed(plug: Open) -> None:
 
 def test_a_global_shutter_exposes_all_rows_at_once(plug: Open) -> None:
     camera, fake = plug(Sensor("imx296", dict(GLOBAL_SHUTTER)), with_preset(width=728, height=544, fps=60))
-    fake.complete()
-    frame = camera.read(1.0)
+    frame = next_frame(camera, fake)
     report = camera.report()
-    assert frame is not None and frame.row_time_ns == 0
+    assert frame.row_time_ns == 0
     assert (report["preset"], report["view_angle_deg"]) == ("global", None), "its lens is bought separately"
 
 
 def test_an_unknown_sensor_goes_by_its_settings(plug: Open) -> None:
     camera, fake = plug(Sensor("imx708"), with_preset(row_time_us=30))
-    fake.complete()
-    frame = camera.read(1.0)
-    assert frame is not None and frame.row_time_ns == 30_000
+    frame = next_frame(camera, fake)
+    assert frame.row_time_ns == 30_000
     assert camera.report()["preset"] is None
 
 
@@ -129,18 +133,15 @@ def test_a_row_time_set_by_hand_counts(plug: Open) -> None:
     ({}, -2_000_000), ({"timestamp_marks": "exposure"}, 2_000_000), ({"timestamp_offset_us": -300.0}, -2_300_000)])
 def test_times_are_mid_exposures_of_row_0(plug: Open, changes: dict[str, Any], correction_ns: int) -> None:
     camera, fake = plug(settings=with_preset(preset="fast", **changes))
-    fake.complete()
-    frame = camera.read(1.0)
-    assert frame is not None and frame.exposure_ns == 4_000_000
+    frame = next_frame(camera, fake)
+    assert frame.exposure_ns == 4_000_000
     assert frame.t_node_ns == CLOCK.from_host_ns(fake.now_ns + correction_ns)
 
 
 def test_the_first_image_row_of_a_scaled_mode_is_read_a_little_later(plug: Open) -> None:
     """1640 x 1232 shown as 640 x 480: one row is cut off, and the first image row is the mean of 2.56 sensor rows."""
     camera, fake = plug()
-    fake.complete()
-    frame = camera.read(1.0)
-    assert frame is not None
+    frame = next_frame(camera, fake)
     late_ns = frame.t_node_ns - CLOCK.from_host_ns(fake.now_ns - 2_000_000)
     assert late_ns == pytest.approx(18_904 * (1.0 + 0.5 * 1.5625), abs=100)
 
@@ -149,9 +150,8 @@ def test_the_first_image_row_of_a_scaled_mode_is_read_a_little_later(plug: Open)
 def test_the_image_is_the_buffer_itself_without_its_padding(plug: Open, width: int) -> None:
     camera, fake = plug(settings=with_preset(width=width, preset="fast"))
     fake.image = np.arange(width * 480 * 3 // 2, dtype=np.uint32).astype(np.uint8)
-    fake.complete()
-    frame = camera.read(1.0)
-    assert frame is not None and frame.image.size == (width, 480) == camera.size
+    frame = next_frame(camera, fake)
+    assert frame.image.size == (width, 480) == camera.size
     planes = np.concatenate([frame.image.y.ravel(), frame.image.u.ravel(), frame.image.v.ravel()])
     assert np.array_equal(planes, fake.image)
     memories = [np.frombuffer(buffer.memory, np.uint8) for buffer in fake.buffers]
@@ -162,18 +162,15 @@ def test_the_image_is_the_buffer_itself_without_its_padding(plug: Open, width: i
 
 def test_a_native_frame_reaches_the_detector_unconverted(plug: Open, monkeypatch: pytest.MonkeyPatch) -> None:
     camera, fake = plug()
-    markers = load_markers(resource_path("markers", "rhot6.json"))
-    picture = warm_up_image(markers, (640, 480))
+    picture = warm_up_image(RHOT6, (640, 480))
     fake.image = np.concatenate([picture.y.ravel(), picture.u.ravel(), picture.v.ravel()])
 
     def refuse(*_args: object, **_options: object) -> None:
         raise AssertionError("a frame was converted")
 
     monkeypatch.setattr(rhot_node.detect.image.cv2, "cvtColor", refuse)
-    fake.complete()
-    frame = camera.read(1.0)
-    assert frame is not None
-    seen = FastDetector(markers).detect(frame.image)
+    frame = next_frame(camera, fake)
+    seen = FastDetector(RHOT6).detect(frame.image)
     assert all(mark.found for mark in seen)
     assert fake.full_metadata_reads == 0
     del frame
@@ -181,14 +178,11 @@ def test_a_native_frame_reaches_the_detector_unconverted(plug: Open, monkeypatch
 
 def test_the_newest_frame_is_read_and_gaps_are_counted(plug: Open) -> None:
     camera, fake = plug()
-    fake.complete()
-    first = camera.read(1.0)
-    for _ in range(3):
+    first = next_frame(camera, fake)
+    for _ in range(2):
         fake.complete()
-    second = camera.read(1.0)
-    fake.complete(frames=4)  # the sensor's frames that never came
-    third = camera.read(1.0)
-    assert first is not None and second is not None and third is not None
+    second = next_frame(camera, fake)
+    third = next_frame(camera, fake, frames=4)  # of which three never came
     assert [frame.number - first.number for frame in (second, third)] == [3, 7]
     assert camera.report()["lost_by_camera"] == 3
     assert camera.read(0.0) is None
@@ -199,9 +193,7 @@ def test_buffers_go_back_to_the_camera(plug: Open) -> None:
     frame = None
     for _ in range(50):
         fake.complete()
-        fake.complete()
-        frame = camera.read(1.0)
-        assert frame is not None
+        frame = next_frame(camera, fake)
         assert sum(not buffer.free for buffer in fake.buffers) == 1, "only the reader's frame is in use"
     fake.complete()
     del frame

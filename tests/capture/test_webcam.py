@@ -119,16 +119,6 @@ def test_nothing_in_time_is_none(plug: Callable[[FakeCapture], Webcam]) -> None:
     camera.close()
 
 
-def test_a_camera_that_stops_is_an_error(plug: Callable[[FakeCapture], Webcam]) -> None:
-    capture = FakeCapture()
-    camera = plug(capture)
-    capture.works = False
-    with pytest.raises(CameraError, match="stopped delivering"):
-        for _ in range(10):
-            camera.read(1.0)
-    camera.close()
-
-
 def test_a_camera_that_hangs_is_an_error(plug: Callable[[FakeCapture], Webcam],
                                          monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rhot_node.capture.webcam, "SILENCE_S", 0.1)
@@ -142,11 +132,14 @@ def test_a_camera_that_hangs_is_an_error(plug: Callable[[FakeCapture], Webcam],
     camera.close()
 
 
-def test_a_changed_size_is_an_error(plug: Callable[[FakeCapture], Webcam]) -> None:
+@pytest.mark.parametrize(("change", "value", "words"), [
+    ("works", False, "stopped delivering"), ("size", (96, 128), "size changed from 64 x 48 to 128 x 96")])
+def test_a_camera_that_stops_or_changes_its_size_is_an_error(plug: Callable[[FakeCapture], Webcam], change: str,
+                                                             value: object, words: str) -> None:
     capture = FakeCapture()
     camera = plug(capture)
-    capture.size = (96, 128)
-    with pytest.raises(CameraError, match="size changed from 64 x 48 to 128 x 96"):
+    setattr(capture, change, value)
+    with pytest.raises(CameraError, match=words):
         for _ in range(10):
             camera.read(1.0)
     camera.close()

@@ -135,9 +135,8 @@ def test_writer_refuses_a_frame_of_another_size(tmp_path: Path) -> None:
         writer.append(0, np.zeros(10, dtype=np.uint8))
 
 
-@pytest.mark.parametrize("frames", [0])
-def test_a_recording_without_frames_is_refused(tmp_path: Path, frames: int) -> None:
-    record(tmp_path, frames)
+def test_a_recording_without_frames_is_refused(tmp_path: Path) -> None:
+    record(tmp_path, 0)
     with pytest.raises(CameraError, match="no frames"):
         YuvRecording(tmp_path, NodeClock())
 
@@ -156,8 +155,3 @@ def test_a_broken_header_is_named(tmp_path: Path, old: str, new: str) -> None:
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(CameraError, match=HEADER_NAME):
         YuvRecording(tmp_path, NodeClock())
-
-
-def test_an_absent_folder_is_named(tmp_path: Path) -> None:
-    with pytest.raises(CameraError, match="no such folder"):
-        YuvRecording(tmp_path / "nothing", NodeClock())
