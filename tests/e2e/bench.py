@@ -15,17 +15,16 @@ from pathlib import Path
 
 import msgspec
 from patience import PATIENCE_S
+from shipped_markers import RHOT6
+from shipped_rig import RIGHT_HAND
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.status import NodeStatus
-from rhot_app.hand.anatomy import load_hand
 from rhot_app.keys import load_master_keys
 from rhot_app.project import Broadcast, CameraPose, Intrinsics, Rig, RigNode, save_rig
 from rhot_app.state import HandState
 from rhot_node.config import ClockSettings, NodeSettings, save_settings
-from rhot_node.files import resource_path
 from rhot_node.keys import keys_path, pair_beforehand
-from rhot_node.markers import load_markers
 
 BASELINE_M = 0.075
 WIDTH, HEIGHT, FPS = 640, 480, 40.0
@@ -137,8 +136,7 @@ def make_rig(ports: Sequence[int]) -> Rig:
         control_port=ports[4 * index + 1], preview_port=ports[4 * index + 2], data_port=ports[4 * index + 3],
         pairing_port=ports[9 + index])
         for index, name in enumerate(("left", "right")))
-    return Rig(name="bench", nodes=nodes, markers=load_markers(resource_path("markers", "rhot6.json")),
-               hand=load_hand(resource_path("hands", "right.json")),
+    return Rig(name="bench", nodes=nodes, markers=RHOT6, hand=RIGHT_HAND,
                broadcast=Broadcast("127.255.255.255", ports[8]))
 
 
@@ -177,6 +175,18 @@ def node_status(client: EngineClient, name: str) -> NodeStatus | None:
     if client.status is None:
         return None
     return next((node for node in client.status.nodes if node.name == name), None)
+
+
+def streams(client: EngineClient, name: str) -> bool:
+    """Whether the engine says that a node streams."""
+    status = node_status(client, name)
+    return status is not None and status.state == "streaming" and status.rate_hz > 0.0
+
+
+def tracks(client: EngineClient) -> bool:
+    """Whether both nodes stream and a state describes the last moment."""
+    return (streams(client, "left") and streams(client, "right") and client.state is not None
+            and time.monotonic_ns() - client.state.t_master_ns < 300_000_000)
 
 
 def states_of(client: EngineClient, seconds: float) -> list[HandState]:

@@ -6,11 +6,12 @@ Plainer than the digital twin on purpose: it shares no code with it, so that bot
 from __future__ import annotations
 
 import math
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from bench import FPS, HEIGHT, WIDTH
+from bench import FPS, HEIGHT, WIDTH, Bench
 from numpy.typing import NDArray
 
 from rhot_app.hand.kinematics import forward
@@ -56,6 +57,15 @@ class Scene:
             for frame in range(round(seconds * FPS)):
                 t_s = frame / FPS
                 writer.append(round(1e9 * t_s), draw(self.pixels(node, t_s), self.rig.markers))
+
+
+def start_still_hand(bench: Bench) -> tuple[subprocess.Popen[bytes], list[subprocess.Popen[bytes]]]:
+    """An engine and both nodes, before whose cameras a hand holds still."""
+    for node in bench.rig.nodes:
+        Scene(bench.rig).record(bench.folder / f"{node.name}.yuv", node, 0.5)
+    engine = bench.start_engine("--start")
+    return engine, [bench.start_node(index, f"yuv:{bench.folder / node.name}.yuv")
+                    for index, node in enumerate(bench.rig.nodes)]
 
 
 def project(node: RigNode, points_m: Array) -> Array:

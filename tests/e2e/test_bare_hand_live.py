@@ -8,8 +8,9 @@ import time
 import msgspec
 import numpy as np
 import pytest
-from bare_scenes import model_and_surface, poses, rig_of, right_hand, scene
+from bare_scenes import model_and_surface, poses, rig_of, scene
 from bench import START_S, TEST_S, Bench, node_status, states_of, wait_until
+from shipped_rig import RIGHT_HAND
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.offline.replay_summary import replay_states
@@ -36,7 +37,7 @@ def record(bench: Bench) -> None:
     """An empty scene, repeated until the recordings start, then the hand, at rest and moving."""
     drawn = [scene(pose, k) for k, pose in enumerate(poses("grasp", TIMES))]
     cameras, walls = drawn[0][0], drawn[0][2]
-    for index, node in enumerate(rig_of(cameras, right_hand()).nodes):
+    for index, node in enumerate(rig_of(cameras).nodes):
         pictures = [walls[index], *(images[index] for _, images, _ in drawn)]
         planes = [from_bgr(picture[:, :, ::-1]) for picture in pictures]
         packed = [np.concatenate([one.y.ravel(), one.u.ravel(), one.v.ravel()]) for one in planes]
@@ -45,9 +46,9 @@ def record(bench: Bench) -> None:
                        0) as out:
             for number, which in enumerate((-1, *ORDER)):
                 out.append(round(1e9 * number / FPS), packed[1 + which])
-    seen = rig_of(cameras, right_hand())
+    seen = rig_of(cameras)
     bench.rig = msgspec.structs.replace(
-        bench.rig, hand=right_hand(), tracker=TrackerSettings("estimator", observe="contours"),
+        bench.rig, hand=RIGHT_HAND, tracker=TrackerSettings("estimator", observe="contours"),
         nodes=tuple(msgspec.structs.replace(node, intrinsics=other.intrinsics, pose=other.pose)
                     for node, other in zip(bench.rig.nodes, seen.nodes, strict=True)))
     bench.save()
@@ -55,7 +56,7 @@ def record(bench: Bench) -> None:
 
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours", "rhot_node/slice_search.py")
 @pytest.mark.timeout(2 * TEST_S)
-def test_a_bare_hand_is_tracked_by_what_its_nodes_find(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bare_hand_is_tracked_by_what_its_nodes_find(bench: Bench) -> None:
     record(bench)
     begin, log = bench.folder / "begin", bench.folder / "hand.rlog"
     for index, node in enumerate(bench.rig.nodes):
@@ -82,8 +83,6 @@ def test_a_bare_hand_is_tracked_by_what_its_nodes_find(bench: Bench, capsys: pyt
         received = []
         while time.monotonic_ns() < t0_ns + 1e9 * (len(ORDER) + 1) / FPS:
             received += [(time.monotonic_ns(), state) for state in states_of(client, 0.05)]
-        counters = client.command("node", node_id=1, request={"request": "counters"},
-                                  timeout_s=COMMAND_S)["answer"]["counters"]
         client.command("record_stop", timeout_s=COMMAND_S)
     model = model_and_surface()[0]
     moving = poses("grasp", TIMES)
@@ -97,10 +96,6 @@ def test_a_bare_hand_is_tracked_by_what_its_nodes_find(bench: Bench, capsys: pyt
     before = [state for _, state in received if state.t_master_ns < t0_ns]
     assert errors_mm, "the hand is tracked while it moves"
     rate_hz = len(errors_mm) * FPS / len(MOVING)
-    with capsys.disabled():
-        print(f"\nbare hand, live: median joint {np.median(errors_mm):.1f} mm, worst state {np.max(errors_mm):.1f} mm, "
-              f"{rate_hz:.1f} of {FPS:g} states/s, exposure to state {1e3 * np.median(ages_s):.0f} ms, "
-              f"{counters['slice_frames']} frames searched, {counters['slice_frames_skipped']} left out")
     assert before and not any(state.tracked for state in before), "there was no hand yet"
     assert rate_hz > 0.3 * FPS, "a busy machine may lose the hand once"
     assert np.median(errors_mm) < ERROR_MM

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import subprocess
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from bench import FPS, START_S, TEST_S, Bench, kill_hard, node_status, states_of, wait_until
+from bench import FPS, START_S, TEST_S, Bench, kill_hard, states_of, streams, tracks, wait_until
 from patience import PATIENCE_S, eventually
-from scene import Scene
+from scene import start_still_hand
 
 from rhot_app.engine.client import EngineClient
 
@@ -24,38 +23,19 @@ class Running:
     """A bench whose nodes and engine stream a hand that holds still."""
 
     bench: Bench
-    nodes: list[subprocess.Popen[bytes]]
     engine: subprocess.Popen[bytes]
+    nodes: list[subprocess.Popen[bytes]]
     client: EngineClient
-
-    def camera(self, index: int) -> str:
-        """Camera spec of a node."""
-        return f"yuv:{self.bench.folder / self.bench.rig.nodes[index].name}.yuv"
-
-    def streams(self, name: str) -> bool:
-        """Whether the engine says that a node streams."""
-        status = node_status(self.client, name)
-        return status is not None and status.state == "streaming" and status.rate_hz > 0.0
-
-    def tracks(self) -> bool:
-        """Whether both nodes stream and a state describes the last moment."""
-        state = self.client.state
-        return (self.streams("left") and self.streams("right") and state is not None
-                and time.monotonic_ns() - state.t_master_ns < 300_000_000)
 
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
     """Nodes, engine and client, once states flow; so does every test leave them."""
     bench = Bench(tmp_path_factory.mktemp("crashes"))
-    scene = Scene(bench.rig)
-    for node in bench.rig.nodes:
-        scene.record(bench.folder / f"{node.name}.yuv", node, 0.5)
     try:
         with EngineClient(bench.sockets) as client:
-            running = Running(bench, [], bench.start_engine("--start"), client)
-            running.nodes += [bench.start_node(index, running.camera(index)) for index in range(2)]
-            wait_until(client, running.tracks, START_S, "states from both nodes")
+            running = Running(bench, *start_still_hand(bench), client)
+            wait_until(client, lambda: tracks(client), START_S, "states from both nodes")
             yield running
     finally:
         bench.clear()
@@ -73,13 +53,13 @@ def test_a_killed_node_shows_within_a_second_and_joins_again(running: Running) -
     shown_s, named_s, joined_s = [], [], []
     for life in range(2, 6):  # the quickest of a few counts: the machine has other things to do
         kill_hard(running.nodes[0])
-        shown_s.append(wait_until(client, lambda: not running.streams("left"), PATIENCE_S, "the silent node shows"))
+        shown_s.append(wait_until(client, lambda: not streams(client, "left"), PATIENCE_S, "the silent node shows"))
         named_s.append(wait_until(client, lambda: any("left" in advice.text for advice in client.status.advice),
                                   PATIENCE_S, "a sentence names the silent node"))
-        wait_until(client, lambda: running.streams("right"), PATIENCE_S, "the other node goes on")
-        running.nodes[0] = bench.start_node(0, running.camera(0))
+        wait_until(client, lambda: streams(client, "right"), PATIENCE_S, "the other node goes on")
+        running.nodes[0] = bench.start_node(0, f"yuv:{bench.folder}/left.yuv")
         wait_ready(bench, "left", life)
-        joined_s.append(wait_until(client, running.tracks, PATIENCE_S, "the node joins again"))
+        joined_s.append(wait_until(client, lambda: tracks(client), PATIENCE_S, "the node joins again"))
         if max(shown_s[-1], named_s[-1]) < NOTICED_S and joined_s[-1] < REJOINED_S:
             break
     assert min(shown_s) < NOTICED_S and min(named_s) < NOTICED_S and min(joined_s) < REJOINED_S
@@ -94,7 +74,7 @@ def test_a_new_engine_takes_over_from_a_killed_one(running: Running) -> None:
     running.engine = bench.start_engine("--start")
     wait_until(client, lambda: client.status is not None and client.status.pid == running.engine.pid, START_S,
                "a new status")
-    wait_until(client, running.tracks, START_S, "the nodes join the new engine")
+    wait_until(client, lambda: tracks(client), START_S, "the nodes join the new engine")
     assert [node.poll() for node in running.nodes] == [None, None]
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import socket
 import subprocess
-from collections.abc import Callable
 
 import pytest
 from bench import START_S, TEST_S, Bench, ends, wait_until
@@ -35,20 +34,6 @@ def test_a_taken_data_port_stops_the_engine(bench: Bench) -> None:
 
 
 @pytest.mark.timeout(TEST_S)
-@pytest.mark.parametrize("which", ["udp_port", "control_port"])
-def test_a_taken_port_stops_a_node(bench: Bench, which: str) -> None:
-    node = bench.rig.nodes[0]
-    port = getattr(node, which)
-    Scene(bench.rig).record(bench.folder / "left.yuv", node, 0.1)
-    kind = socket.SOCK_DGRAM if which == "udp_port" else socket.SOCK_STREAM
-    with socket.socket(socket.AF_INET, kind) as holder:
-        holder.bind(("127.0.0.1", port))
-        if kind == socket.SOCK_STREAM:
-            holder.listen()
-        assert refused(bench, bench.start_node(0, f"yuv:{bench.folder}/left.yuv"), "left", str(port))
-
-
-@pytest.mark.timeout(TEST_S)
 def test_a_second_engine_in_the_same_directory_is_refused(bench: Bench) -> None:
     first = bench.start_engine()
     with EngineClient(bench.sockets) as client:
@@ -57,20 +42,6 @@ def test_a_second_engine_in_the_same_directory_is_refused(bench: Bench) -> None:
                              "second")
         assert refused(bench, second, "second", str(first.pid))
         assert client.command("hello")["pid"] == first.pid
-
-
-@pytest.mark.timeout(TEST_S)
-@pytest.mark.parametrize("damaged", [lambda text: text[:200], lambda text: text.replace('sion": 1', 'sion": 99'),
-                                     lambda _: '{"format": "shopping-list", "version": 1}'])
-def test_bad_files_are_named(bench: Bench, damaged: Callable[[str], str]) -> None:
-    settings = bench.settings_path(bench.rig.nodes[0])
-    for path in (bench.rig_path, settings):
-        before = path.read_text()
-        path.write_text(damaged(before))
-        assert path.read_text() != before
-    refused(bench, bench.start_engine(), "engine", str(bench.rig_path))
-    refused(bench, bench.start_node(0, "yuv:nowhere"), "left", str(settings))
-    assert not list(bench.folder.glob(".*")), "no half-written file"
 
 
 @pytest.mark.timeout(TEST_S)

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 import zmq
-from bench import START_S, TEST_S, Bench, node_status, wait_until
+from bench import START_S, TEST_S, Bench, node_status, tracks, wait_until
 from patience import PATIENCE_S
-from scene import Scene
+from scene import start_still_hand
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.recording.raw_log import LogReader, RecordKind
@@ -47,13 +47,6 @@ class Attack:
     client: EngineClient
     context: zmq.Context[zmq.Socket[bytes]]
     udp: socket.socket
-
-    def tracks(self) -> bool:
-        """Whether both nodes stream and a state describes the last moment."""
-        state = self.client.state
-        both = [status for name in ("left", "right") if (status := node_status(self.client, name)) is not None]
-        return (len(both) == 2 and all(status.state == "streaming" and status.rate_hz > 0.0 for status in both)
-                and state is not None and time.monotonic_ns() - state.t_master_ns < 300_000_000)
 
     def dropped(self) -> dict[str, int]:
         """What the engine has refused of the left node's port."""
@@ -97,19 +90,13 @@ def attack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Attack]:
     """One start of everything for all tests, because none may leave a trace."""
     bench = Bench(tmp_path_factory.mktemp("strangers"))
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-    scene = Scene(bench.rig)
-    for node in bench.rig.nodes:
-        scene.record(bench.folder / f"{node.name}.yuv", node, 0.5)
     try:
         with EngineClient(bench.sockets) as client, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
             udp.bind(("127.0.0.1", 0))
             udp.settimeout(SILENCE_S)
-            bench.start_engine("--start")
-            for index, node in enumerate(bench.rig.nodes):
-                bench.start_node(index, f"yuv:{bench.folder / node.name}.yuv")
-            attack = Attack(bench, client, context, udp)
-            wait_until(client, attack.tracks, START_S, "states from both nodes")
-            yield attack
+            start_still_hand(bench)
+            wait_until(client, lambda: tracks(client), START_S, "states from both nodes")
+            yield Attack(bench, client, context, udp)
     finally:
         context.destroy(linger=0)
         bench.clear()
@@ -149,7 +136,7 @@ def test_it_stops_no_node_and_takes_none_over(attack: Attack) -> None:
         attack.udp.recv(2048)
     answers = attack.answers(request="stop") + attack.answers(request="start", session=9, host="127.0.0.1", port=port)
     assert not any(json.loads(part)["ok"] for part in answers)
-    wait_until(attack.client, attack.tracks, PATIENCE_S, "everything goes on")
+    wait_until(attack.client, lambda: tracks(attack.client), PATIENCE_S, "everything goes on")
 
     def all_counted() -> bool:
         counters = attack.client.command("node", node_id=1, request={"request": "counters"})["answer"]["counters"]
@@ -162,7 +149,7 @@ def test_it_stops_no_node_and_takes_none_over(attack: Attack) -> None:
 
 def test_it_moves_no_marker(attack: Attack) -> None:
     client, rig = attack.client, attack.bench.rig
-    wait_until(client, lambda: attack.tracks() and client.state is not None
+    wait_until(client, lambda: tracks(client) and client.state is not None
                and bool((client.state.marker_knowledge == Knowledge.MEASURED).all()), PATIENCE_S, "all markers' places")
     status, node = client.status, node_status(client, "left")
     assert status is not None and node is not None and node.clock_offset_s is not None and client.state is not None
@@ -182,6 +169,7 @@ def test_it_moves_no_marker(attack: Attack) -> None:
     for state in states:
         measured = state.marker_knowledge == Knowledge.MEASURED
         np.testing.assert_allclose(state.marker_positions[measured], before[measured], atol=0.004)
+
     def forged_ones() -> list[int]:
         return [attack.dropped().get(kind, 0) for kind in ("untagged", "tag")]
 

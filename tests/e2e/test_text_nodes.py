@@ -55,28 +55,18 @@ def count_dropped(client: EngineClient) -> int:
 
 
 @pytest.mark.timeout(TEST_S)
-def test_text_datagrams_move_the_markers(bench: Bench) -> None:
+def test_text_datagrams_move_the_markers_and_garbage_between_them_is_counted_and_dropped(bench: Bench) -> None:
     bench.allow_text()
     bench.start_engine("--start")
     here_m = Scene(bench.rig).markers_m(0.0)
     there_m = here_m + np.array([0.02, -0.03, 0.05])
-    with EngineClient(bench.sockets) as client:
-        wait_until(client, lambda: client.status is not None, START_S, "the engine's status")
-        for points_m in (here_m, there_m):
-            send_until_it_follows(bench, client, points_m)
-
-
-@pytest.mark.timeout(TEST_S)
-def test_garbage_between_text_datagrams_is_counted_and_dropped(bench: Bench) -> None:
-    bench.allow_text()
-    bench.start_engine("--start")
-    points_m = Scene(bench.rig).markers_m(0.0)
     garbage = [b"", b"nan,nan;" * 6, b"1,2;3,4", b"\xff" * 200, b"1e308,1;" * 6, b"RHOT" + bytes(60), b"x" * 9000]
     with EngineClient(bench.sockets) as client:
         wait_until(client, lambda: client.status is not None, START_S, "the engine's status")
-        send_until_it_follows(bench, client, points_m, garbage)
+        for points_m in (here_m, there_m):
+            send_until_it_follows(bench, client, points_m, garbage)
         before = count_dropped(client)
-        send(bench, client, points_m, 2 * len(garbage), garbage)
+        send(bench, client, there_m, 2 * len(garbage), garbage)
         wait_until(client, lambda: count_dropped(client) >= before + 2 * len(garbage), PATIENCE_S, "every drop")
 
 
