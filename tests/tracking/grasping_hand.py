@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from synthetic_rig import EPOCH_NS, WIDE, Preset, Trajectory, Viewing, hand_trajectory, make_rig, observe, run
+from synthetic_rig import WIDE, Preset, Trajectory, Viewing, hand_trajectory, make_rig, observe, run
 
 from rhot_app.project import Rig
 from rhot_app.state import HandState, Knowledge
@@ -20,8 +20,3 @@ def states_of(viewing: Viewing = VIEWING, rig: Rig = RIG, preset: Preset = WIDE,
               seconds: float = 4.0) -> list[HandState]:
     """What a new tracker says of this trajectory."""
     return run(make_tracker(rig), observe(rig, preset, trajectory, seconds, viewing))
-
-
-def seconds(state: HandState) -> float:
-    """Since the trajectory's begin, s."""
-    return (state.t_master_ns - EPOCH_NS) * 1e-9

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from synthetic_rig import EPOCH_NS, WIDE, Trajectory, Viewing, hand_trajectory, make_rig, observe, run
+from synthetic_rig import WIDE, Trajectory, Viewing, hand_trajectory, make_rig, observe, run, seconds
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import Rig, TrackerSettings
@@ -52,11 +52,6 @@ def states_of(rig: Rig, frames: list[CameraObservations]) -> list[HandState]:
 def after_s(states: list[HandState], begin: float, end: float = np.inf) -> list[HandState]:
     """The states of instants from `begin` to `end`, s."""
     return [state for state in states if begin <= seconds(state) < end]
-
-
-def seconds(state: HandState) -> float:
-    """Since the trajectory's begin, s."""
-    return (state.t_master_ns - EPOCH_NS) * 1e-9
 
 
 @dataclass(frozen=True)

@@ -9,17 +9,18 @@ from functools import cache
 import msgspec
 import numpy as np
 from scipy.interpolate import CubicSpline
+from shipped_markers import RHOT6
+from shipped_rig import RIGHT_HAND
 
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.anatomy import HandAnatomy, load_hand
+from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import build_model
 from rhot_app.project import CameraPose, FilterSettings, Intrinsics, Rig, RigNode
 from rhot_app.simulator.render.body import build_body
 from rhot_app.simulator.scene.motion import load_motion
 from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations, Tracker
-from rhot_node.files import resource_path
-from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag
 
 Trajectory = Callable[[np.ndarray], np.ndarray]  # (N,) s -> (N, M, 3) m
@@ -41,13 +42,13 @@ FAST = Preset(120.0, 10_000, float(320 / np.tan(np.radians(13.25))))
 def make_rig(preset: Preset = WIDE, *, cameras: int = 2, filters: FilterSettings | None = None,
              bodies: bool = False) -> Rig:
     lens = Intrinsics(640, 480, preset.focal, preset.focal, 319.5, 239.5, (-0.05, 0.0, 0.0, 0.0, 0.0))
-    markers = load_markers(resource_path("markers", "rhot6.json"))
+    markers = RHOT6
     if not bodies:
         markers = msgspec.structs.replace(markers, markers=tuple(
             msgspec.structs.replace(marker, radius_mm=None, shape="blob") for marker in markers.markers))
     nodes = tuple(RigNode(k + 1, f"camera {k + 1}", lens, CameraPose(translation_m=(0.075 * k, 0.0, 0.0)))
                   for k in range(cameras))
-    return Rig("synthetic", nodes, markers, load_hand(resource_path("hands", "right.json")),
+    return Rig("synthetic", nodes, markers, RIGHT_HAND,
                FilterSettings() if filters is None else filters)
 
 
@@ -133,6 +134,15 @@ def altered(frames, change):
     return out
 
 
+def hidden(markers, begin, end=np.inf, camera=None):
+    """Edits frames so that `markers` are out of sight of one camera, or of all, from `begin` to `end`, s."""
+    def hide(t, eye, _pixels, flags):
+        if begin < t < end and camera in (None, eye):
+            flags[markers] = LOST
+
+    return hide
+
+
 def run(tracker: Tracker, frames: list[CameraObservations]) -> list[HandState]:
     states = []
     for observations in frames:
@@ -141,6 +151,11 @@ def run(tracker: Tracker, frames: list[CameraObservations]) -> list[HandState]:
         if state is not None:
             states.append(state)
     return states
+
+
+def seconds(state: HandState) -> float:
+    """Since the trajectory's begin, s."""
+    return (state.t_master_ns - EPOCH_NS) * 1e-9
 
 
 @dataclass(frozen=True)
@@ -156,7 +171,7 @@ class Errors:
 
 def compare(rig: Rig, states: list[HandState], trajectory: Trajectory) -> Errors:
     states = [s for s in states if s.t_master_ns >= EPOCH_NS + 10**9]
-    times = np.array([s.t_master_ns - EPOCH_NS for s in states]) * 1e-9
+    times = np.array([seconds(s) for s in states])
     truth = trajectory(times)
     measured = np.array([s.marker_knowledge for s in states]) == Knowledge.MEASURED
     error = np.linalg.norm(np.array([s.marker_positions for s in states]) - truth, axis=2)[measured]

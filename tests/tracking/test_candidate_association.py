@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from grasping_hand import INFERRED, MEASURED, REST, RIG, seconds
+from grasping_hand import INFERRED, MEASURED, REST, RIG
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
-from synthetic_rig import LOST, WIDE, Viewing, observe, run, still_trajectory
+from synthetic_rig import LOST, WIDE, Viewing, observe, run, seconds, still_trajectory
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import with_tracker
@@ -35,7 +35,6 @@ def with_further(frame: CameraObservations, markers: list[int], points_m: np.nda
     further = Candidates(np.array(markers), pixels, np.tile(1e-3 * np.eye(2), (count, 1, 1)), np.full(count, 16.0),
                          np.ones(count), np.zeros(count, np.uint16))
     return replace(frame, pixels=own, further=further)
-
 
 
 KNOWN = {"classic": MEASURED, "estimator": INFERRED}  # a blob is paint that nobody measured

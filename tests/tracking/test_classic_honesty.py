@@ -6,7 +6,7 @@ from itertools import pairwise
 import msgspec
 import numpy as np
 import pytest
-from grasping_hand import GRASP, INFERRED, MEASURED, REST, RIG, UNKNOWN, seconds, states_of
+from grasping_hand import GRASP, INFERRED, MEASURED, REST, RIG, UNKNOWN, states_of
 from synthetic_rig import (
     EPOCH_NS,
     LOST,
@@ -14,9 +14,11 @@ from synthetic_rig import (
     Viewing,
     altered,
     compare,
+    hidden,
     make_rig,
     observe,
     run,
+    seconds,
     still_trajectory,
 )
 
@@ -39,11 +41,7 @@ def test_every_part_says_how_it_is_known():
 
 
 def test_a_hidden_marker_is_carried_on_then_unknown_and_its_finger_a_guess():
-    def hide(t, camera, _pixels, flags):
-        if camera == 0 and t > 1.0:
-            flags[1] = LOST
-
-    states = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 2.0, Viewing()), hide))
+    states = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 2.0, Viewing()), hidden(1, 1.0, camera=0)))
     knowledge = {round(seconds(s) - 1.0, 3): s.marker_knowledge[1] for s in states}
     assert all(known == MEASURED for t, known in knowledge.items() if -0.9 < t < -0.03)
     assert all(known == INFERRED for t, known in knowledge.items() if 0.03 < t < 0.2)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from modelled_hand import after_s, deviations, model_rig, moving, observations_of, seconds, states_of
-from synthetic_rig import LOST, Viewing, altered, hand_trajectory, make_rig, run
+from modelled_hand import after_s, deviations, model_rig, moving, observations_of, states_of
+from synthetic_rig import LOST, Viewing, altered, hand_trajectory, hidden, make_rig, run, seconds
 
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
@@ -83,11 +83,7 @@ def test_a_hand_is_found_within_a_fifth_of_a_second():
 
 def before_one_camera(rig, truth):
     """The states of a hand that one camera does not see from 1 s to 2 s."""
-    def blind(t, camera, _pixels, flags):
-        if camera == 0 and 1.0 < t < 2.0:
-            flags[:] = LOST
-
-    return states_of(rig, altered(observations_of(rig, truth, SECONDS), blind))
+    return states_of(rig, altered(observations_of(rig, truth, SECONDS), hidden(slice(None), 1.0, 2.0, 0)))
 
 
 def test_a_hand_before_one_camera_is_as_far_away_as_its_fingertips_look():
@@ -111,15 +107,6 @@ def test_one_blind_camera_does_not_end_the_tracking():
     sighted = deviations(after_s(states, 0.6, 1.0), moving("rest"))
     assert found.mm.mean() > sighted.mm.mean()
     assert deviations(after_s(states, 2.3), moving("rest")).rms_mm < 3.0
-
-
-def hidden(markers, begin, end, camera=None):
-    """Edits frames so that `markers` are out of sight of one camera, or of all, from `begin` to `end`, s."""
-    def hide(t, eye, _pixels, flags):
-        if begin < t < end and camera in (None, eye):
-            flags[markers] = LOST
-
-    return hide
 
 
 @pytest.mark.parametrize(("motion", "camera"), [
@@ -166,9 +153,9 @@ def test_markers_hidden_in_turns():
     states = after_s(states_of(RIG, altered(observations_of(RIG, moving("rest"), SECONDS), hide)), 1.0)
     found = deviations(states, moving("rest"))
     assert found.rms_mm < 6.0 and found.within >= 0.97
-    hidden = np.array([state.camera_flags[:, :5] & LOST for state in states]).all(axis=1)
+    unseen = np.array([state.camera_flags[:, :5] & LOST for state in states]).all(axis=1)
     measured = np.array([state.marker_knowledge[:5] for state in states]) == Knowledge.MEASURED
-    assert hidden.mean() > 0.2 and (hidden & measured).mean() < 0.5 * hidden.mean()
+    assert unseen.mean() > 0.2 and (unseen & measured).mean() < 0.5 * unseen.mean()
 
 
 def test_names_that_are_exchanged_are_put_right_by_the_hand():
@@ -216,11 +203,7 @@ def test_a_frame_that_is_far_too_late_changes_nothing():
 
 
 def test_a_hand_that_leaves_is_lost_and_found_again():
-    def leave(t, _camera, _pixels, flags):
-        if 1.0 < t < 2.0:
-            flags[:] = LOST
-
-    states = states_of(RIG, altered(observations_of(RIG, moving(), SECONDS), leave))
+    states = states_of(RIG, altered(observations_of(RIG, moving(), SECONDS), hidden(slice(None), 1.0, 2.0)))
     assert all(state.condition in HERE for state in after_s(states, 0.2, 1.0))
     assert all(state.condition is Condition.PARTIAL for state in after_s(states, 1.1, 1.4))
     gone = after_s(states, 1.6, 2.0)
@@ -258,12 +241,8 @@ def test_a_still_hand_leaves_its_size_open(factor):
 
 
 def test_a_hand_found_again_has_the_size_that_it_had_and_a_reset_forgets_it():
-    def leave(t, _camera, _pixels, flags):
-        if 5.0 < t < 6.0:
-            flags[:] = LOST
-
-    tracker = make_tracker(of_wrong_size(1.1))
-    states = run(tracker, altered(observations_of(RIG, moving("grasp", 8.0), 7.0), leave))
+    tracker, frames = make_tracker(of_wrong_size(1.1)), observations_of(RIG, moving("grasp", 8.0), 7.0)
+    states = run(tracker, altered(frames, hidden(slice(None), 5.0, 6.0)))
     assert any(state.condition is Condition.LOST for state in states)
     before, after = (sizes_of(after_s(states, *span)) for span in ((4.0, 5.0), (6.2, 7.0)))
     assert np.abs(after[0, 0] - before[-1, 0]) < 0.02 and after[0, 1] < before[0, 1] + 0.01

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from modelled_hand import model_rig, moving, observations_of, seconds, states_of
-from synthetic_rig import EPOCH_NS
+from modelled_hand import model_rig, moving, observations_of, states_of
+from synthetic_rig import EPOCH_NS, seconds
 
 from rhot_app.project import with_tracker
 from rhot_app.state import Condition

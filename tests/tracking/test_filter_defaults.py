@@ -34,15 +34,11 @@ def with_and_without(preset, distance, motion, noise_px=0.03):
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_a_hand_at_rest_jitters_less(preset):
-    filtered, raw = with_and_without(*PRESETS[preset], None)
-    assert filtered < 0.75 * raw
-
-
-@pytest.mark.parametrize("preset", PRESETS)
-def test_a_grasping_hand_is_followed_as_exactly_as_without_filters(preset):
-    filtered, raw = with_and_without(*PRESETS[preset], "grasp")
-    assert filtered < 1.1 * raw
+@pytest.mark.parametrize(("motion", "share"), [(None, 0.75), ("grasp", 1.1)])
+def test_a_hand_at_rest_jitters_less_and_a_grasping_one_is_followed_as_exactly_as_without_filters(preset, motion,
+                                                                                                  share):
+    filtered, raw = with_and_without(*PRESETS[preset], motion)
+    assert filtered < share * raw
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from grasping_hand import GRASP, MEASURED, RIG, UNKNOWN, VIEWING, seconds
-from synthetic_rig import LOST, WIDE, altered, observe, run
+from grasping_hand import GRASP, MEASURED, RIG, UNKNOWN, VIEWING
+from synthetic_rig import WIDE, altered, hidden, observe, run, seconds
 
 from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.trackers import make_tracker
@@ -15,11 +15,8 @@ WRIST = 5
 
 def states_without_wrist(since_s: float, until_s: float, tips: int, length_s: float = 3.0) -> list[HandState]:
     """What the tracker says when only the first `tips` fingertips are seen from `since_s` to `until_s`."""
-    def hide(t, _camera, _pixels, flags):
-        if since_s <= t < until_s:
-            flags[tips:] = LOST
-
-    return run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, length_s, VIEWING), hide))
+    frames = observe(RIG, WIDE, GRASP, length_s, VIEWING)
+    return run(make_tracker(RIG), altered(frames, hidden(slice(tips, None), since_s, until_s)))
 
 
 def tip_errors_m(state: HandState, tips: int, knowledge: Knowledge = Knowledge.MEASURED) -> np.ndarray:
@@ -46,7 +43,7 @@ def test_the_doubt_about_the_rest_grows() -> None:
 
 @pytest.mark.parametrize(("tips", "joints"), [(2, Knowledge.UNKNOWN), (5, Knowledge.GUESSED)])
 def test_fingertips_are_told_before_the_wrist_was_ever_seen(tips: int, joints: Knowledge) -> None:
-    last = states_without_wrist(0.0, 9.0, tips, 0.5)[-1]
+    last = states_without_wrist(-1.0, 9.0, tips, 0.5)[-1]
     # Two markers that were never seen with a third may be two things.
     assert tip_errors_m(last, tips, Knowledge.INFERRED if tips < 3 else MEASURED).max() < 3e-3
     assert np.isfinite(last.fingertip_positions[:, 0]).sum() == (tips if joints == Knowledge.UNKNOWN else 5)

@@ -6,6 +6,8 @@ from functools import cache
 import msgspec
 import numpy as np
 import pytest
+from modelled_hand import states_of
+from shipped_markers import LANDMARKS21, RHOT6
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import forward
@@ -26,23 +28,12 @@ from rhot_app.simulator.nodes.landmark_detector import (
 from rhot_app.tracking.markers import acquisition
 from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
-from rhot_app.tracking.trackers import make_tracker
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
 from rhot_node.wire.messages import MarkerFlag
 
 FPS, SECONDS, SETTLED_S = 30.0, 2.5, 1.0
 MOST_START_S = 0.5
 RIG = landmark_rig()
 TIPS = [JOINTS.index(f"{finger}_tip") for finger in ("thumb", "index", "middle", "ring", "little")]
-
-
-def states_of(rig, frames):
-    tracker, states = make_tracker(rig), []
-    for frame in frames:
-        tracker.ingest(frame)
-        states.append(tracker.solve())
-    return states
 
 
 @cache
@@ -70,9 +61,8 @@ def rms_mm(errors):
 
 
 def test_the_marker_set_has_the_joints_in_the_usual_order():
-    markers = load_markers(resource_path("markers", "landmarks21.json"))
-    assert markers.ids == JOINTS
-    assert tuple(marker.role for marker in markers.markers) == LANDMARK_ROLES
+    assert LANDMARKS21.ids == JOINTS
+    assert tuple(marker.role for marker in LANDMARKS21.markers) == LANDMARK_ROLES
 
 
 def test_a_landmark_is_at_its_joint():
@@ -163,11 +153,10 @@ def test_one_wrong_landmark_does_not_take_another_ones_place():
 def mixed_rig():
     """Two painted fingertips, landmarks for all other joints."""
     painted = {marker.role: msgspec.structs.replace(marker, id=f"paint_{marker.id}", shape="disc", radius_mm=None)
-               for marker in load_markers(resource_path("markers", "rhot6.json")).markers}
-    landmarks = load_markers(resource_path("markers", "landmarks21.json"))
-    rest = tuple(marker for marker in landmarks.markers if marker.id not in ("thumb_tip", "index_tip"))
+               for marker in RHOT6.markers}
+    rest = tuple(marker for marker in LANDMARKS21.markers if marker.id not in ("thumb_tip", "index_tip"))
     return landmark_rig(markers=msgspec.structs.replace(
-        landmarks, markers=(*rest, painted["thumb_tip"], painted["index_tip"])))
+        LANDMARKS21, markers=(*rest, painted["thumb_tip"], painted["index_tip"])))
 
 
 def test_two_painted_fingertips_and_landmarks_are_better_than_either():

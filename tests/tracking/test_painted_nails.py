@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from shipped_markers import NAILS6
 from synthetic_rig import EPOCH_NS, WIDE, Viewing, compare, hand_trajectory, make_rig, observe, run
 
 from rhot_app.hand.model import build_model
@@ -13,19 +14,16 @@ from rhot_app.project import FilterSettings, Rig, TrackerSettings
 from rhot_app.simulator.scene.motion import load_motion
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.trackers import make_tracker
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
 
-NAILS = load_markers(resource_path("markers", "nails6.json"))
 SECONDS = 3.0
 
 
 def nails_rig(**fields: object) -> Rig:
     """The wrist without a body, as the rig's other sights are centres."""
     markers = tuple(msgspec.structs.replace(m, shape="blob", radius_mm=None) if m.role == "wrist"
-                    else msgspec.structs.replace(m, **fields) for m in NAILS.markers)
+                    else msgspec.structs.replace(m, **fields) for m in NAILS6.markers)
     return msgspec.structs.replace(make_rig(filters=FilterSettings(enabled=False)),
-                                   markers=msgspec.structs.replace(NAILS, markers=markers))
+                                   markers=msgspec.structs.replace(NAILS6, markers=markers))
 
 
 def bends_off(rig: Rig, states: list) -> float:
@@ -62,6 +60,6 @@ def test_nails_are_tracked_where_they_are(nails, kind) -> None:
 def test_a_flat_patch_is_not_set_back_even_with_a_radius() -> None:
     arrays = compile_rig(nails_rig(radius_mm=6.0))
     assert not arrays.shapes[:5].any()
-    ring = msgspec.structs.replace(NAILS.markers[1], patch="ring", shape="band", radius_mm=8.0)
-    rig = msgspec.structs.replace(nails_rig(), markers=msgspec.structs.replace(NAILS, markers=(ring,)))
+    ring = msgspec.structs.replace(NAILS6.markers[1], patch="ring", shape="band", radius_mm=8.0)
+    rig = msgspec.structs.replace(nails_rig(), markers=msgspec.structs.replace(NAILS6, markers=(ring,)))
     assert compile_rig(rig).shapes[0] == pytest.approx(64e-6 * np.eye(3))

@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from shipped_rig import TWO_PIS
 
 from rhot_app.calibration.check.checks import check_rig
 from rhot_app.engine.pipeline import warm_up
@@ -23,14 +24,13 @@ from rhot_app.objects.object_file import ObjectMarker, ObjectModel, SphereShape,
 from rhot_app.objects.state import Validity
 from rhot_app.outputs.joints import JointConverter, json_message
 from rhot_app.outputs.osc import object_messages
-from rhot_app.project import Rig, load_rig, with_object, with_tracker
+from rhot_app.project import Rig, with_object, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
-from rhot_node.files import resource_path
 
 PALM = np.array([[0.0, 1.0, 0.0, 0.04], [-1.0, 0.0, 0.0, 0.07], [0.0, 0.0, 1.0, 0.6], [0.0, 0.0, 0.0, 1.0]])
 OBJECT = rigid(exp_so3([0.2, 0.1, 0.0]), [-0.1, 0.0, 0.55])
@@ -42,14 +42,13 @@ PERIOD_NS = 25_000_000
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Rig:
-    plain = load_rig(resource_path("rigs", "two_pis.json"))
-    extra = tuple(msgspec.structs.replace(plain.markers.markers[0], id=f"ball{k}", role=None, shape="blob")
+    own = TWO_PIS.markers.markers
+    extra = tuple(msgspec.structs.replace(own[0], id=f"ball{k}", role=None, shape="blob")
                   for k in range(3))
-    own = plain.markers.markers
     mixed = (*own[:2], extra[0], *own[2:], *extra[1:])  # not at the end
     save_object(tmp_path / "ball.json", BALL)
-    return with_object(msgspec.structs.replace(plain, markers=msgspec.structs.replace(plain.markers, markers=mixed)),
-                       tmp_path / "ball.json")
+    markers = msgspec.structs.replace(TWO_PIS.markers, markers=mixed)
+    return with_object(msgspec.structs.replace(TWO_PIS, markers=markers), tmp_path / "ball.json")
 
 
 def frames(rig: Rig, count: int) -> list[CameraObservations]:

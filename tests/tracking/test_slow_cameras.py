@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from modelled_hand import after_s, deviations, model_rig, moving, seconds, states_of
-from synthetic_rig import WIDE, Viewing, observe
+from modelled_hand import after_s, deviations, model_rig, moving, states_of
+from synthetic_rig import WIDE, Viewing, observe, seconds
 
 from rhot_app.state import Condition, Knowledge
 from rhot_app.tracking.markers.estimator_state import RecentObservations

@@ -5,13 +5,13 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from modelled_hand import after_s, deviations, model_rig, moving, observations_of, seconds, states_of
-from synthetic_rig import LOST, altered, make_rig, run
+from modelled_hand import after_s, deviations, model_rig, moving, observations_of, states_of
+from shipped_rig import LEFT_HAND
+from synthetic_rig import LOST, altered, make_rig, run, seconds
 
 from rhot_app.engine import status
 from rhot_app.engine.advice import hands_advice
 from rhot_app.errors import RigError
-from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import OTHER_HAND, Rig, TrackerSettings, parse_rig
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.classic import ClassicTracker
@@ -19,7 +19,6 @@ from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.trackers import make_tracker
 from rhot_app.tracking.two_hands import TwoHands
-from rhot_node.files import resource_path
 
 RIGHT, LEFT = model_rig("rhot8"), model_rig("rhot8", side="left")
 ASIDE = np.array([-0.14, 0.0, 0.05])  # where the left hand is, m
@@ -169,15 +168,10 @@ def test_the_classic_tracker_follows_the_first_hand_and_says_so():
     tracker = make_tracker(rig)
     assert isinstance(tracker, ClassicTracker)
     last = states_of(rig, FRAMES)[-1]
-    assert last.other is None and deviations_mm(last) < 5.0
+    assert last.other is None and deviations([last], RIGHT_TRUTH).mm.max() < 5.0
     (advice,) = hands_advice(rig)
     assert "first hand only" in advice.text
     assert hands_advice(RIG) == [] and hands_advice(make_rig()) == []
-
-
-def deviations_mm(state):
-    tips = RIGHT_TRUTH(np.array([seconds(state)]))[0, :5]
-    return 1e3 * np.linalg.norm(state.fingertip_positions - tips, axis=1).max()
 
 
 def test_a_rig_says_which_hand_is_missing():
@@ -188,6 +182,6 @@ def test_a_rig_says_which_hand_is_missing():
     with pytest.raises(RigError, match=r"other_thumb_tip.*give the rig that hand as other_hand"):
         parse_rig(msgspec.json.encode(without), "rig.json")
     bare = msgspec.json.decode(msgspec.json.encode(RIGHT))
-    bare["other_hand"] = msgspec.to_builtins(load_hand(resource_path("hands", "left.json")))
+    bare["other_hand"] = msgspec.to_builtins(LEFT_HAND)
     with pytest.raises(RigError, match=r"not both wear markers.*other_"):
         parse_rig(msgspec.json.encode(bare), "rig.json")
