@@ -27,10 +27,11 @@ import msgspec
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "barehand")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand")]
 
-from bare_scenes import rig_of, right_hand  # noqa: E402
+from bare_scenes import rig_of  # noqa: E402
 from pictures import picture, two_cameras, wall  # noqa: E402
+from shipped_rig import RIGHT_HAND  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
 
 from rhot_app.barehand.contour_residual import Contours  # noqa: E402
@@ -105,7 +106,7 @@ def iteration_ms(tracker: BareHandTracker, images: list[np.ndarray]) -> dict[str
 
 def run(case: str, motion: str, seed: int, frames: int) -> dict[str, float]:
     rng, bad, calibrated = np.random.default_rng(seed), case in ("shape", "mismatched"), case != "mismatched"
-    hand, cameras = right_hand(), two_cameras()
+    hand, cameras = RIGHT_HAND, two_cameras()
     model = build_model(hand)
     surface = surface_of(model)
     walls = [wall(camera, 10 * seed + k, bad) for k, camera in enumerate(cameras)]
@@ -155,7 +156,7 @@ def run(case: str, motion: str, seed: int, frames: int) -> dict[str, float]:
 
 def edges(motion: str, seed: int, frames: int) -> dict[str, float]:
     """Errors of the outline's edges, rms px, and their squares by the stated variances, on average."""
-    cameras, rig_hand = two_cameras(), right_hand()
+    cameras, rig_hand = two_cameras(), RIGHT_HAND
     tracker = BareHandTracker(rig_of(cameras, rig_hand))
     walls = [wall(camera, 10 * seed + c, False) for c, camera in enumerate(cameras)]
     moving = load_motion(motion, tracker.model, np.array([0.0, 0.0, 0.55]), seed)

@@ -22,9 +22,9 @@ import msgspec
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "barehand")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand")]
 
-from bare_scenes import rig_of, right_hand  # noqa: E402
+from bare_scenes import rig_of  # noqa: E402
 
 from rhot_app.articulated.bodies import hand_bodies, root_of  # noqa: E402
 from rhot_app.articulated.tracker import LayeredTracker  # noqa: E402
@@ -95,7 +95,7 @@ def main() -> None:
     points = [landmarks(arguments.folder / f"landmarks_c{c}.csv") for c in (0, 1)]
     films = [film(arguments.folder / f"cam{c}_first120.mp4") for c in (0, 1)]
     first = [frames[arguments.first] for frames in films]
-    rig = rig_of(cameras, right_hand())
+    rig = rig_of(cameras)
     tracker = BareHandTracker(rig, foreground=[learn_skin(image) for image in first])
     t_ns = round(1e9 * arguments.first / 30.0)
     if arguments.start == "landmarks":

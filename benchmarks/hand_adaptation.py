@@ -22,11 +22,12 @@ import msgspec
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "barehand")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand")]
 
 from bare_hand import mistaken  # noqa: E402
-from bare_scenes import rig_of, right_hand  # noqa: E402
+from bare_scenes import rig_of  # noqa: E402
 from pictures import picture, taken, two_cameras, wall  # noqa: E402
+from shipped_rig import RIGHT_HAND  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
 
 from rhot_app.barehand.key_frames import KeyFrames  # noqa: E402
@@ -55,7 +56,7 @@ def errors_of(hand: HandAnatomy, truth: HandAnatomy) -> tuple[np.ndarray, np.nda
 
 def run(motion: str, seed: int, seconds: float) -> dict[str, float]:
     """Figures of one hand."""
-    rng, hand, cameras = np.random.default_rng(seed), right_hand(), two_cameras()
+    rng, hand, cameras = np.random.default_rng(seed), RIGHT_HAND, two_cameras()
     model = build_model(hand)
     surface, parts = surface_of(model), [load_motion(name, model, PLACE, seed) for name in motion.split("+")]
     each_s = seconds / len(parts)

@@ -19,6 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "handfit"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "barehand"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from fit_scenes import another_hand
 

@@ -32,11 +32,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "barehand"), str(ROOT / "benchmarks")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand"), str(ROOT / "benchmarks")]
 
 from bare_hand import CHI2_3, MOTIONS, mistaken  # noqa: E402
-from bare_scenes import DISTANCE_M, rig_of, right_hand  # noqa: E402
+from bare_scenes import DISTANCE_M, rig_of  # noqa: E402
 from pictures import picture, two_cameras, wall  # noqa: E402
+from shipped_rig import RIGHT_HAND  # noqa: E402
 
 from rhot_app.barehand.surface import capsules_of, ray_to_capsule, surface_of  # noqa: E402
 from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
@@ -90,7 +91,7 @@ def markers_of(case: str) -> MarkerSet:
 def film(case: str, seed: int, frames: int) -> Film:
     """The pictures and markers of one hand."""
     rng, own = np.random.default_rng(seed), case.endswith("-file")
-    cameras, hand, markers = two_cameras(distance=DISTANCE_M), right_hand(), markers_of(case)
+    cameras, hand, markers = two_cameras(distance=DISTANCE_M), RIGHT_HAND, markers_of(case)
     rig = msgspec.structs.replace(rig_of(cameras, hand if own else mistaken(hand, rng)), markers=markers)
     model = build_model(hand)
     surface = surface_of(model)

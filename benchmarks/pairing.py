@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "tracking"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from synthetic_rig import FAST, WIDE, Preset, Viewing, compare, hand_trajectory, make_rig, observe, run
 from tables import arguments, publish, table

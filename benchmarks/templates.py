@@ -24,13 +24,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT), *(str(ROOT / "tests" / name) for name in ("barehand", "articulated"))]
+sys.path[:0] = [str(ROOT), *(str(ROOT / "tests" / name) for name in ("", "barehand", "articulated"))]
 
-from bare_scenes import model_and_surface, right_hand  # noqa: E402
+from bare_scenes import model_and_surface  # noqa: E402
 from depth_buffer import depth_labels  # noqa: E402
 from objects import object_of  # noqa: E402
 from painted_object import meshes_of, picture, waves  # noqa: E402
 from pictures import look_at, wall  # noqa: E402
+from shipped_rig import RIGHT_HAND  # noqa: E402
 
 from rhot_app.articulated.bodies import ANGLES, camera_rays, hand_bodies, place  # noqa: E402
 from rhot_app.articulated.process import ConstantVelocity, free_of, rest_of  # noqa: E402
@@ -136,7 +137,7 @@ class Turning:
 
 
 def textured_hand(source: Turning, seed: int) -> BareHand:
-    surface = build_surface(right_hand(), spacing_m=2e-3)
+    surface = build_surface(RIGHT_HAND, spacing_m=2e-3)
     rng = np.random.default_rng(seed)
     colours = skin_colours(surface, 4.0, None, seed) * np.exp(0.2 * waves(surface.right, rng))[:, None]
     arm = source.sample(np.zeros(1))[0][0, :3, 0]

@@ -27,9 +27,9 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "barehand")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand")]
 
-from bare_scenes import model_and_surface, rig_of, right_hand  # noqa: E402
+from bare_scenes import model_and_surface, rig_of  # noqa: E402
 from pictures import look_at, picture  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
 
@@ -152,7 +152,7 @@ def held(case: Case, mode: str, speed_m_s: float, seed: int) -> bool:
     cameras = cameras_of(case)
     walls = [np.full((camera.height, camera.width, 3), CLOTH) for camera in cameras]
     known = [learn_background(skin_foreground(), [one.astype(np.uint8)]) for one in walls]
-    tracker = BareHandTracker(rig_of(cameras, right_hand()), mode="feature" if mode == "features" else "contour",
+    tracker = BareHandTracker(rig_of(cameras), mode="feature" if mode == "features" else "contour",
                               foreground=known)
     if case.constrained:
         tracker.process = tracker.filter.process = MouseProcess(tracker, pose_at(0.0, speed_m_s, direction))

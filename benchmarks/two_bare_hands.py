@@ -31,11 +31,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "barehand"), str(ROOT / "benchmarks")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand"), str(ROOT / "benchmarks")]
 
 from bare_hand import CHI2_3  # noqa: E402
-from bare_scenes import DISTANCE_M, left_hand, model_and_surface, rig_of, right_hand  # noqa: E402
+from bare_scenes import DISTANCE_M, model_and_surface, rig_of  # noqa: E402
 from pictures import picture_of, taken, two_cameras, wall  # noqa: E402
+from shipped_rig import LEFT_HAND  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
 
 from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
@@ -101,10 +102,10 @@ def film(case: str, seed: int, frames: int, still: int = STILL) -> Film:
     walls = [wall(camera, 10 * seed + k, False) for k, camera in enumerate(cameras)]
     images = [[picture_of([(model_and_surface(side)[1], poses[side][k]) for side in sides], camera, walls[c], k)
                for c, camera in enumerate(cameras)] for k in range(still + frames)]
-    rig = msgspec.structs.replace(rig_of(cameras, right_hand()), tracker=TrackerSettings("estimator",
+    rig = msgspec.structs.replace(rig_of(cameras), tracker=TrackerSettings("estimator",
                                                                                          observe="contours"))
     if case != "alone":
-        rig = msgspec.structs.replace(rig, other_hand=left_hand())
+        rig = msgspec.structs.replace(rig, other_hand=LEFT_HAND)
     return Film(rig, poses, shown, [taken(one, 0) for one in walls], images)
 
 

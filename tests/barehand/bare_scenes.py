@@ -2,41 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from pictures import picture, two_cameras, wall
+from shipped_markers import RHOT6
+from shipped_rig import LEFT_MODEL, RIGHT_HAND, RIGHT_MODEL
 
 from rhot_app.barehand.surface import SHAPE, Surface, surface_of
+from rhot_app.evaluation.searched_nodes import SearchedNodes
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import quaternion_from_rotation
-from rhot_app.hand.anatomy import HandAnatomy, load_hand
-from rhot_app.hand.model import HandModel, build_model
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
 from rhot_app.simulator.scene.motion import load_motion
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
+from rhot_app.tracking.trackers import make_tracker
+from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 
 DISTANCE_M = 0.55
 
 
-def right_hand() -> HandAnatomy:
-    return load_hand(resource_path("hands", "right.json"))
-
-
-def left_hand() -> HandAnatomy:
-    return load_hand(resource_path("hands", "left.json"))
-
-
 @lru_cache
 def model_and_surface(side: str = "right") -> tuple[HandModel, Surface]:
-    model = build_model(right_hand() if side == "right" else left_hand())
+    model = RIGHT_MODEL if side == "right" else LEFT_MODEL
     return model, surface_of(model)
 
 
-def rig_of(cameras: list[CameraModel], hand: HandAnatomy) -> Rig:
+def rig_of(cameras: list[CameraModel], hand: HandAnatomy = RIGHT_HAND) -> Rig:
     """A rig with these cameras and this hand; nobody wears its markers."""
     nodes = tuple(
         RigNode(k + 1, f"camera {k + 1}",
@@ -45,7 +42,7 @@ def rig_of(cameras: list[CameraModel], hand: HandAnatomy) -> Rig:
                 CameraPose(tuple(float(v) for v in quaternion_from_rotation(camera.world_from_camera[:3, :3])),
                            tuple(float(v) for v in camera.centre)))
         for k, camera in enumerate(cameras))
-    return Rig("bare", nodes, load_markers(resource_path("markers", "rhot6.json")), hand)
+    return Rig("bare", nodes, RHOT6, hand)
 
 
 def state_of(pose: HandPose) -> np.ndarray:
@@ -72,3 +69,42 @@ def scene(pose: HandPose, seed: int = 0, clutter: bool = False, radii: float = 1
     images = [picture(drawn, pose.world_from_palm, pose.angles, camera, walls[k], seed)
               for k, camera in enumerate(cameras)]
     return cameras, images, [np.clip(one, 0, 255).astype(np.uint8) for one in walls]
+
+
+def learnt(empty: Sequence[np.ndarray]) -> list[Foreground]:
+    """What each camera knows that has learnt the empty scene."""
+    return [learn_background(skin_foreground(), [image]) for image in empty]
+
+
+class ShownNodes(SearchedNodes):
+    """Nodes that have learnt the empty scene, and are shown one picture after the other; `number` is the next one's."""
+
+    def __init__(self, rig: Rig, empty: Sequence[np.ndarray], **options: Any) -> None:
+        super().__init__(make_tracker(rig), learnt(empty), len(rig.markers.ids), **options)
+        self.number = 0
+
+    @property
+    def tracked(self) -> bool:
+        """Whether the newest state has all hands of the rig."""
+        newest = self.states[-1] if self.states else None
+        return newest is not None and newest.tracked and (newest.other is None or newest.other.tracked)
+
+    def show(self, images: Sequence[np.ndarray | None], frames: int = 1,
+             pixels: Sequence[np.ndarray] | None = None) -> None:
+        """The same images in so many frames."""
+        for _ in range(frames):
+            self.step(self.number, images, pixels)
+            self.number += 1
+
+    def show_until(self, done: Callable[[], bool], images: Sequence[np.ndarray | None], frames: int,
+                   pixels: Sequence[np.ndarray] | None = None) -> None:
+        """The same images until it is `done`, in so many frames at most."""
+        last = self.number + frames
+        while not done():
+            assert self.number < last, f"not within {frames} frames"
+            self.show(images, 1, pixels)
+
+    def show_until_tracked(self, images: Sequence[np.ndarray | None], frames: int = 40,
+                           pixels: Sequence[np.ndarray] | None = None) -> None:
+        """The same images until a hand is found."""
+        self.show_until(lambda: self.tracked, images, frames, pixels)

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from bare_scenes import DISTANCE_M, model_and_surface, poses, rig_of, right_hand
+from bare_scenes import DISTANCE_M, model_and_surface, poses, rig_of
 from pictures import person, picture, taken, two_cameras, wall
 
 from rhot_app.barehand.follower import HandFollower
@@ -33,7 +33,7 @@ def learnt() -> list[Foreground]:
 
 def states(draw: Draw, known: bool) -> list[HandState]:
     """What the follower says of pictures `draw(camera, wall, number)`, with a learnt background or by skin alone."""
-    follower = HandFollower(rig_of(CAMERAS, right_hand()), learnt() if known else None, known_size=True)
+    follower = HandFollower(rig_of(CAMERAS), learnt() if known else None, known_size=True)
     return [follower.step([draw(camera, empty, number) for camera, empty in zip(CAMERAS, WALLS, strict=True)],
                           [round(1e9 * number / FPS)] * 2) for number in range(IMAGES)]
 

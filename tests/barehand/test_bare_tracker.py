@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bare_scenes import model_and_surface, poses, rig_of, right_hand, scene, state_of
+from bare_scenes import model_and_surface, poses, rig_of, scene, state_of
 
 from rhot_app.barehand.overlay import overlay
 from rhot_app.barehand.surface import SHAPE
@@ -32,7 +32,7 @@ def errors_mm(tracker: BareHandTracker, pose) -> np.ndarray:
 
 @pytest.mark.parametrize(("mode", "most_mm"), [("contour", 1.5), ("feature", 3.0)])
 def test_a_hand_is_tracked_from_a_given_start(film, mode, most_mm) -> None:
-    tracker = BareHandTracker(rig_of(film[0][0], right_hand()), mode=mode)
+    tracker = BareHandTracker(rig_of(film[0][0]), mode=mode)
     moving = poses("grasp", TIMES)
     tracker.start(moving[0], 0)
     for t, pose, (_, images, _) in zip(TIMES, moving, film, strict=True):
@@ -47,7 +47,7 @@ def test_one_camera_has_a_larger_depth_deviation_than_two(film) -> None:
     pose = poses("grasp", TIMES)[0]
     spread = []
     for second in (True, False):
-        tracker = BareHandTracker(rig_of(film[0][0], right_hand()))
+        tracker = BareHandTracker(rig_of(film[0][0]))
         tracker.start(pose, 0)
         state = tracker.step([film[0][1][0], film[0][1][1] if second else None], [0, 0])
         spread.append(float(np.sqrt(state.palm_covariance[2, 2])))
@@ -61,14 +61,14 @@ def test_other_residuals_are_used_in_the_same_update(film) -> None:
             jacobian[0, 0] = 1.0
             return Rows(np.array([0.5 - state[3]]), jacobian, np.array([1e-12]))
 
-    tracker = BareHandTracker(rig_of(film[0][0], right_hand()))
+    tracker = BareHandTracker(rig_of(film[0][0]))
     tracker.start(poses("grasp", TIMES)[0], 0)
     knot = tracker.update({0: film[0][1][0]}, 0, [Place()])
     assert abs(knot.state[3] - 0.5) < 1e-3
 
 
 def test_a_step_without_a_start_raises_an_error_with_advice(film) -> None:
-    tracker = BareHandTracker(rig_of(film[0][0], right_hand()))
+    tracker = BareHandTracker(rig_of(film[0][0]))
     with pytest.raises(TrackingError, match="start"):
         tracker.step(film[0][1], [0, 0])
 
@@ -77,7 +77,7 @@ def test_a_hand_is_found_without_a_given_start(film) -> None:
     cameras, images, walls = film[0]
     known = [learn_skin(image, learn_background(skin_foreground(), [empty]))
              for image, empty in zip(images, walls, strict=True)]
-    tracker = BareHandTracker(rig_of(cameras, right_hand()), foreground=known)
+    tracker = BareHandTracker(rig_of(cameras), foreground=known)
     assert tracker.find(images, 0)
     tracker.step(images, [0, 0])
     assert np.median(errors_mm(tracker, poses("grasp", TIMES)[0])) < 10.0
@@ -87,7 +87,7 @@ def test_a_track_far_from_the_hand_begins_anew_at_the_hand(film) -> None:
     """It may have been mistaken for its forearm. What was learnt there of its shape is wrong."""
     cameras, images, walls = film[0]
     pose = poses("grasp", TIMES)[0]
-    tracker = BareHandTracker(rig_of(cameras, right_hand()), known_size=False,
+    tracker = BareHandTracker(rig_of(cameras), known_size=False,
                               foreground=[learn_background(skin_foreground(), [empty]) for empty in walls])
     wrong = pose.world_from_palm.copy()
     wrong[:3, 3] -= 0.15 * wrong[:3, 0]
@@ -102,14 +102,14 @@ def test_a_track_far_from_the_hand_begins_anew_at_the_hand(film) -> None:
 
 def test_no_hand_is_found_in_an_empty_scene(film) -> None:
     cameras, _, walls = film[0]
-    tracker = BareHandTracker(rig_of(cameras, right_hand()),
+    tracker = BareHandTracker(rig_of(cameras),
                               foreground=[learn_background(skin_foreground(), [empty]) for empty in walls])
     assert not tracker.find(walls, 0)
 
 
 def test_the_overlay_draws_the_contour(film) -> None:
     pose = poses("grasp", TIMES)[0]
-    tracker = BareHandTracker(rig_of(film[0][0], right_hand()))
+    tracker = BareHandTracker(rig_of(film[0][0]))
     tracker.start(pose, 0)
     tracker.step(film[0][1], [0, 0])
     frame = tracker.frames[0]

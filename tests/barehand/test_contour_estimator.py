@@ -5,23 +5,25 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
-from bare_scenes import DISTANCE_M, model_and_surface, poses, rig_of, right_hand, scene
+from bare_scenes import DISTANCE_M, ShownNodes, model_and_surface, poses, rig_of, scene
 from patience import PATIENCE_S, eventually
 from pictures import look_at, picture, taken, wall
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
+from shipped_markers import RHOT6
+from shipped_rig import RIGHT_MODEL
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import RigError
-from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
+from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import FLEXIONS, JOINTS, HandPose
 from rhot_app.project import Rig, TrackerSettings, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
@@ -30,7 +32,6 @@ from rhot_app.tracking.contours.finder import Finder
 from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.tracker import CameraFrame, ShowsContours
 from rhot_app.tracking.trackers import make_tracker
-from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 
@@ -45,13 +46,21 @@ def film() -> list[tuple[list, list, list]]:
 
 
 def bare_rig(cameras: list[CameraModel], observe: str = "contours", markers: str = "rhot6") -> Rig:
-    rig = msgspec.structs.replace(rig_of(cameras, right_hand()), markers=load_markers(resource_path(
+    rig = msgspec.structs.replace(rig_of(cameras), markers=load_markers(resource_path(
         "markers", f"{markers}.json")))
     return msgspec.structs.replace(rig, tracker=TrackerSettings("estimator", observe=observe))
 
 
-def known(film: list[tuple[list, list, list]]) -> list[Foreground]:
-    return [learn_background(skin_foreground(), [empty]) for empty in film[0][2]]
+def shown_nodes(film: list[tuple[list, list, list]], observe: str = "contours", markers: str = "rhot6",
+                **options: Any) -> ShownNodes:
+    return ShownNodes(bare_rig(film[0][0], observe, markers), film[0][2], **options)
+
+
+def curled(pose: HandPose) -> HandPose:
+    """The same with a bent index finger."""
+    angles = pose.angles.copy()
+    angles[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
+    return HandPose(pose.world_from_palm, angles)
 
 
 def error_mm(state: HandState, pose: HandPose) -> float:
@@ -59,27 +68,19 @@ def error_mm(state: HandState, pose: HandPose) -> float:
     return 1e3 * float(np.median(np.linalg.norm(state.joint_positions - truth, axis=1)))
 
 
-def follow(nodes: SearchedNodes, film: list[tuple[list, list, list]]) -> int:
-    """An empty scene, a hand that waits until it is found, then the whole motion; returns the next frame's number."""
-    for number in range(3):
-        nodes.step(number, film[0][2])
+def follow(nodes: ShownNodes, film: list[tuple[list, list, list]]) -> None:
+    """An empty scene, a hand that waits until it is found, then the whole motion."""
+    nodes.show(film[0][2], 3)
     assert nodes.states and not any(state.tracked for state in nodes.states)
-    number = 3
-    while not nodes.states[-1].tracked:
-        assert number < 40, "the hand was not found"
-        nodes.step(number, film[0][1])
-        number += 1
+    nodes.show_until_tracked(film[0][1], 37)
     for _, images, _ in film:
-        nodes.step(number, images)
-        number += 1
-    return number
+        nodes.show(images)
 
 
 @dataclass(frozen=True)
 class Run:
     """Of a hand that is found, moves, is seen by one camera only for eight frames, and goes."""
 
-    rig: Rig
     followed: HandState
     drawn: list
     asked: list[SliceRequest]
@@ -90,20 +91,18 @@ class Run:
 
 @pytest.fixture(scope="module", params=[False, True], ids=["live", "from a log"])
 def run(film, request) -> Run:
-    rig = bare_rig(film[0][0])
-    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids), forget=request.param)
+    nodes = shown_nodes(film, forget=request.param)
     with pytest.MonkeyPatch.context() as patched:
         if request.param:  # a log's maps are no others
             patched.setattr(Finder, "search_everywhere", lambda *_: None)
             patched.setattr(Finder, "found", lambda _: (poses("grasp", TIMES)[0], FIRST_NS))
-        number = follow(nodes, film)
+        follow(nodes, film)
     assert isinstance(nodes.tracker, ShowsContours)
     followed, drawn, asked, before = nodes.states[-1], nodes.tracker.seen(), list(nodes.asked), len(nodes.states)
-    for later in range(28):
-        nodes.step(number + later, [film[-1][1][0], None] if later < 8 else film[0][2])
-        if later == 7:
-            alone = nodes.states[before:]
-    return Run(rig, followed, drawn, asked, alone, nodes.tracker.seen(), nodes.states[-1])
+    nodes.show([film[-1][1][0], None], 8)
+    alone = nodes.states[before:]
+    nodes.show(film[0][2], 20)
+    return Run(followed, drawn, asked, alone, nodes.tracker.seen(), nodes.states[-1])
 
 
 def test_a_hand_is_found_tracked_and_lost(film, run: Run) -> None:
@@ -115,12 +114,12 @@ def test_a_hand_is_found_tracked_and_lost(film, run: Run) -> None:
         assert len(seen.edges) == len(seen.of_hand) and 0.3 < np.mean(seen.of_hand) <= 1.0
         apart = np.linalg.norm(seen.edges[seen.of_hand][:, None] - seen.contour[None], axis=2).min(axis=1)
         assert np.median(apart) < 2.0 and (seen.edges < [camera.width, camera.height]).all()
-    assert last.marker_ids == run.rig.markers.ids and np.isnan(last.marker_positions).all()
+    assert last.marker_ids == RHOT6.ids and np.isnan(last.marker_positions).all()
     assert run.drawn_at_last == []
     assert run.lost.condition is Condition.LOST and np.isnan(run.lost.joint_positions).all()
 
 
-class EdgesLast(SearchedNodes):
+class EdgesLast(ShownNodes):
     """The last camera's edges come after its map."""
 
     def give(self, frame: CameraFrame) -> None:
@@ -137,8 +136,7 @@ class EdgesLast(SearchedNodes):
 
 
 def test_maps_that_come_before_the_last_edges_confirm_the_hand(film) -> None:
-    rig = bare_rig(film[0][0])
-    nodes = EdgesLast(make_tracker(rig), known(film), len(rig.markers.ids))
+    nodes = EdgesLast(bare_rig(film[0][0]), film[0][2])
     follow(nodes, film[:4])
     assert error_mm(nodes.states[-1], poses("grasp", TIMES)[3]) < 5.0
 
@@ -146,8 +144,7 @@ def test_maps_that_come_before_the_last_edges_confirm_the_hand(film) -> None:
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 def test_a_hand_is_found_and_tracked_by_slow_cameras(film) -> None:
     """Of a hand that is found after the first camera's frame, the second one's edges come first."""
-    rig = bare_rig(film[0][0])
-    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
+    nodes = shown_nodes(film)
     for number in range(13):
         nodes.step(number, film[0][1 if number >= 3 else 2], times_ns=[FIRST_NS + 4 * number * PERIOD_NS] * 2)
     assert nodes.states[-1].tracked and error_mm(nodes.states[-1], poses("grasp", TIMES)[0]) < 5.0
@@ -164,7 +161,7 @@ def test_a_camera_with_a_wrong_pose_gives_a_resting_hand_no_velocity(film, apart
     pose = msgspec.structs.replace(rig.nodes[1].pose,
                                    rotation_wxyz=tuple(turned.as_quat(scalar_first=True).tolist()))
     rig = msgspec.structs.replace(rig, nodes=(rig.nodes[0], msgspec.structs.replace(rig.nodes[1], pose=pose)))
-    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
+    nodes = ShownNodes(rig, film[0][2])
     for number in range(30):
         t_ns = FIRST_NS + 3 * number * PERIOD_NS
         nodes.step(number, film[0][1 if number >= 3 else 2], times_ns=[t_ns, t_ns + 1_000_000 * apart_ms])
@@ -175,26 +172,21 @@ def test_a_camera_with_a_wrong_pose_gives_a_resting_hand_no_velocity(film, apart
 
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 def test_a_confused_finger_is_relocalised(film, monkeypatch) -> None:
-    pose = poses("grasp", TIMES)[0]
-    curled = pose.angles.copy()
-    curled[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
-    rig = bare_rig(film[0][0])
-    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
+    pose, nodes = poses("grasp", TIMES)[0], shown_nodes(film)
     with monkeypatch.context() as patched:
-        patched.setattr(Finder, "found", lambda _: (HandPose(pose.world_from_palm, curled), FIRST_NS))
-        for number in range(20):
-            nodes.step(number, film[0][1])
+        patched.setattr(Finder, "found", lambda _: (curled(pose), FIRST_NS))
+        nodes.show(film[0][1], 20)
     tip = forward(model_and_surface()[0], pose).joints[INDEX_TIP]
     assert nodes.states[-1].tracked
     assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.01
 
 
-class SlowSearches(SearchedNodes):
+class SlowSearches(ShownNodes):
     """Of the searches of the whole image, the first one has a given result, and the second one ends when `ended` is
     set; only that one is not waited for."""
 
-    def __init__(self, rig: Rig, film: list[tuple[list, list, list]], first: HandPose) -> None:
-        super().__init__(make_tracker(rig), known(film), len(rig.markers.ids))
+    def __init__(self, film: list[tuple[list, list, list]], first: HandPose) -> None:
+        super().__init__(bare_rig(film[0][0]), film[0][2])
         self.ended, self.searches = threading.Event(), 0
         relocaliser = self.tracker.hand.relocaliser
         find = relocaliser.search_globally
@@ -208,39 +200,28 @@ class SlowSearches(SearchedNodes):
         self.tracker.wait = lambda: eventually(lambda: (self.searches == 2 and not self.ended.is_set()) or not any(
             thread.name == "find" for thread in threading.enumerate()))
 
-    def until(self, done: Callable[[], bool], first: int, images: list) -> int:
-        """Steps from frame `first` on with the same images, for a second and a half at most. Returns the next
-        number."""
-        for number in range(first, first + 45):
-            self.step(number, images)
-            if done():
-                return number + 1
-        raise AssertionError("not within 45 frames")
-
 
 def test_a_wrong_start_is_corrected_before_a_slow_second_search_ends(film) -> None:
     pose = poses("grasp", TIMES)[0]
-    curled = pose.angles.copy()
-    curled[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
-    nodes = SlowSearches(bare_rig(film[0][0]), film, HandPose(pose.world_from_palm, curled))
+    nodes = SlowSearches(film, curled(pose))
     tracker, tip = nodes.tracker, forward(model_and_surface()[0], pose).joints[INDEX_TIP]
-    number = nodes.until(lambda: tracker.tracking, 0, film[0][1])
-    number = nodes.until(lambda: np.linalg.norm(joints_of(tracker.hand, tracker.hand.filter.newest.state)[INDEX_TIP]
-                                                - tip) < 0.01, number, film[0][1])
+    nodes.show_until(lambda: tracker.tracking, film[0][1], 45)
+    nodes.show_until(lambda: np.linalg.norm(joints_of(tracker.hand, tracker.hand.filter.newest.state)[INDEX_TIP]
+                                            - tip) < 0.01, film[0][1], 45)
     assert not tracker.confirmed
     nodes.ended.set()
-    nodes.until(lambda: tracker.confirmed, number, film[0][1])
+    nodes.show_until(lambda: tracker.confirmed, film[0][1], 45)
 
 
 def test_a_search_that_outlasts_its_track_finds_the_next_one(film) -> None:
     pose = poses("grasp", TIMES)[0]
     wrong = pose.world_from_palm.copy()
     wrong[:3, 3] += 0.4 * film[0][0][0].world_from_camera[:3, 0]  # from where no edge of the hand leads to it
-    nodes = SlowSearches(bare_rig(film[0][0]), film, HandPose(wrong, pose.angles))
-    number = nodes.until(lambda: nodes.tracker.tracking, 0, film[0][1])
-    number = nodes.until(lambda: not nodes.tracker.tracking, number, film[0][1])
+    nodes = SlowSearches(film, HandPose(wrong, pose.angles))
+    nodes.show_until(lambda: nodes.tracker.tracking, film[0][1], 45)
+    nodes.show_until(lambda: not nodes.tracker.tracking, film[0][1], 45)
     nodes.ended.set()
-    nodes.until(lambda: nodes.tracker.tracking, number, film[0][1])
+    nodes.show_until(lambda: nodes.tracker.tracking, film[0][1], 45)
     assert nodes.searches == 2
 
 
@@ -253,19 +234,13 @@ def test_a_hand_with_a_wrong_start_is_relocalised(film, monkeypatch, off_m, turn
     wrong = pose.world_from_palm.copy()
     wrong[:3, :3] = wrong[:3, :3] @ Rotation.from_euler("z", turn_deg, degrees=True).as_matrix()
     wrong[:3, 3] -= off_m * wrong[:3, 0]
-    rig, number = bare_rig(film[0][0]), 0
-    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
+    nodes = shown_nodes(film)
     with monkeypatch.context() as patched:
-        patched.setattr(Finder, "found", lambda _: (HandPose(wrong, pose.angles), FIRST_NS + number * PERIOD_NS))
+        patched.setattr(Finder, "found", lambda _: (HandPose(wrong, pose.angles), FIRST_NS + nodes.number * PERIOD_NS))
         patched.setattr(Finder, "verify", lambda *_: False)
-        while not nodes.states or not nodes.states[-1].tracked:
-            assert number < 20
-            nodes.step(number, film[0][1])
-            number += 1
+        nodes.show_until_tracked(film[0][1], 20)
     assert error_mm(nodes.states[-1], pose) > 10.0, "it is wrong"
-    for _ in range(45):
-        nodes.step(number, film[0][1])
-        number += 1
+    nodes.show(film[0][1], 45)
     assert nodes.states[-1].tracked and error_mm(nodes.states[-1], pose) < 3.0
 
 
@@ -297,24 +272,17 @@ def test_requested_slices_cross_the_contour_of_the_next_frame(film, run: Run) ->
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 @pytest.mark.parametrize("which", ["followed", "looked for"])
 def test_a_recording_that_restarts_is_a_new_session(film, which: str) -> None:
-    rig = bare_rig(film[0][0])
-    nodes = SearchedNodes(make_tracker(rig), known(film), len(rig.markers.ids))
-    number = 0
+    nodes = shown_nodes(film)
     if which == "followed":
-        number = follow(nodes, film)
+        follow(nodes, film)
     else:
-        while len(nodes.states) < 8:
-            nodes.step(number, film[0][1])
-            number += 1
+        nodes.show_until(lambda: len(nodes.states) >= 8, film[0][1], 40)
     nodes.states.clear()
-    first = number = number - 100  # three seconds earlier
-    while not nodes.states or not nodes.states[-1].tracked:
-        assert number < first + 40, "the hand was not found again"
-        nodes.step(number, film[0][1])
-        number += 1
-    assert number - first > 2, "of what was before, nothing is reported"
+    nodes.number = first = nodes.number - 100  # three seconds earlier
+    nodes.show_until_tracked(film[0][1])
+    assert nodes.number - first > 2, "of what was before, nothing is reported"
     times_ns = [state.t_master_ns for state in nodes.states]
-    assert times_ns == sorted(times_ns) and times_ns[-1] <= FIRST_NS + number * PERIOD_NS
+    assert times_ns == sorted(times_ns) and times_ns[-1] <= FIRST_NS + nodes.number * PERIOD_NS
     assert error_mm(nodes.states[-1], poses("grasp", TIMES)[0]) < 5.0
 
 
@@ -350,21 +318,14 @@ def test_a_hand_outside_one_cameras_image_is_tracked_by_the_other(monkeypatch) -
     cameras, moved, images, empty = leaving(frames, out)
     joints = [forward(model_and_surface()[0], pose).joints for pose in moved]
     assert all((cameras[1].project(one)[:, 0] > cameras[1].width).all() for one in joints[frames:frames + out])
-    rig = bare_rig(cameras)
-    nodes = SearchedNodes(make_tracker(rig), [learn_background(skin_foreground(), [one]) for one in empty],
-                          len(rig.markers.ids))
-    number = 0
+    nodes = ShownNodes(bare_rig(cameras), empty)
     with monkeypatch.context() as patched:
-        patched.setattr(Finder, "found", lambda _: (moved[0], FIRST_NS + number * PERIOD_NS))
-        while not nodes.states or not nodes.states[-1].tracked:
-            assert number < 20
-            nodes.step(number, images[0])
-            number += 1
+        patched.setattr(Finder, "found", lambda _: (moved[0], FIRST_NS + nodes.number * PERIOD_NS))
+        nodes.show_until_tracked(images[0], 20)
     outside = []  # squared Mahalanobis distances of the joints while one camera shows them
     for k, one in enumerate(images):
         before = len(nodes.states)
-        nodes.step(number, one)
-        number += 1
+        nodes.show(one)
         assert all(state.tracked for state in nodes.states[before:]), f"lost in frame {k}"
         if frames <= k < frames + out:
             assert len(nodes.states) > before, "the camera that shows it is weighed without waiting for the other"
@@ -372,9 +333,7 @@ def test_a_hand_outside_one_cameras_image_is_tracked_by_the_other(monkeypatch) -
             outside.append(np.einsum("ij,ijk,ik->i", error, np.linalg.inv(nodes.states[-1].joint_covariances), error))
     assert np.mean(np.array(outside) < chi2.ppf(0.997, 3)) > 0.9, "it says how uncertain it is"
     assert error_mm(nodes.states[-1], moved[-1]) < 5.0
-    for _ in range(20):
-        nodes.step(number, empty)
-        number += 1
+    nodes.show(empty, 20)
     assert nodes.states[-1].condition is Condition.LOST, "both should show it, and do not"
 
 
@@ -383,31 +342,23 @@ def landmarks(film: list[tuple[list, list, list]], pose: HandPose) -> list[np.nd
     return [camera.project(joints) for camera in film[0][0]]
 
 
-def until_tracked(nodes: SearchedNodes, film: list[tuple[list, list, list]], number: int, which: int) -> int:
-    """A hand at rest whose landmarks are reported; returns the next frame's number."""
-    first, pose = number, poses("grasp", TIMES)[which]
-    while not nodes.states or not nodes.states[-1].tracked:
-        assert (number - first) * PERIOD_NS < 0.5e9, "landmarks show at once where the hand is"
-        nodes.step(number, film[which][1], landmarks(film, pose))
-        number += 1
+def show_landmarks_until_tracked(nodes: ShownNodes, film: list[tuple[list, list, list]], which: int) -> None:
+    """Landmarks show at once where a hand at rest is."""
+    pose = poses("grasp", TIMES)[which]
+    nodes.show_until_tracked(film[which][1], round(0.5e9 / PERIOD_NS), landmarks(film, pose))
     assert error_mm(nodes.states[-1], pose) < 5.0
-    return number
 
 
 def test_landmarks_start_a_track_that_contours_continue_and_start_it_again_after_a_loss(film, monkeypatch) -> None:
     monkeypatch.setattr(Finder, "search_everywhere", lambda *_: None)  # no search is as quick
-    rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
-    nodes = SearchedNodes(make_tracker(rig), known(film), 21)
-    number = until_tracked(nodes, film, 0, 0)
+    nodes = shown_nodes(film, "landmarks_and_contours", "landmarks21")
+    show_landmarks_until_tracked(nodes, film, 0)
     for _, images, _ in film:
-        nodes.step(number, images)  # its detector has lost it
-        number += 1
+        nodes.show(images)  # its detector has lost it
     assert nodes.states[-1].tracked and error_mm(nodes.states[-1], poses("grasp", TIMES)[-1]) < 6.0
-    for _ in range(20):
-        nodes.step(number, film[0][2])
-        number += 1
+    nodes.show(film[0][2], 20)
     assert nodes.states[-1].condition is Condition.LOST
-    until_tracked(nodes, film, number, 5)
+    show_landmarks_until_tracked(nodes, film, 5)
 
 
 @pytest.mark.parametrize("rounded_ns", [-300_000, 300_000])
@@ -415,65 +366,48 @@ def test_landmarks_and_edges_of_one_image_are_one_update(film, monkeypatch, roun
     """Their datagrams come apart, and the node's clock is compared anew for each."""
     for search in ("search_everywhere", "relocalise"):
         monkeypatch.setattr(Finder, search, lambda *_, **__: None)
-    rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
-    nodes = SearchedNodes(make_tracker(rig), known(film), 21, rounded_ns=rounded_ns)
-    number = until_tracked(nodes, film, 0, 0)
+    nodes = shown_nodes(film, "landmarks_and_contours", "landmarks21", rounded_ns=rounded_ns)
+    show_landmarks_until_tracked(nodes, film, 0)
     alone: list[int] = []
     monkeypatch.setattr(MarkersOfHand, "update", lambda _, frame, *__: bool(alone.append(frame.camera)))
-    for _ in range(8):
-        nodes.step(number, film[0][1], landmarks(film, poses("grasp", TIMES)[0]))
-        number += 1
+    nodes.show(film[0][1], 8, landmarks(film, poses("grasp", TIMES)[0]))
     assert nodes.states[-1].tracked and not alone
 
 
 def test_landmarks_correct_a_confused_finger(film, monkeypatch) -> None:
-    pose = poses("grasp", TIMES)[0]
-    curled = pose.angles.copy()
-    curled[list(FLEXIONS[1])] = 1.4, 1.6, 1.0
-    rig = bare_rig(film[0][0], "landmarks_and_contours", "landmarks21")
+    pose, nodes = poses("grasp", TIMES)[0], shown_nodes(film, "landmarks_and_contours", "landmarks21")
     monkeypatch.setattr(Finder, "relocalise", lambda *_, **__: None)  # it would correct the finger, too
-    nodes, number = SearchedNodes(make_tracker(rig), known(film), 21), 0
     with monkeypatch.context() as patched:
         patched.setattr(Finder, "search_everywhere", lambda *_: None)
-        patched.setattr(Finder, "found", lambda _: (HandPose(pose.world_from_palm, curled), FIRST_NS))
-        while not nodes.states or not nodes.states[-1].tracked:
-            assert number < 20
-            nodes.step(number, film[0][1])
-            number += 1
+        patched.setattr(Finder, "found", lambda _: (curled(pose), FIRST_NS))
+        nodes.show_until_tracked(film[0][1], 20)
     tip = forward(model_and_surface()[0], pose).joints[INDEX_TIP]
     assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) > 0.02, "it is wrong"
     for _ in range(30):
-        nodes.step(number, film[0][1], landmarks(film, pose))
-        number += 1
-        assert nodes.states[-1].tracked
+        nodes.show(film[0][1], 1, landmarks(film, pose))
+        assert nodes.tracked
     assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.003
 
 
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 def test_a_fingertip_that_contradicts_the_contours_inflates_its_fingers_covariance(film) -> None:
     """An object of the index finger's colour lies 6 cm from it. The rest of the hand is bare."""
-    markers = load_markers(resource_path("markers", "rhot6.json"))
-    two = msgspec.structs.replace(markers, markers=tuple(one for one in markers.markers
-                                                         if one.role in ("thumb_tip", "index_tip")))
+    two = msgspec.structs.replace(RHOT6, markers=tuple(one for one in RHOT6.markers
+                                                       if one.role in ("thumb_tip", "index_tip")))
     rig = msgspec.structs.replace(bare_rig(film[0][0], "both"), markers=two)
-    nodes, pose = SearchedNodes(make_tracker(rig), known(film), 2), poses("grasp", TIMES)[0]
+    nodes, pose = ShownNodes(rig, film[0][2]), poses("grasp", TIMES)[0]
     tips = np.argsort([one.role != "thumb_tip" for one in two.markers])
-    marked = forward(build_model(right_hand()), pose).marker_centres[:2][tips]
-    number = 0
-    for _ in range(3):
-        nodes.step(number, film[0][2])
-        number += 1
-    while len(nodes.states) < 60:
-        nodes.step(number, film[0][1], [camera.project(marked) for camera in film[0][0]])
-        number += 1
+    marked = forward(RIGHT_MODEL, pose).marker_centres[:2][tips]
+    nodes.show(film[0][2], 3)
+    pixels = [camera.project(marked) for camera in film[0][0]]
+    nodes.show_until(lambda: len(nodes.states) >= 60, film[0][1], 200, pixels)
     assert nodes.states[-1].tracked and error_mm(nodes.states[-1], pose) < 3.0
     true, wrong = marked.copy(), marked.copy()
     wrong[int(np.flatnonzero(tips == 1)[0])] += [0.06, 0.0, 0.0]
     for places, knowledge in ((wrong, Knowledge.GUESSED), (true, Knowledge.MEASURED)):
         for _ in range(20):
-            nodes.step(number, film[0][1], [camera.project(places) for camera in film[0][0]])
-            number += 1
-            assert nodes.states[-1].tracked
+            nodes.show(film[0][1], 1, [camera.project(places) for camera in film[0][0]])
+            assert nodes.tracked
         assert nodes.states[-1].joint_knowledge[INDEX_TIP] == knowledge
         assert error_mm(nodes.states[-1], pose) < 3.0
         others = np.delete(nodes.states[-1].joint_knowledge, range(5, 9))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
-from bare_scenes import DISTANCE_M, poses, rig_of, right_hand, scene, state_of
+from bare_scenes import DISTANCE_M, poses, rig_of, scene, state_of
 from pictures import two_cameras
 
 from rhot_app.barehand.contours import SILHOUETTE, STEP_M
@@ -31,7 +31,7 @@ from rhot_node.markers import load_markers
 
 @pytest.fixture
 def hand() -> BareHandTracker:
-    return BareHandTracker(rig_of(two_cameras(distance=DISTANCE_M), right_hand()))
+    return BareHandTracker(rig_of(two_cameras(distance=DISTANCE_M)))
 
 
 def test_recorded_slices_that_do_not_cross_the_hand_are_left_out(hand: BareHandTracker) -> None:
@@ -113,7 +113,7 @@ def test_a_search_that_ends_after_its_track_gives_no_pose(hand: BareHandTracker,
 
 @pytest.mark.parametrize("markers", ["landmarks21", "rhot6"])
 def test_markers_lie_on_a_hand_of_the_states_shape_with_its_jacobian(markers: str) -> None:
-    rig = msgspec.structs.replace(rig_of(two_cameras(distance=DISTANCE_M), right_hand()), markers=load_markers(
+    rig = msgspec.structs.replace(rig_of(two_cameras(distance=DISTANCE_M)), markers=load_markers(
         resource_path("markers", f"{markers}.json")))
     hand, pose, factor = BareHandTracker(rig, known_size=False), poses("grasp", (0.5,))[0], 1.1
     MarkersOfHand(rig, hand)

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 import pytest
-from bare_scenes import DISTANCE_M, left_hand, model_and_surface, poses, rig_of, right_hand
+from bare_scenes import DISTANCE_M, ShownNodes, model_and_surface, poses, rig_of
 from pictures import picture_of, taken, two_cameras, wall
+from shipped_rig import LEFT_HAND
 
 from rhot_app.barehand.observations import EdgeFrame, SliceRequest
 from rhot_app.errors import RigError
-from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes
+from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig, TrackerSettings, load_rig, save_rig, with_tracker
@@ -31,7 +32,7 @@ EMPTY = [taken(one, 0) for one in WALLS]
 
 
 def two_bare_hands(**settings: str) -> Rig:
-    return msgspec.structs.replace(rig_of(CAMERAS, right_hand()), other_hand=left_hand(),
+    return msgspec.structs.replace(rig_of(CAMERAS), other_hand=LEFT_HAND,
                                    tracker=TrackerSettings("estimator", **{"observe": "contours"} | settings))
 
 
@@ -47,11 +48,6 @@ def at(side: str, place: Sequence[float], t_s: float = 0.0) -> HandPose:
 def shown(hands: dict[str, HandPose], number: int) -> list[np.ndarray]:
     return [picture_of([(model_and_surface(side)[1], pose) for side, pose in hands.items()], camera, WALLS[c], number)
             for c, camera in enumerate(CAMERAS)]
-
-
-def nodes_of(rig: Rig, *, forget: bool = False) -> SearchedNodes:
-    return SearchedNodes(make_tracker(rig), [learn_background(skin_foreground(), [one]) for one in EMPTY],
-                         len(rig.markers.ids), forget=forget)
 
 
 def states_of(state: HandState) -> dict[str, HandState]:
@@ -79,40 +75,26 @@ def still() -> list[np.ndarray]:
     return shown(HOME, 0)
 
 
-def until_tracked(nodes: SearchedNodes, images: list[np.ndarray], number: int) -> int:
-    first = number
-    while not nodes.states or not all(one.tracked for one in states_of(nodes.states[-1]).values()):
-        assert number < first + 40, "both are found"
-        nodes.step(number, images)
-        number += 1
-    return number
-
-
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 @pytest.mark.parametrize("forget", [False, True], ids=["live", "from a log"])
 def test_both_hands_are_found_and_one_leaves_and_returns(still: list[np.ndarray], forget: bool) -> None:
-    nodes, number = nodes_of(two_bare_hands(), forget=forget), 0
-    for _ in range(3):
-        nodes.step(number, EMPTY)
-        number += 1
+    nodes = ShownNodes(two_bare_hands(), EMPTY, forget=forget)
+    nodes.show(EMPTY, 3)
     assert nodes.states[-1].condition == nodes.states[-1].other.condition == Condition.SEARCHING
-    number = until_tracked(nodes, still, number)
-    for _ in range(12):
-        nodes.step(number, still)
-        number += 1
+    nodes.show_until_tracked(still)
+    nodes.show(still, 12)
     limit_mm = 8.0 if forget else 2.0  # a log has the slices of the hands as they were expected
     assert all(error_mm(one, side, HOME[side]) < limit_mm for side, one in states_of(nodes.states[-1]).items())
     assert nodes.states[-1].other.t_master_ns == nodes.states[-1].t_master_ns
     assert all(len(request.slices) > 300 for request in nodes.asked)
     assert len(nodes.tracker.seen()) == len(CAMERAS)
     for _ in range(20):
-        nodes.step(number, shown({"right": HOME["right"]}, 1))
-        number += 1
+        nodes.show(shown({"right": HOME["right"]}, 1))
         right = nodes.states[-1]
         assert right.tracked and error_mm(right, "right", HOME["right"]) < limit_mm + 1.0, "it goes on undisturbed"
     assert nodes.states[-1].other.condition is Condition.LOST
     assert np.isnan(nodes.states[-1].other.joint_positions).all()
-    until_tracked(nodes, still, number)
+    nodes.show_until_tracked(still)
     times_ns = [state.t_master_ns for state in nodes.states if state.tracked]
     assert (np.diff(times_ns) > 0).all()
 
@@ -120,24 +102,23 @@ def test_both_hands_are_found_and_one_leaves_and_returns(still: list[np.ndarray]
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 def test_both_hands_are_tracked_after_one_has_occluded_the_other(monkeypatch) -> None:
     """The left hand passes 6 cm before the right one, which rests, and covers all of it."""
-    nodes, number = nodes_of(two_bare_hands()), 0
+    nodes = ShownNodes(two_bare_hands(), EMPTY)
     hands = {"right": at("right", (0.0, 0.0, 0.03)), "left": at("left", (-0.13, 0.0, -0.03))}
     with monkeypatch.context() as patched:
         given(patched, hands)
-        number = until_tracked(nodes, shown(hands, 0), number)
+        nodes.show_until_tracked(shown(hands, 0))
     errors = []
     way = np.linspace(0.0, 1.0, 50)
     for x_m in np.append(-0.13 + 0.26 * (3.0 * way**2 - 2.0 * way**3), np.full(30, 0.13)):
         hands["left"] = at("left", (x_m, 0.0, -0.03))
-        nodes.step(number, shown(hands, number))
-        number += 1
+        nodes.show(shown(hands, nodes.number))
         states = states_of(nodes.states[-1])
         assert states["left"].tracked
         errors.append({side: error_mm(one, side, hands[side]) for side, one in states.items()})
     left = [one["left"] for one in errors]
     assert np.median(left) < 2.0, "the nearer one goes on; the other may be lost while it is hidden"
     assert all(error < 2.0 for error in errors[-1].values()), "neither is taken for the other one"
-    assert nodes.states[-1].t_master_ns == FIRST_NS + (number - 1) * PERIOD_NS
+    assert nodes.states[-1].t_master_ns == FIRST_NS + (nodes.number - 1) * PERIOD_NS
 
 
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
@@ -147,17 +128,13 @@ def test_swapped_hands_are_corrected(still: list[np.ndarray], monkeypatch) -> No
     for side, other in zip(SIDES, SIDES[::-1], strict=True):
         world = HOME[other].world_from_palm @ np.diag([1.0, -1.0, -1.0, 1.0])
         turned[side] = HandPose(world, model_and_surface(side)[0].pose_prior.mean.copy())
-    nodes, number = nodes_of(two_bare_hands()), 0
+    nodes = ShownNodes(two_bare_hands(), EMPTY)
     with monkeypatch.context() as patched:
         given(patched, turned)
-        number = until_tracked(nodes, still, number)
+        nodes.show_until_tracked(still)
     assert all(error_mm(one, side, HOME[side]) > 100.0 for side, one in states_of(nodes.states[-1]).items())
-    first = number
-    while any(not one.tracked or error_mm(one, side, HOME[side]) > 20.0
-              for side, one in states_of(nodes.states[-1]).items()):
-        assert number < first + 40
-        nodes.step(number, still)
-        number += 1
+    nodes.show_until(lambda: all(one.tracked and error_mm(one, side, HOME[side]) <= 20.0
+                                 for side, one in states_of(nodes.states[-1]).items()), still, 40)
 
 
 def test_edges_requested_for_one_hand_alone_are_left_out() -> None:
@@ -173,12 +150,10 @@ def test_edges_requested_for_one_hand_alone_are_left_out() -> None:
 def test_the_slices_of_both_hands_fit_into_a_request(monkeypatch) -> None:
     """Hands so near that each alone would ask for more than its half."""
     near = {side: at(side, (x_m, 0.0, 0.28 - DISTANCE_M)) for side, x_m in zip(SIDES, (0.07, -0.07), strict=True)}
-    nodes = nodes_of(two_bare_hands())
+    nodes = ShownNodes(two_bare_hands(), EMPTY)
     monkeypatch.setattr("rhot_app.tracking.contours.requests.STEP_M", 1e-3)
     given(monkeypatch, near)
-    images = shown(near, 0)
-    for number in range(6):
-        nodes.step(number, images)
+    nodes.show(shown(near, 0), 6)
     assert all(SLICES_MAX // 2 < len(request.slices) <= SLICES_MAX for request in nodes.asked)
 
 

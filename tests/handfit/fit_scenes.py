@@ -6,7 +6,8 @@ from functools import lru_cache
 
 import msgspec
 import numpy as np
-from bare_scenes import left_hand, poses, rig_of, right_hand, scene
+from bare_scenes import poses, rig_of, scene
+from shipped_rig import LEFT_HAND, RIGHT_HAND
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
@@ -25,7 +26,7 @@ def drawn(motion: str = "still", seconds: float = 0.2, side: str = "right") \
     """A rig, the pose of its hand, and a picture of each camera."""
     (pose,) = poses(motion, (seconds,), side)
     cameras, images, _ = scene(pose, side=side)
-    rig = rig_of(cameras, right_hand() if side == "right" else left_hand())
+    rig = rig_of(cameras, RIGHT_HAND if side == "right" else LEFT_HAND)
     return msgspec.structs.replace(rig, calibration=CameraCalibration("exact")), pose, tuple(images)
 
 

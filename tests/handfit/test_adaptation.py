@@ -8,8 +8,9 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from bare_scenes import DISTANCE_M, rig_of, right_hand
+from bare_scenes import DISTANCE_M, rig_of
 from pictures import picture, taken, two_cameras, wall
+from shipped_rig import RIGHT_HAND, RIGHT_MODEL
 
 from rhot_app.barehand.key_frames import MAX_KEY_FRAMES, MIN_INTERVAL_S, SHAPE_SD, KeyFrame, KeyFrames, phalanx_sd
 from rhot_app.barehand.surface import surface_of
@@ -43,7 +44,7 @@ def wrong(hand: HandAnatomy) -> HandAnatomy:
 @lru_cache
 def tracked() -> tuple[HandAnatomy, KeyFrames, list[HandPose], BareHandTracker]:
     """The wrong hand file, the key frames of a spreading hand tracked with it, and the true poses."""
-    truth, cameras = right_hand(), two_cameras(distance=DISTANCE_M)
+    truth, cameras = RIGHT_HAND, two_cameras(distance=DISTANCE_M)
     model = build_model(truth)
     surface, believed = surface_of(model), wrong(truth)
     walls = [wall(camera, 10 * k + 1, False) for k, camera in enumerate(cameras)]
@@ -68,7 +69,7 @@ def tracked() -> tuple[HandAnatomy, KeyFrames, list[HandPose], BareHandTracker]:
 
 def errors(hand: HandAnatomy, field: str) -> np.ndarray:
     """(15,) logarithms of the true values less the hand's."""
-    truth = right_hand()
+    truth = RIGHT_HAND
     return np.log([np.array(getattr(truth.fingers[name], field)) / np.array(getattr(hand.fingers[name], field))
                    for name in truth.fingers]).ravel()
 
@@ -85,7 +86,7 @@ def test_a_wrong_hand_file_is_mended_by_ten_poses() -> None:
         world = np.eye(4)
         world[:3] = state[:ANGLES].reshape(3, 4)
         joints.append(forward(build_model(found.hand), HandPose(world, state[ANGLES:VELOCITY])).joints
-                      - forward(build_model(right_hand()), pose).joints)
+                      - forward(RIGHT_MODEL, pose).joints)
     assert np.mean(np.linalg.norm(joints, axis=2)) < 1.0e-3
     assert rms(errors(found.hand, "radii_mm")) < 0.03 < rms(errors(believed, "radii_mm"))
     assert rms(errors(found.hand, "bones_mm")) < 0.045 < rms(errors(believed, "bones_mm"))
@@ -104,7 +105,7 @@ def test_key_frames_predict_how_certain_the_hand_will_be() -> None:
     assert rms(predicted[0]) == pytest.approx(rms(found.length_sd), rel=0.3)
     assert rms(predicted[1]) == pytest.approx(rms(found.radius_sd), rel=0.3)
     assert key_frames.sufficient
-    assert not KeyFrames(build_model(right_hand())).sufficient
+    assert not KeyFrames(RIGHT_MODEL).sufficient
 
 
 def test_what_tells_least_goes_first() -> None:
@@ -130,7 +131,7 @@ def test_the_tracker_believes_the_stated_standard_deviations() -> None:
 
 
 def test_a_hand_file_keeps_what_it_was(tmp_path: Path) -> None:
-    path, hand = tmp_path / "me.json", right_hand()
+    path, hand = tmp_path / "me.json", RIGHT_HAND
     thumb = msgspec.structs.replace(hand.fingers["thumb"], bones_sd_mm=(0.5, 0.4, 0.3), radii_sd_mm=(0.2, 0.2, 0.2))
     adapted = msgspec.structs.replace(hand, fingers={**hand.fingers, "thumb": thumb})
     save_hand(path, hand)

@@ -7,8 +7,9 @@ import dataclasses
 import msgspec
 import numpy as np
 import pytest
-from bare_scenes import rig_of, right_hand
+from bare_scenes import rig_of
 from fit_scenes import another_hand, begun, drawn, seen
+from shipped_rig import RIGHT_HAND, RIGHT_MODEL
 
 from rhot_app.barehand.surface import FOREARM_TURN, LENGTH, RADIUS, SHAPE, capsules_of, surface_of
 from rhot_app.errors import CalibrationError
@@ -18,7 +19,7 @@ from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.handfit.hand_shape import ROOTS, SHAPE_LIMIT, SHAPE_SD, SIZE, Shapes, anatomy_of
 from rhot_app.handfit.session import HandFit
-from rhot_app.handfit.state import OWN, FitState
+from rhot_app.handfit.state import OWN, Anchor, FitState
 from rhot_app.project import CameraCalibration
 from rhot_app.simulator.scene.motion import load_motion
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
@@ -35,6 +36,14 @@ def errors_m(fit, hand, pose):
     """(21,) m: the fit's joints against those of `hand` in `pose`."""
     places, _ = fit.solver.places(fit.state.shape, fit.instant)
     return np.linalg.norm(places - forward(build_model(hand), pose).joints, axis=1)
+
+
+def with_pinned_palm():
+    fit = begun(true_pose=True)
+    for camera in range(2):
+        for joint in (WRIST, INDEX_MCP, LITTLE_MCP):
+            fit.anchor(camera, joint, tuple(fit.joints(camera)[joint]))
+    return fit
 
 
 # -- drags -------------------------------------------------------------------------------------------------------------
@@ -61,20 +70,14 @@ def test_a_dragged_fingertip_bends_its_finger_and_moves_the_palm_little():
 
 
 def test_anchors_in_both_cameras_hold_while_another_joint_is_dragged():
-    fit = begun(true_pose=True)
-    for camera in range(2):
-        for joint in (WRIST, INDEX_MCP, LITTLE_MCP):
-            fit.anchor(camera, joint, tuple(fit.joints(camera)[joint]))
+    fit = with_pinned_palm()
     fit.anchor(0, INDEX_TIP, tuple(fit.joints(0)[INDEX_TIP] + (3.0, 18.0)))
     assert len(fit.errors_px()) == 7 and max(fit.errors_px().values()) < 0.5
 
 
 def test_beyond_its_limits_a_joint_goes_as_far_as_it_can():
     """The palm is pinned, so the fingertip reaches only where the finger can bend; every limit holds exactly."""
-    fit = begun(true_pose=True)
-    for camera in range(2):
-        for joint in (WRIST, INDEX_MCP, LITTLE_MCP):
-            fit.anchor(camera, joint, tuple(fit.joints(camera)[joint]))
+    fit = with_pinned_palm()
     start = fit.joints(0)[INDEX_TIP]
     target = fit.joints(0)[WRIST] + (-250.0, 0.0)
     fit.anchor(0, INDEX_TIP, tuple(target))
@@ -190,7 +193,7 @@ def test_reset_is_where_it_began():
     fit.anchor(0, WRIST, (330.0, 400.0))
     fit.set_number(number(fit, "Sizes", "whole hand"), 110.0)
     fit.reset()
-    assert fit.hand == anatomy_of(right_hand(), np.zeros(SIZE)) and fit.errors_px() == {}
+    assert fit.hand == anatomy_of(RIGHT_HAND, np.zeros(SIZE)) and fit.errors_px() == {}
     assert np.array_equal(fit.instant.pose.world_from_palm, first.world_from_palm)
 
 
@@ -237,22 +240,30 @@ def test_standard_deviations_shrink_where_anchors_are():
 
 # -- fits --------------------------------------------------------------------------------------------------------------
 
-@pytest.mark.parametrize("side", ["right", "left"])
-def test_lengths_come_from_anchors_at_true_joints_in_two_cameras(side):
-    """Without noise every length is well within its standard deviation, from a pose of which nothing was known."""
-    fit = begun(side=side)
-    rig, pose, _ = drawn(side=side)
-    hand = another_hand(rig.hand, 3, only=slice(0, RADIUS))
+def anchor_all(fit, hand, pose):
+    """Anchors at all joints of this hand in both cameras, exact ones."""
     for camera, places in enumerate(seen(hand, pose, fit.cameras)):
         for joint, place in enumerate(places):
             fit.anchor(camera, joint, tuple(place))
-    fit.freedom, fit.anchor_sd_px = "lengths", 0.5
+    fit.anchor_sd_px = 0.5
+
+
+@pytest.mark.parametrize(("side", "freedom", "kind", "field", "changed", "most_sd"), [
+    ("right", "lengths", "length", "bones_mm", slice(0, RADIUS), 1.0),
+    ("left", "lengths", "length", "bones_mm", slice(0, RADIUS), 1.0),
+    ("right", "roots", "root", "base_mm", slice(ROOTS, SIZE), 2.0)])
+def test_a_hand_comes_from_anchors_at_true_joints_in_two_cameras(side, freedom, kind, field, changed, most_sd):
+    """Without noise every number is well within its standard deviation, from a pose of which nothing was known."""
+    fit = begun(side=side)
+    rig, pose, _ = drawn(side=side)
+    hand = another_hand(rig.hand, 3 if kind == "length" else 5, only=changed)
+    anchor_all(fit, hand, pose)
+    fit.freedom = freedom
     fit.fit_to_anchors()
-    truth = [bone for finger in hand.fingers.values() for bone in finger.bones_mm]
-    lengths = [one for one in fit.numbers if one.kind == "length"]
-    off = [abs(fit.value(one) - true) / fit.sd(one) for one, true in zip(lengths, truth, strict=True)]
-    assert max(off) < 1.0
-    assert max(fit.sd(one) for one in lengths) < 1.2, "mm: two cameras tell every bone"
+    truth = [one for finger in hand.fingers.values() for one in getattr(finger, field)]
+    numbers = [one for one in fit.numbers if one.kind == kind]
+    assert max(abs(fit.value(one) - true) / fit.sd(one) for one, true in zip(numbers, truth, strict=True)) < most_sd
+    assert kind == "root" or max(fit.sd(one) for one in numbers) < 1.2, "mm: two cameras tell every bone"
     assert errors_m(fit, hand, pose).max() < 1e-3
 
 
@@ -287,34 +298,13 @@ def test_lengths_scatter_as_their_standard_deviations_say():
             for joint, place in enumerate(places):
                 state = fit.state
                 anchor = tuple(place + 1.5 * noise.standard_normal(2))
-                fit.take(state.change(0, state.instants[0].with_anchor(_anchor(camera, joint, anchor))), "an anchor")
+                fit.take(state.change(0, state.instants[0].with_anchor(Anchor(camera, joint, anchor))), "an anchor")
         fit.freedom, fit.anchor_sd_px = "lengths", 1.5
         fit.fit_to_anchors()
         truth = [bone for finger in hand.fingers.values() for bone in finger.bones_mm]
         lengths = [one for one in fit.numbers if one.kind == "length"]
         squares += [((fit.value(one) - true) / fit.sd(one)) ** 2 for one, true in zip(lengths, truth, strict=True)]
     assert 0.6 < np.mean(squares) < 1.5
-
-
-def _anchor(camera, joint, pixel):
-    from rhot_app.handfit.state import Anchor
-
-    return Anchor(camera, joint, pixel)
-
-
-def test_finger_roots_come_from_anchors_too():
-    fit = begun()
-    rig, pose, _ = drawn()
-    hand = another_hand(rig.hand, 5, only=slice(ROOTS, SIZE))
-    for camera, places in enumerate(seen(hand, pose, fit.cameras)):
-        for joint, place in enumerate(places):
-            fit.anchor(camera, joint, tuple(place))
-    fit.freedom, fit.anchor_sd_px = "roots", 0.5
-    fit.fit_to_anchors()
-    roots = [one for one in fit.numbers if one.kind == "root"]
-    truth = [part for finger in hand.fingers.values() for part in finger.base_mm]
-    assert max(abs(fit.value(one) - true) / fit.sd(one) for one, true in zip(roots, truth, strict=True)) < 2.0
-    assert errors_m(fit, hand, pose).max() < 1e-3
 
 
 def test_two_instants_share_the_lengths_and_have_their_own_poses():
@@ -325,10 +315,8 @@ def test_two_instants_share_the_lengths_and_have_their_own_poses():
     true_poses = (drawn()[1], bent)
     for k, pose in enumerate(true_poses):
         fit.current = k
-        for camera, places in enumerate(seen(hand, pose, fit.cameras)):
-            for joint, place in enumerate(places):
-                fit.anchor(camera, joint, tuple(place))
-    fit.freedom, fit.anchor_sd_px = "lengths", 0.5
+        anchor_all(fit, hand, pose)
+    fit.freedom = "lengths"
     fit.fit_to_anchors()
     for k, pose in enumerate(true_poses):
         fit.current = k
@@ -409,17 +397,17 @@ def test_the_hand_file_says_what_was_fitted(tmp_path):
     shape = SHAPE_SD * rng.standard_normal(SIZE)
     shape[RADIUS:RADIUS + 15] = 0.0
     shape[ROOTS:] = 0.0
-    hand = anatomy_of(right_hand(), shape)
+    hand = anatomy_of(RIGHT_HAND, shape)
     save_hand(tmp_path / "hand.json", hand)
     read = load_hand(tmp_path / "hand.json")
     assert read == hand
     _, pose, _ = drawn()
     bare = np.zeros(SHAPE)
     bare[:FOREARM_TURN] = shape[:FOREARM_TURN]
-    base = surface_of(build_model(right_hand()))
+    base = surface_of(RIGHT_MODEL)
     centres, radii = capsules_of(base, pose.world_from_palm, pose.angles, bare)
     of_file, file_radii = capsules_of(surface_of(build_model(read)), pose.world_from_palm, pose.angles)
     own = base.group < 5
     assert of_file[own] == pytest.approx(centres[own], abs=1.5e-3) and file_radii == pytest.approx(radii, abs=1e-6)
-    joints = Shapes(right_hand()).model(shape)
+    joints = Shapes(RIGHT_HAND).model(shape)
     assert forward(joints, pose).joints == pytest.approx(forward(build_model(read), pose).joints, abs=1e-9)

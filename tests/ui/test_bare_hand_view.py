@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from bare_scenes import poses, rig_of, right_hand, scene
+from bare_scenes import poses, rig_of, scene
 from PySide6.QtGui import QImage
 from screen_pictures import check
 
@@ -25,7 +25,7 @@ def hand():
     """A rig, its pictures as previews, and what a tracker has seen in them, as it comes from the engine."""
     (pose,) = poses("spread", (0.4,))
     cameras, images, _ = scene(pose)
-    rig = rig_of(cameras, right_hand())
+    rig = rig_of(cameras)
     tracker = BareHandTracker(rig)
     tracker.start(pose, T_NS)
     tracker.step(images, [T_NS, T_NS])
