@@ -5,16 +5,12 @@ from __future__ import annotations
 import ast
 import re
 import subprocess
-import warnings
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("rhot_node", "rhot_app")
-COMFORTABLE_LINES = 300
 UNOWNED = re.compile(r"\b(?:TO" r"DO|FIX" r"ME|XX" r"X)\b(?!\((\w+)\):)")
 FROM_IMPORT = re.compile(r"^ *from ([\w.]+) import (\([^)]*\)|.*)", re.MULTILINE)
 
@@ -24,13 +20,13 @@ def sources(*folders: str) -> list[Path]:
     return sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
 
 
-def tracked_text() -> Iterator[tuple[Path, str]]:
-    """Every text file of the project, by git where there is a repository, else by folder."""
+def tracked_text(suffix: str) -> Iterator[tuple[Path, str]]:
+    """Every file of the project with this suffix, by git where there is a repository, else by folder."""
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
     names = listed.stdout.splitlines() or [str(path.relative_to(ROOT)) for path in sources(*PACKAGES, "tests")]
     for name in names:
         path = ROOT / name
-        if path.is_file() and path.suffix in {".py", ".md", ".toml", ".in", ".json", ""}:
+        if path.is_file() and path.suffix == suffix:
             yield path, path.read_text(encoding="utf-8")
 
 
@@ -83,14 +79,6 @@ def test_what_other_packages_use_is_described() -> None:
     assert not missing, "\n".join(missing)
 
 
-def test_long_files_are_named() -> None:
-    """Advice, not a rule: a file is one concept."""
-    for path in sources(*PACKAGES, "tests", "benchmarks"):
-        lines = len(path.read_text().splitlines())
-        if lines > COMFORTABLE_LINES:
-            warnings.warn(f"{path.relative_to(ROOT)} has {lines} lines; does it do two things?", stacklevel=1)
-
-
 def test_pictures_and_videos_of_others_are_opened_in_one_place() -> None:
     """It checks them first, and turns no pixels; a camera's device is no file."""
     allowed = {"rhot_node/pictures.py", "rhot_node/capture/webcam.py"}
@@ -100,16 +88,14 @@ def test_pictures_and_videos_of_others_are_opened_in_one_place() -> None:
 
 
 def test_what_is_left_for_later_has_an_owner() -> None:
-    found = [f"{path.relative_to(ROOT)}: {match.group()}" for path, text in tracked_text() if path.suffix == ".py"
+    found = [f"{path.relative_to(ROOT)}: {match.group()}" for path, text in tracked_text(".py")
              for match in UNOWNED.finditer(text)]
     assert not found, "write the owner's name in parentheses behind it, and a colon:\n" + "\n".join(found)
 
 
 def test_links_between_documents_lead_somewhere() -> None:
     broken = []
-    for path, text in tracked_text():
-        if path.suffix != ".md":
-            continue
+    for path, text in tracked_text(".md"):
         for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
             if "://" not in target and not target.startswith("mailto:") and not (path.parent / target).exists():
                 broken.append(f"{path.relative_to(ROOT)} -> {target}")
@@ -118,9 +104,7 @@ def test_links_between_documents_lead_somewhere() -> None:
 
 def test_links_to_sections_name_headings() -> None:
     broken = []
-    for path, text in tracked_text():
-        if path.suffix != ".md":
-            continue
+    for path, text in tracked_text(".md"):
         for target, section in re.findall(r"\]\(([^)#\s:]*)#([^)\s]+)\)", text):
             page = path.parent / target if target else path
             prose = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
@@ -130,8 +114,7 @@ def test_links_to_sections_name_headings() -> None:
     assert not broken, "\n".join(broken)
 
 
-@pytest.mark.parametrize("folder", ["tests"])
-def test_test_files_have_unique_names(folder: str) -> None:
-    names = [path.name for path in (ROOT / folder).rglob("test_*.py")]
+def test_test_files_have_unique_names() -> None:
+    names = [path.name for path in (ROOT / "tests").rglob("test_*.py")]
     doubled = sorted({name for name in names if names.count(name) > 1})
     assert not doubled, f"pytest would import only one of each: {', '.join(doubled)}"

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from shipped_markers import RHOT6
+from shipped_rig import TWO_PIS
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.articulated import load_articulated
@@ -36,15 +38,14 @@ def test_the_example_nodes_run_on_one_machine_and_the_first_has_the_ports_of_a_p
              for settings in (load_settings(resource_path("nodes", f"{name}.json")) for name in ("left", "right"))]
     assert len({*ports[0], *ports[1]}) == 8
     assert {(node.udp_port, node.control_port, node.preview_port, node.pairing_port)
-            for node in load_rig(resource_path("rigs", "two_pis.json")).nodes} == {ports[0]}
+            for node in TWO_PIS.nodes} == {ports[0]}
 
 
 def test_the_nodes_of_the_example_are_those_of_its_rig() -> None:
-    rig = load_rig(resource_path("rigs", "two_pis.json"))
-    assert [node.name for node in rig.nodes] == ["left", "right"]
-    for node in rig.nodes:
+    assert [node.name for node in TWO_PIS.nodes] == ["left", "right"]
+    for node in TWO_PIS.nodes:
         settings = load_settings(resource_path("nodes", f"{node.name}.json"))
         assert settings.node_id == node.node_id
-        assert settings.broadcast_port == rig.broadcast.port
+        assert settings.broadcast_port == TWO_PIS.broadcast.port
         assert (settings.camera.width, settings.camera.height) == (node.intrinsics.width, node.intrinsics.height)
-        assert settings.markers == rig.markers == load_markers(resource_path("markers", "rhot6.json"))
+        assert settings.markers == TWO_PIS.markers == RHOT6

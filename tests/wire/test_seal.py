@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import random
-from pathlib import Path
 
 import pytest
-from wire_samples import KEY, TAGGED
+from wire_samples import KEY, TAGGED, packet
 
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import TAG_LENGTH, Seal, decode, decode_sealed, decode_verified, encode, node_of
 
-PACKETS = Path(__file__).parents[1] / "packets"
 SEAL = Seal(KEY)
-
-
-def packet(name: str) -> bytes:
-    return (PACKETS / f"{name}.bin").read_bytes()
 
 
 def refused(data: bytes, seal: Seal = SEAL) -> str:

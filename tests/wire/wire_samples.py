@@ -33,6 +33,11 @@ PACKETS = Path(__file__).parents[1] / "packets"
 SESSION = 0x1122334455667788
 FRAME_NS = 3_600_000_000_000
 RHOT6_CHECKSUM = 0xC0FFEE01
+OF_A_FRAME: dict[str, int] = {
+    "node_id": 2, "session": SESSION, "sequence": 7, "t_frame_node_ns": FRAME_NS,
+    "t_send_node_ns": FRAME_NS + 27_000_000, "processing_ns": 1_500_000, "exposure_ns": 4_000_000,
+    "row_time_ns": 48_000, "width": 640, "height": 480, "frame_number": 41}
+"""What all messages about a frame have."""
 
 
 def packet(name: str) -> bytes:
@@ -49,10 +54,7 @@ def found(index: int, x: float, y: float, flags: MarkerFlag = NO_FLAGS) -> Marke
 
 
 def observations(markers: tuple[MarkerObservation, ...], sequence: int = 7) -> Observations:
-    return Observations(
-        node_id=2, session=SESSION, sequence=sequence, t_frame_node_ns=FRAME_NS,
-        t_send_node_ns=FRAME_NS + 27_000_000, processing_ns=1_500_000, exposure_ns=4_000_000, row_time_ns=48_000,
-        width=640, height=480, frame_number=41, marker_checksum=RHOT6_CHECKSUM, markers=markers)
+    return Observations(**OF_A_FRAME | {"sequence": sequence}, marker_checksum=RHOT6_CHECKSUM, markers=markers)
 
 
 def fiducial(family: int, number: int, x: float, y: float, side: float = 32.0) -> Fiducial:
@@ -61,17 +63,11 @@ def fiducial(family: int, number: int, x: float, y: float, side: float = 32.0) -
 
 
 def fiducials(found: tuple[Fiducial, ...], truncated: bool = False) -> Fiducials:
-    return Fiducials(
-        node_id=2, session=SESSION, sequence=7, t_frame_node_ns=FRAME_NS, t_send_node_ns=FRAME_NS + 27_000_000,
-        processing_ns=1_500_000, exposure_ns=4_000_000, row_time_ns=48_000, width=640, height=480, frame_number=41,
-        fiducials=found, truncated=truncated)
+    return Fiducials(**OF_A_FRAME, fiducials=found, truncated=truncated)
 
 
 def edges(found: tuple[SliceEdge, ...], part: int = 0, parts: int = 1) -> SliceEdges:
-    return SliceEdges(
-        node_id=2, session=SESSION, sequence=7, t_frame_node_ns=FRAME_NS, t_send_node_ns=FRAME_NS + 27_000_000,
-        processing_ns=1_500_000, exposure_ns=4_000_000, row_time_ns=48_000, width=640, height=480, frame_number=41,
-        request=12, slice_count=232, part=part, parts=parts, edges=found)
+    return SliceEdges(**OF_A_FRAME, request=12, slice_count=232, part=part, parts=parts, edges=found)
 
 
 def slices(records: bytes, count: int, map_step: int = 0, part: int = 0, parts: int = 1) -> Slices:
@@ -80,10 +76,7 @@ def slices(records: bytes, count: int, map_step: int = 0, part: int = 0, parts: 
 
 
 def foreground(data: bytes, part: int = 0, parts: int = 1) -> ForegroundPart:
-    return ForegroundPart(
-        node_id=2, session=SESSION, sequence=7, t_frame_node_ns=FRAME_NS, t_send_node_ns=FRAME_NS + 27_000_000,
-        processing_ns=1_500_000, exposure_ns=4_000_000, row_time_ns=48_000, width=640, height=480, frame_number=41,
-        request=12, step=8, part=part, parts=parts, data=data)
+    return ForegroundPart(**OF_A_FRAME, request=12, step=8, part=part, parts=parts, data=data)
 
 
 SIX = tuple(found(i, 100.5 + 64.25 * i, 200.125 - 8.5 * i) for i in range(6))
