@@ -8,13 +8,9 @@ import signal
 from collections.abc import Iterator
 from pathlib import Path
 
-import msgspec
 import pytest
-from shipped_markers import RHOT6
 
 from rhot_app.__main__ import main
-from rhot_node.config import NodeSettings, load_settings
-from rhot_node.errors import SettingsError
 from rhot_node.files import resource_path
 
 RIG = resource_path("rigs", "two_pis.json")
@@ -108,12 +104,3 @@ def test_a_time_that_never_ends_is_refused(command: str, seconds: str, tmp_path:
     assert main(arguments) == 2
     assert "seconds" in capsys.readouterr().err or command == "evaluate"
     assert not (tmp_path / "out").exists()
-
-
-def test_a_rate_that_never_gives_a_frame_is_refused(tmp_path: Path) -> None:
-    settings = NodeSettings(1, "left", RHOT6)
-    document = msgspec.to_builtins(settings)
-    document["camera"]["fps"] = 1e-300
-    (tmp_path / "node.json").write_text(json.dumps(document))
-    with pytest.raises(SettingsError, match=r"camera\.fps"):
-        load_settings(tmp_path / "node.json")

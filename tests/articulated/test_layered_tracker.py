@@ -1,7 +1,5 @@
 """Tracking articulated objects by layered templates: fingers that cross, a box that opens, what is not free."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from objects import box_on_hinge, object_of

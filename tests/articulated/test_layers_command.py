@@ -1,7 +1,5 @@
 """``rhot layers``: pictures and films of visibility orders, and its refusals."""
 
-from __future__ import annotations
-
 import json
 
 import cv2

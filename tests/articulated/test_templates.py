@@ -1,7 +1,5 @@
 """Template residuals: Jacobians against finite differences, occlusion, light, pictures without texture or object."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from objects import object_of

@@ -1,7 +1,5 @@
 """Visibility orders: against a depth buffer, the rule of a joint, sorting, cycles."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -21,8 +21,6 @@ from rhot_node.files import resource_path
 TRIAD = tuple(MarkerPlace(f"palm_{k}", PALM, PALM) for k in range(1, 4))
 RICH = (*TRIAD, *(MarkerPlace(f"{finger}_{bone}", f, b, painted=b == 2)
                   for f, finger in enumerate(FINGERS) for b, bone in enumerate(BONES[f])))
-TWO_PER_FINGER = (*TRIAD, *(MarkerPlace(f"{finger}_{word}", f, bone) for f, finger in enumerate(FINGERS)
-                            for word, bone in (("tip", 2), ("middle", 1 if f == 0 else 0))))
 SIX = (*(MarkerPlace(f"{finger}_tip", f, 2, painted=True) for f, finger in enumerate(FINGERS)),
        MarkerPlace("wrist", PALM, PALM, painted=True))
 

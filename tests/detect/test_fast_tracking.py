@@ -138,27 +138,6 @@ def test_no_more_than_four_candidates_are_told_and_they_are_of_the_marker() -> N
     assert len(seen) == 6 + 3
 
 
-def test_a_spread_hand_is_found_whole_and_a_hidden_marker_again_within_five_frames() -> None:
-    """Six small discs as far apart as the frame allows; every marker in turn is hidden for a while."""
-    places = {name: (30.0 + 115 * k, 30.0 + 210 * (k % 3)) for k, name in enumerate(RHOT6.ids)}
-    detector, rng = FastDetector(RHOT6), np.random.default_rng(4)
-
-    def frame(hidden: str = "") -> tuple[MarkerObservation, ...]:
-        canvas = Canvas(640, 480)
-        for name, (x, y) in places.items():
-            if name != hidden:
-                canvas.paint(disc(x, y, 6), RGB[name], (x, y), 9, 0.25)
-        return detector.detect(canvas.expose(rng))
-
-    assert all(mark.found for mark in frame())
-    for name in RHOT6.ids:
-        for _ in range(6):
-            assert [mark.found for mark in frame(name)] == [one != name for one in RHOT6.ids]
-        later = [frame()[RHOT6.ids.index(name)].found for _ in range(5)]
-        assert later[-1], name
-        assert later == sorted(later), name
-
-
 def test_hiding_is_noticed_and_the_covariance_covers_it() -> None:
     detector = only("thumb")
     rng = np.random.default_rng(5)

@@ -29,11 +29,6 @@ def test_labels_are_the_pixels_of_the_blobs() -> None:
         assert 0 <= specks <= 6  # what the search leaves out as noise
 
 
-def test_only_the_wanted_markers_are_searched() -> None:
-    blobs = ColourGate(RHOT6).blobs(picture(), [3])
-    assert set(blobs[:, LABEL]) == {4}
-
-
 def test_too_dark_and_too_bright_pixels_are_nobodys() -> None:
     image = picture()
     luma = image.y.copy()

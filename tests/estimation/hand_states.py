@@ -1,7 +1,5 @@
 """A hand before two cameras, states of it, and derivatives by central differences."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Transitions and noise of Gauss-Markov processes against their stochastic differential equations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The hand as a process: manifold, and prediction."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hand_states import BIAS_S, make_process, markers, moving_state, natural_state, points_of, slopes, world_of

@@ -1,7 +1,5 @@
 """The iterated filter: Kalman's on linear problems, late observations, robust kernels, a nonlinear observation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from linear_motion import ConstantVelocity, Linear, kalman_update, place
@@ -17,6 +15,14 @@ TIMES = np.array([0.1, 0.25, 0.3, 0.62, 0.7, 0.9])
 def started(knots=12):
     estimate = IteratedFilter(ConstantVelocity(), knots)
     estimate.start(0.0, STATE, COVARIANCE)
+    return estimate
+
+
+def given(taken, knots=12):
+    """A filter that has taken these, one by one."""
+    estimate = started(knots)
+    for t, residual in taken:
+        estimate.add(t, [residual])
     return estimate
 
 
@@ -52,11 +58,8 @@ def test_a_linear_process_is_estimated_as_by_the_kalman_filter():
 
 
 def test_the_estimate_at_an_earlier_time_uses_earlier_observations_only():
-    estimate, shorter = started(), started()
-    for t, residual in measurements():
-        estimate.add(t, [residual])
-        if t < 0.5:
-            shorter.add(t, [residual])
+    taken = measurements()
+    estimate, shorter = given(taken), given([one for one in taken if one[0] < 0.5])
     for got, expected in zip(estimate.predict(0.5), shorter.predict(0.5), strict=True):
         np.testing.assert_allclose(got, expected, atol=1e-12)
 
@@ -64,9 +67,7 @@ def test_the_estimate_at_an_earlier_time_uses_earlier_observations_only():
 @pytest.mark.parametrize("seed", range(5))
 def test_the_order_of_arrival_does_not_matter(seed):
     taken = measurements()
-    in_order, shuffled = started(), started()
-    for t, residual in taken:
-        in_order.add(t, [residual])
+    in_order, shuffled = given(taken), started()
     for k in np.random.default_rng(seed).permutation(len(taken)):
         t, residual = taken[k]
         assert shuffled.add(t, [residual]).t_s == t
@@ -76,12 +77,7 @@ def test_the_order_of_arrival_does_not_matter(seed):
 def test_the_order_does_not_matter_to_robust_residuals_either():
     taken = [(t, place(value, kernel=student())) for t, value in zip(TIMES, [0.2, 9.0, 0.3, -0.1, -7.0, 0.0],
                                                                      strict=True)]
-    in_order, backwards = started(), started()
-    for t, residual in taken:
-        in_order.add(t, [residual])
-    for t, residual in reversed(taken):
-        backwards.add(t, [residual])
-    assert_same(backwards.newest, in_order.newest)
+    assert_same(given(reversed(taken)).newest, given(taken).newest)
 
 
 def test_a_prediction_made_before_is_taken_for_the_prior():
@@ -91,27 +87,15 @@ def test_a_prediction_made_before_is_taken_for_the_prior():
 
 
 def test_an_observation_older_than_the_oldest_knot_enters_that_one():
-    estimate, expected = started(knots=3), started(knots=12)
-    taken = measurements()
-    for t, residual in taken:
-        estimate.add(t, [residual])
+    taken, late = measurements(), place(2.0, 0.01)
     oldest = taken[-3][0]
-    for t, residual in taken[:-3]:
-        expected.add(t, [residual])
-    late = place(2.0, 0.01)
-    expected.add(oldest, [taken[-3][1]])
-    expected.add(oldest, [late])
-    for t, residual in taken[-2:]:
-        expected.add(t, [residual])
+    estimate, expected = given(taken, knots=3), given([*taken[:-2], (oldest, late), *taken[-2:]])
     assert estimate.add(0.2, [late]).t_s == oldest
     assert_same(estimate.newest, expected.newest)
 
 
 def test_two_observations_older_than_the_oldest_knot_both_count():
-    estimate, expected = started(knots=1), started(knots=1)
-    for t, residual in measurements():
-        estimate.add(t, [residual])
-        expected.add(t, [residual])
+    estimate, expected = (given(measurements(), knots=1) for _ in range(2))
     first, second = place(2.0, 0.01), place(1.5, 0.02)
     estimate.add(0.2, [first])
     estimate.add(0.1, [second])
@@ -120,9 +104,7 @@ def test_two_observations_older_than_the_oldest_knot_both_count():
 
 
 def test_starting_again_discards_all_knots():
-    estimate = started()
-    for t, residual in measurements():
-        estimate.add(t, [residual])
+    estimate = given(measurements())
     estimate.start(5.0, STATE, COVARIANCE)
     fresh = started()
     assert_same(estimate.add(5.1, [place(1.0)]), fresh.add(0.1, [place(1.0)]))

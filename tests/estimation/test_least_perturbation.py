@@ -1,7 +1,5 @@
 """Rounding errors do not grow over time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

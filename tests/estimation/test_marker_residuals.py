@@ -1,7 +1,5 @@
 """Jacobians and whitening of the rows of markers and joint limits, by central differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hand_states import (

@@ -1,7 +1,5 @@
 """The filter takes observation kinds that it was not written for: image lines, landmarks and contacts of a hand."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The smoother: the textbook's on a linear process, the same in chunks, and nearer to the truth where markers hide."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from linear_motion import ConstantVelocity, kalman_update, place

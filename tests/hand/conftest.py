@@ -1,7 +1,5 @@
 """The two shipped hands."""
 
-from __future__ import annotations
-
 import pytest
 from shipped_rig import LEFT_MODEL, RIGHT_MODEL
 

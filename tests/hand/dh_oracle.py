@@ -1,7 +1,5 @@
 """The plain numpy twin of the tree kinematics: 4x4 products from a file's rows, and numerical differentiation."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

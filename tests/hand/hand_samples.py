@@ -1,7 +1,5 @@
 """Random and natural hand poses for the tests of this room."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -1,7 +1,5 @@
 """Hands from one number: the published parts of hand length, proportions that stay, and the lengths of people."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Articulated objects from files: Rehg's hand against his table and a numpy twin, any other tree, what is refused."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

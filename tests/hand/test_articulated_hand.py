@@ -1,7 +1,5 @@
 """A hand written out as an articulated object is the same hand: points, angles, limits, couplings, sides."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hand_samples import random_pose

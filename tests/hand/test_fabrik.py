@@ -1,7 +1,5 @@
 """FABRIK against the paper's own pseudocode, written down a second time in plain numpy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

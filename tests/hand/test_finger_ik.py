@@ -1,7 +1,5 @@
 """Finger inverse kinematics: targets met, limits kept, neighbours near."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

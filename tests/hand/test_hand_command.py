@@ -1,7 +1,5 @@
 """``rhot hand``: what it makes, writes and draws, and that mistakes end in a sentence with nothing written."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

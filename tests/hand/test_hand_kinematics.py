@@ -1,7 +1,5 @@
 """Forward kinematics against a plain numpy twin, the Jacobian against finite differences, the two sides as mirrors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hand_samples import random_pose, rotation_about
@@ -104,11 +102,6 @@ def test_left_hand_is_the_mirror_image(right_hand, left_hand):
     right, left = forward(right_hand, pose), forward(left_hand, pose)
     np.testing.assert_allclose(left.joints * [1, -1, 1], right.joints, atol=1e-12)
     np.testing.assert_allclose(left.marker_centres * [1, -1, 1], right.marker_centres, atol=1e-12)
-
-
-def test_limits_follow_the_angles(right_hand):
-    assert right_hand.limits.shape == (21, 2)
-    np.testing.assert_allclose(np.degrees(right_hand.limits[ANGLES.index("ring_dip_flexion")]), [-20, 90])
 
 
 def test_thumb_can_oppose_the_little_finger(right_hand):

@@ -1,7 +1,5 @@
 """Angles recovered from joint positions are the angles that posed them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hand_samples import rotation_about

@@ -1,7 +1,5 @@
 """Limits of every shape: the joint alone, chains within them, knuckles, and neighbouring fingers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The small solvers against numpy and scipy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear

@@ -1,7 +1,5 @@
 """The 26 OpenXR joints: order and names, positions that are ours, axes as the standard defines them, both hands."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

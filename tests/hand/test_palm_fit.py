@@ -1,7 +1,5 @@
 """The palm fit on hands whose pose is known: what it gets right, how sure it says it is, and what it refuses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hand_samples import natural_angles, natural_motion, random_world, rotation_about

@@ -1,7 +1,5 @@
 """The picture of an articulated object: every body can be seen, five fingers stand apart, nothing leaves the frame."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import msgspec

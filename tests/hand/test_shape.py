@@ -1,7 +1,5 @@
 """The hand's capsules: markers sit where the kinematics says, and nothing floats."""
 
-from __future__ import annotations
-
 import numpy as np
 from hand_samples import random_pose
 

@@ -1,7 +1,5 @@
 """The solvers side by side: targets met, limits kept, what stopped them said, formulas as numpy has them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

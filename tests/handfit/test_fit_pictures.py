@@ -1,7 +1,5 @@
 """Pictures for a fit: what is none, or none of a camera, is refused in a sentence."""
 
-from __future__ import annotations
-
 import cv2
 import msgspec
 import numpy as np

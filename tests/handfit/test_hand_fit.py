@@ -1,7 +1,5 @@
 """Fitting a hand by anchors and contours: what is dragged gets there, limits hold, lengths are as good as is said."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import msgspec

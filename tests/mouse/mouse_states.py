@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
+from shipped_rig import LEFT_MODEL, RIGHT_MODEL
 
-from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
 from rhot_app.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
-from rhot_node.files import resource_path
 
 PERIOD_NS = 10_000_000
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """World from palm at rest: x right, y forward, z up, as the cursor's frame."""
-
-
-@cache
-def model(side: str) -> HandModel:
-    return build_model(load_hand(resource_path("hands", f"{side}.json")))
 
 
 def hand_state(number: int, place=(0.0, 0.0, 0.0), *, side: str = "right", unseen=(), tip_sd_m: float = 0.0,
@@ -32,7 +24,7 @@ def hand_state(number: int, place=(0.0, 0.0, 0.0), *, side: str = "right", unsee
         angles[ANGLES.index(name)] = np.radians(value)
     palm = np.eye(4)
     palm[:3, :3], palm[:3, 3] = TURN, place
-    points = forward(model(side), HandPose(palm, angles))
+    points = forward(RIGHT_MODEL if side == "right" else LEFT_MODEL, HandPose(palm, angles))
     known = np.array([Knowledge.GUESSED if name in unseen else Knowledge.INFERRED for name in JOINTS], np.uint8)
     estimated = UNESTIMATED | ({"fingertip_covariances": np.tile(tip_sd_m**2 * np.eye(3), (5, 1, 1)),
                                 "palm_covariance": np.zeros((6, 6))} if tip_sd_m else {})

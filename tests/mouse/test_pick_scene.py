@@ -27,6 +27,14 @@ def moved(scene: PickScene) -> None:
         scene.feed(state)
 
 
+def held() -> PickScene:
+    """The ball is held where it lay."""
+    scene = PickScene((BALL,))
+    scene.feed(mouse((0.1, 0.0, 0.05)))
+    scene.feed(mouse((0.1, 0.0, 0.05), "thumb"))
+    return scene
+
+
 def test_a_ball_follows_the_cursor_while_the_thumb_holds_it() -> None:
     scene = PickScene((BALL,))
     moved(scene)
@@ -43,9 +51,7 @@ def test_only_near_balls_are_selected_and_a_thumb_spread_before_picks_nothing() 
 
 
 def test_a_ball_stays_above_the_ground() -> None:
-    scene = PickScene((BALL,))
-    scene.feed(mouse((0.1, 0.0, 0.05)))
-    scene.feed(mouse((0.1, 0.0, 0.05), "thumb"))
+    scene = held()
     scene.feed(mouse((0.1, 0.0, 0.0), "thumb"))
     assert scene.balls[0].centre[2] == pytest.approx(BALL.radius_m)
 
@@ -77,9 +83,7 @@ def test_the_move_of_a_held_ball_cannot_be_undone() -> None:
 
 
 def test_a_lost_hand_releases_the_ball_and_the_move_can_be_undone() -> None:
-    scene = PickScene((BALL,))
-    scene.feed(mouse((0.1, 0.0, 0.05)))
-    scene.feed(mouse((0.1, 0.0, 0.05), "thumb"))
+    scene = held()
     scene.feed(mouse((0.0, 0.0, 0.1), "thumb"))
     scene.feed(mouse((0.0, 0.0, 0.1)))  # what `Mouse` says of a hand that was lost
     assert scene.held is None
@@ -118,9 +122,7 @@ def test_clicks_outside_the_target_are_missed() -> None:
 
 
 def test_an_interruption_releases_a_held_ball_where_it_is() -> None:
-    scene = PickScene((BALL,))
-    scene.feed(mouse((0.1, 0.0, 0.05)))
-    scene.feed(mouse((0.1, 0.0, 0.05), "thumb"))
+    scene = held()
     scene.feed(mouse((0.0, 0.0, 0.1), "thumb"))
     scene.interrupt()
     left = scene.balls[0]

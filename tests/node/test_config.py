@@ -50,7 +50,8 @@ SAID: list[tuple[dict[str, Any], str]] = [
      """"plug:NAME" with the name of a plug-in"""),
     ({"late_frames": "keep"},
      """late_frames: 'keep' is not one of the values that this field can have: "drop" or "send"."""),
-    ({"udp_port": 70000}, "udp_port"), ({"camera": {"width": 641}}, "camera.width"), ({"camera": {"fps": 0}}, "fps"),
+    ({"udp_port": 70000}, "udp_port"), ({"camera": {"width": 641}}, "camera.width"),
+    ({"camera": {"fps": 1e-300}}, "camera.fps"),
     ({"markers": {"markers": []}}, "markers"), ({"format": "rhot-rig"}, "rhot-node"), ({"version": 2}, "version 2"),
     ({"name": ""}, "name"), ({"control_port": 5000, "preview_port": 5000}, "5000"), ({"udp_port": 47799}, "47799"),
 ]

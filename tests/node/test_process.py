@@ -237,12 +237,3 @@ def test_what_is_wrong_is_said_in_a_sentence_with_code_2(tmp_path: Path, recordi
         assert f"udp_port: UDP port {port}" in failed_start("--settings", taken, "--camera", f"yuv:{recording}")
     assert "--camera" in failed_start("--settings", settings)
 
-
-def test_help_is_complete() -> None:
-    done = subprocess.run([sys.executable, "-m", "rhot_node", "--help"], capture_output=True, text=True,
-                          timeout=READY_S)
-    assert done.returncode == 0
-    for word in ("--settings", "--camera", "--loop", "--exit-with-parent", "--log-level", "/dev/video", "yuv:",
-                 "stream:", "?rate=max", "detect"):
-        assert word in done.stdout
-

@@ -83,8 +83,3 @@ def test_nodes_share_the_markers_and_keep_to_this_machine() -> None:
     assert settings.bind_address == "127.0.0.1" and settings.broadcast_port is None
     assert (settings.udp_port, settings.control_port, settings.preview_port) == (2001, 2002, 2003)
     assert settings.clock.offset_s == scene.clocks[1].offset_s
-
-
-def test_impossible_scenes_are_refused_with_a_sentence() -> None:
-    with pytest.raises(SimulatorError, match=r"--distance 0\.01: expected a number >= 0\.15"):
-        scene_from("--distance", "0.01")

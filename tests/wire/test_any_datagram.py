@@ -30,7 +30,6 @@ from rhot_node.wire.messages import (
     TrustState,
 )
 
-f32 = st.floats(width=32, allow_nan=False, allow_infinity=False)
 u32 = st.integers(0, 2**32 - 1)
 u64 = st.integers(0, 2**64 - 1)
 times = st.integers(-(2**62) + 1, 2**62 - 1)

@@ -15,7 +15,6 @@ from PySide6.QtTest import QTest
 from synthetic_rig import WIDE, Viewing, make_rig, observe
 from wizard_hand import HeldMarker, RecordingAsker
 
-from rhot_app.calibration.hand.bones import solve_bones
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import load_rig
 from rhot_app.ui.wizards.bones import make_plan
@@ -36,30 +35,6 @@ def write_movement(rig, path):
         return np.stack([np.interp(times, tracks.times_s, column) for column in columns], axis=1).reshape(-1, 6, 3)
 
     write_log(Path(path), rig, observe(rig, WIDE, trajectory, SECONDS - 0.5, Viewing(noise_px=0.05)))
-
-
-def twin_report(rig):
-    """What that hand with six painted markers shows."""
-    return solve_bones(record(person(3, SIZE), SIX, 3, seconds=40.0, rate_hz=20.0), rig.hand)
-
-
-class FreeHand:
-    """A listener that hears six markers of a hand that moves freely, three times as fast as anybody would."""
-
-    def __init__(self):
-        self.engine = FakeEngine(make_rig())
-        self.tracks = record(person(3), SIX, 3, seconds=40.0, sloppiness=Sloppiness(0.0, 0.0, 0.0))
-
-    def connect(self):
-        return self
-
-    def close(self):
-        """Nothing to close."""
-
-    def poll(self):
-        now = self.engine.clock()
-        at = self.tracks.positions[int(180.0 * now) % len(self.tracks.positions)]
-        return [replace(self.engine.state(now), marker_raw_positions=at)]
 
 
 @pytest.fixture
