@@ -1,7 +1,7 @@
 """The two shipped hands."""
 
 import pytest
-from shipped_rig import LEFT_MODEL, RIGHT_MODEL
+from shipped_rig import LEFT_MODEL, RIGHT_MODEL, model  # noqa: F401
 
 
 @pytest.fixture(scope="session")

@@ -17,18 +17,16 @@ def state_of(pose):
     return np.concatenate([quaternion_from_rotation(world[:3, :3]), world[:3, 3], pose.angles])
 
 
-@pytest.mark.parametrize("side", ["right_hand", "left_hand"])
-def test_points_and_jacobian_are_the_hands(side, request, tmp_path):
-    hand = request.getfixturevalue(side)
+def test_points_and_jacobian_are_the_hands(model, tmp_path):
     path = tmp_path / "hand.json"
-    save_articulated(path, articulated_hand(hand.anatomy))
-    model = build_articulated(load_articulated(path))
+    save_articulated(path, articulated_hand(model.anatomy))
+    articulated = build_articulated(load_articulated(path))
     for seed in range(3):
-        pose = random_pose(hand, np.random.default_rng(seed))
-        points, expected = forward_state(model, state_of(pose)).points, forward(hand, pose)
+        pose = random_pose(model, np.random.default_rng(seed))
+        points, expected = forward_state(articulated, state_of(pose)).points, forward(model, pose)
         np.testing.assert_allclose(points[:21], expected.joints, atol=1e-11)
         np.testing.assert_allclose(points[21:], expected.marker_centres, atol=1e-11)
-        per_number, per_twist = state_jacobian(model, state_of(pose)), jacobian(hand, pose)
+        per_number, per_twist = state_jacobian(articulated, state_of(pose)), jacobian(model, pose)
         np.testing.assert_allclose(per_number[:, :, 4:7], per_twist[:, :, :3], atol=1e-12)
         np.testing.assert_allclose(per_number[:, :, 7:], per_twist[:, :, 6:], atol=1e-11)
 

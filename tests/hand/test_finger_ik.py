@@ -17,9 +17,7 @@ from rhot_app.hand.solvers.finger_ik import solve_finger, solve_fingers, to_fing
 HUNDREDTH_DEGREE = np.radians(0.01)
 
 
-@pytest.mark.parametrize("side", ["right_hand", "left_hand"])
-def test_reachable_targets_are_met_within_limits(side, request):
-    model = request.getfixturevalue(side)
+def test_reachable_targets_are_met_within_limits(model):
     rng = np.random.default_rng(1)
     low, high = model.limits.T
     residuals = []

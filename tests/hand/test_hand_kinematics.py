@@ -60,9 +60,7 @@ def numeric_jacobian(look, pose):
     return np.stack([(moved(c, step) - moved(c, -step)) / (2 * step) for c in range(6 + len(ANGLES))], axis=-1)
 
 
-@pytest.mark.parametrize("side", ["right_hand", "left_hand"])
-def test_jacobian_matches_finite_differences(side, request):
-    model = request.getfixturevalue(side)
+def test_jacobian_matches_finite_differences(model):
     rng = np.random.default_rng(2)
 
     def points(pose):
@@ -74,9 +72,7 @@ def test_jacobian_matches_finite_differences(side, request):
         np.testing.assert_allclose(jacobian(model, pose), numeric_jacobian(points, pose), atol=1e-8)
 
 
-@pytest.mark.parametrize("side", ["right_hand", "left_hand"])
-def test_directions_follow_the_pose_as_finite_differences_say(side, request):
-    model = request.getfixturevalue(side)
+def test_directions_follow_the_pose_as_finite_differences_say(model):
     rng, dh = np.random.default_rng(3), model.dh
     count = len(dh.point_row)
 

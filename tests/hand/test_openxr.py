@@ -3,7 +3,6 @@
 from itertools import pairwise
 
 import numpy as np
-import pytest
 from hand_samples import random_pose
 from scipy.spatial.transform import Rotation
 
@@ -11,7 +10,6 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import FINGERS, JOINTS, HandPose
 from rhot_app.outputs.openxr import OPENXR_JOINTS, OUR_JOINTS, joints_from_openxr, openxr_hand, openxr_map
 
-SIDES = ["right_hand", "left_hand"]
 CHAINS = {finger: [k for k, name in enumerate(OPENXR_JOINTS) if name.startswith(finger)] for finger in FINGERS}
 
 
@@ -28,18 +26,14 @@ def test_order_is_the_standards():
     assert {name for name in OUR_JOINTS if name} == set(JOINTS)
 
 
-@pytest.mark.parametrize("side", SIDES)
-def test_our_joints_are_where_the_kinematics_puts_them(side, request):
-    model = request.getfixturevalue(side)
+def test_our_joints_are_where_the_kinematics_puts_them(model):
     for seed in range(3):
         pose = random_pose(model, np.random.default_rng(seed))
         positions, _, _ = posed(model, pose)
         np.testing.assert_allclose(joints_from_openxr(positions), forward(model, pose).joints, atol=1e-12)
 
 
-@pytest.mark.parametrize("side", SIDES)
-def test_minus_z_points_along_each_bone(side, request):
-    model = request.getfixturevalue(side)
+def test_minus_z_points_along_each_bone(model):
     positions, turns, _ = posed(model, random_pose(model, np.random.default_rng(4)))
     for chain in CHAINS.values():
         for joint, following in pairwise(chain):
@@ -53,9 +47,7 @@ def test_minus_z_points_along_each_bone(side, request):
     np.testing.assert_allclose(turns[0][:, 2], turns[middle][:, 2], atol=1e-12)
 
 
-@pytest.mark.parametrize("side", SIDES)
-def test_y_is_dorsal_and_x_right_of_a_palm_that_faces_down(side, request):
-    model = request.getfixturevalue(side)
+def test_y_is_dorsal_and_x_right_of_a_palm_that_faces_down(model):
     _, turns, _ = posed(model, HandPose(np.eye(4), np.zeros(21)))  # palm frame: x distal, z dorsal
     np.testing.assert_allclose(np.linalg.det(turns), 1.0, atol=1e-12)
     flat = [k for k, name in enumerate(OPENXR_JOINTS) if not name.startswith("thumb")]
@@ -63,9 +55,7 @@ def test_y_is_dorsal_and_x_right_of_a_palm_that_faces_down(side, request):
     assert np.all(turns[flat][:, 1, 0] < -0.9), "+x lies to the right as one looks along the fingers, on both hands"
 
 
-@pytest.mark.parametrize("side", SIDES)
-def test_fingers_bend_about_x_and_to_the_palm(side, request):
-    model = request.getfixturevalue(side)
+def test_fingers_bend_about_x_and_to_the_palm(model):
     angles = np.zeros(21)
     angles[[6, 7, 8]] = 0.4, 0.5, 0.3  # the index finger's flexions
     _, turns, _ = posed(model, HandPose(np.eye(4), angles))

@@ -35,9 +35,7 @@ def height(model: HandModel, marker: Marker) -> tuple[float, float]:
     return float(off @ along), float(np.linalg.norm(off - (off @ along) * along)) * np.sign(off[2])
 
 
-@pytest.mark.parametrize("side", ["right_hand", "left_hand"])
-def test_a_nail_is_on_the_back_and_a_dot_on_the_pulp(side, request):
-    model = request.getfixturevalue(side)
+def test_a_nail_is_on_the_back_and_a_dot_on_the_pulp(model):
     for nail, dot, whole in zip(worn("nail", length_mm=11.0).markers, worn("pulp", length_mm=8.0).markers,
                                 RHOT6.markers, strict=True):
         if nail.id in ("thumb", "wrist"):  # a thumb's back is not up
@@ -70,10 +68,9 @@ def test_the_place_is_where_the_middle_of_the_patch_is_seen_from_several_sides(r
         assert centroid == pytest.approx(expected, abs=2.5e-4)  # of a rim that is not quite plane
 
 
-@pytest.mark.parametrize("side", ["right_hand", "left_hand"])
 @pytest.mark.parametrize("patch", ["nail", "pulp"])
-def test_fingers_are_solved_for_markers_beside_the_bone(side, patch, request):
-    model = with_markers(request.getfixturevalue(side), worn(patch, length_mm=10.0))
+def test_fingers_are_solved_for_markers_beside_the_bone(model, patch):
+    model = with_markers(model, worn(patch, length_mm=10.0))
     rng = np.random.default_rng(3)
     low, high = model.limits.T
     met = []

@@ -73,12 +73,17 @@ def test_a_doubtful_sight_is_inferred_unless_two_others_are_clear(flag):
         assert np.linalg.norm(last.marker_positions[2] - GRASP(np.array([seconds(last)]))[0, 2]) < 3e-3
 
 
-def test_rays_that_miss_each_other_are_not_measured():
-    def shift(t, camera, pixels, _flags):
-        if camera == 1 and t > 0.5:
-            pixels[3, 1] += 9.0
+def shifted(camera, by_px, since_s=0.5):
+    """Edits frames so that one camera shows the ring finger's marker elsewhere."""
+    def shift(t, eye, pixels, _flags):
+        if eye == camera and t > since_s:
+            pixels[3] += by_px
 
-    states = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 1.2, Viewing()), shift))
+    return shift
+
+
+def test_rays_that_miss_each_other_are_not_measured():
+    states = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 1.2, Viewing()), shifted(1, [0.0, 9.0])))
     assert states[-1].marker_knowledge[3] == UNKNOWN
     assert states[-1].epipolar_error_px[3] == pytest.approx(4.5, abs=0.3)
     assert all(s.marker_knowledge[3] != MEASURED for s in states if seconds(s) > 0.53)
@@ -86,23 +91,15 @@ def test_rays_that_miss_each_other_are_not_measured():
 
 def test_rays_that_nearly_meet_are_inferred():
     """A marker hidden so slowly that no node noticed: its views disagree by more than calibrations do."""
-    def shift(t, camera, pixels, _flags):
-        if camera == 1 and t > 0.5:
-            pixels[3, 1] += 3.0
-
-    last = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 1.0, Viewing()), shift))[-1]
+    last = run(make_tracker(RIG), altered(observe(RIG, WIDE, GRASP, 1.0, Viewing()), shifted(1, [0.0, 3.0])))[-1]
     assert last.marker_knowledge[3] == INFERRED
     assert (np.delete(last.marker_knowledge, 3) == MEASURED).all()
 
 
 def test_one_wrong_camera_of_three_is_given_up():
-    def shift(_t, camera, pixels, _flags):
-        if camera == 2:
-            pixels[3] += [-4.0, 9.0]
-
     rig = make_rig(cameras=3)
-    viewing = Viewing(phases=(0.0, 0.37, 0.71))
-    last = run(make_tracker(rig), altered(observe(rig, WIDE, GRASP, 1.0, viewing), shift))[-1]
+    frames = observe(rig, WIDE, GRASP, 1.0, Viewing(phases=(0.0, 0.37, 0.71)))
+    last = run(make_tracker(rig), altered(frames, shifted(2, [-4.0, 9.0], since_s=-1.0)))[-1]
     assert last.marker_knowledge[3] == MEASURED
     assert np.linalg.norm(last.marker_positions[3] - GRASP(np.array([seconds(last)]))[0, 3]) < 2e-3
 
