@@ -114,6 +114,11 @@ class HandFit:
         return self.shapes.model(self.state.shape)
 
     @property
+    def reshaped(self) -> bool:
+        """Whether the shape is another one than the base hand's."""
+        return bool(self.state.shape.any())
+
+    @property
     def unsaved(self) -> bool:
         """Whether the shape is another one than when it was saved last."""
         return not np.array_equal(self.state.shape, self._saved.shape)

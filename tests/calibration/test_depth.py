@@ -5,16 +5,23 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from synthetic_rig import make_rig
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.depth.fit import DepthGeometry, depth_from_disparity, fit_depth, geometry_of
+from rhot_app.calibration.depth.fit import (
+    DepthGeometry,
+    depth_from_disparity,
+    fit_depth,
+    geometry_of,
+    replaced_calibration,
+)
 from rhot_app.calibration.depth.table import DepthTable, read_depth_table
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
-from rhot_app.project import load_rig, save_rig
+from rhot_app.project import CameraCalibration, load_rig, save_rig
 from rhot_app.rig_history import versions
 
 THESIS = Path(__file__).parents[2] / "../shared/reference/rhot_table_10_1.csv"
@@ -148,9 +155,12 @@ def test_each_doubt_is_said(change, code: str) -> None:
 
 def test_the_rig_is_written_when_asked_and_good(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rig_path, table = tmp_path / "rig.json", table_of(plain_rows(), tmp_path / "t.csv")
-    save_rig(rig_path, make_rig())
-    assert main(["calibrate", "depth", "--table", str(table), "--rig", str(rig_path), "--out", str(rig_path)]) == 0
+    save_rig(rig_path, msgspec.structs.replace(make_rig(), calibration=CameraCalibration("board", "ruler", 5e-4)))
+    arguments = ["calibrate", "depth", "--table", str(table), "--rig", str(rig_path), "--out", str(rig_path)]
+    assert main(arguments) == 0
+    assert "calibrated cameras" in capsys.readouterr().out, "what is replaced is said"
     rig = load_rig(rig_path)
+    assert replaced_calibration(rig) == [], "distances are from disparity already"
     assert rig.depth.mode == "disparity" and rig.depth.k == pytest.approx(DepthGeometry().constant_m, rel=1e-3)
     assert geometry_of(rig).width_px == 640 and len(versions(rig_path)) == 1
     metres = table_of([f"{0.01 * d:g},{x}" for d, x in zip(DISTANCES_CM, disparity(DISTANCES_CM), strict=True)],

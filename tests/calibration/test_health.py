@@ -9,7 +9,7 @@ from patience import quickest
 from synthetic_rig import make_rig
 
 from rhot_app.calibration.check.health import HealthMonitor, HealthSample
-from rhot_app.project import Rig
+from rhot_app.project import CameraCalibration, Rig
 
 MARKERS = 6
 
@@ -54,6 +54,17 @@ def test_little_is_no_reason_to_speak() -> None:
         monitor.feed(sample(k, places(rng), 3.0))
     (found,) = monitor.findings()
     assert found.mender == "stereo" and not found.finding.grade.rank < 2
+
+
+@pytest.mark.parametrize(("method", "said"), [(None, "no stereo"), ("outdated", "lens"), ("board", "stale")])
+def test_only_a_calibration_that_was_made_is_called_stale(method: str | None, said: str) -> None:
+    record = None if method is None else CameraCalibration(method)
+    rig = msgspec.structs.replace(rig_with_palm_markers(), calibration=record)
+    rng, monitor = np.random.default_rng(1), HealthMonitor(rig)
+    for k in range(60):
+        monitor.feed(sample(k, places(rng), 3.0))
+    (found,) = monitor.findings()
+    assert said in found.finding.cause and ("stale" in found.finding.sentence) == (method == "board")
 
 
 def test_times_that_step_back_begin_anew() -> None:

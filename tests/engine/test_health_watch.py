@@ -12,7 +12,7 @@ from synthetic_rig import WIDE, Trajectory, Viewing, hand_trajectory, make_rig, 
 
 from rhot_app.engine.advice import calibration_advice
 from rhot_app.engine.observer import HealthWatch
-from rhot_app.project import CameraPose, DepthSettings, Rig
+from rhot_app.project import CameraCalibration, CameraPose, DepthSettings, Rig
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.messages import MarkerFlag
@@ -54,7 +54,7 @@ def test_a_sound_rig_is_left_in_peace(motion: str) -> None:
 
 
 def test_a_camera_that_was_turned_is_told_until_a_new_run_begins(grasp: Trajectory) -> None:
-    rig = turned(0, 0.3)
+    rig = msgspec.structs.replace(turned(0, 0.3), calibration=CameraCalibration("board"))
     tracker, watch = make_tracker(rig), HealthWatch(rig)
     found, state, now_ns = [], None, 0
     for frame in observe(RIG, WIDE, grasp, 8.0, Viewing(noise_px=0.1)):

@@ -60,7 +60,7 @@ def test_a_turned_camera_is_told_and_forgotten_with_a_new_run(frames: list[Camer
     wrong = turned(RIG, -0.3)
     watch = RigWatch(wrong)
     (advice,) = told(watch, frames)
-    assert "camera 2 camera has turned by 0." in advice.text and advice.level == "warning"
+    assert "camera 2 camera is turned by 0." in advice.text and advice.level == "warning"
     answer = watch.refined(wrong)
     msgspec.json.encode(answer)
     assert answer["stale"] and answer["usable"] == (advice.mender == "refined")

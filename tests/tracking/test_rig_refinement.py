@@ -82,7 +82,7 @@ def test_a_camera_that_turned_before_the_start_is_mended(axis: int, still: list[
     mended = refined_rig(wrong, found)
     assert refined(still, mended).holds
     assert mended.nodes[0] == wrong.nodes[0] and mended.nodes[1].intrinsics == wrong.nodes[1].intrinsics
-    assert "right camera has turned by 0." in stale_sentence(wrong, found)
+    assert "right camera is turned by 0." in stale_sentence(wrong, found)
     assert "use the refined calibration" in stale_sentence(wrong, found)
 
 

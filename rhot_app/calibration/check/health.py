@@ -82,12 +82,25 @@ class MarkerQuality:
 
 @dataclass(frozen=True, slots=True)
 class HealthFigures:
-    """Twenty seconds. `errors_px`: median reprojection error of all, of slow and of fast markers, NaN unknown."""
+    """Twenty seconds. `errors_px`: median reprojection error of all, of slow and of fast markers, NaN unknown.
+    `misfit`: why rays may miss each other, as `misfit_cause` says of the rig."""
 
     errors_px: tuple[float, float, float]
+    misfit: str
     rigid: tuple[RigidDrift, ...]
     reaches: tuple[Reach, ...]
     qualities: tuple[MarkerQuality, ...]
+
+
+def misfit_cause(rig: Rig) -> str:
+    """Why the rays of a rig's cameras may miss each other, by what the rig says of its calibration."""
+    if rig.depth.mode == "disparity":
+        return "The rig has no stereo calibration: it takes its cameras for equal and parallel."
+    if rig.calibration is None:
+        return "The rig has no stereo calibration, and its cameras do not stand as it says."
+    if rig.calibration.method == "outdated":
+        return "A lens was found anew after the cameras were put together."
+    return "The stereo calibration is stale: a camera was moved or turned, or its lens refocused."
 
 
 def findings_of(figures: HealthFigures) -> tuple[HealthFinding, ...]:
@@ -108,9 +121,8 @@ def _geometry(figures: HealthFigures) -> list[HealthFinding]:
         return []
     return [HealthFinding("stereo", Finding(
         "stale_geometry", Grade.POOR if error > POOR_ERROR_PX else Grade.FAIR,
-        f"The cameras' rays miss each other by {error:.1f} px.",
-        "The stereo calibration is stale: a camera was moved or turned, or its lens refocused.",
-        "Put the cameras together again with a board (Calibrate menu)."))]
+        f"The cameras' rays miss each other by {error:.1f} px.", figures.misfit,
+        "Put the cameras together with a board (Calibrate menu)."))]
 
 
 def _rigid(figures: HealthFigures) -> list[HealthFinding]:
@@ -248,8 +260,8 @@ class HealthMonitor:
             return ()
         rows = self._times > 1e-9 * self._last.t_ns - WINDOW_S
         return findings_of(HealthFigures(
-            errors_px=self._error(rows), rigid=tuple(self._rigid_drifts(rows)), reaches=tuple(self._reach(rows)),
-            qualities=tuple(self._marker_qualities(rows))))
+            errors_px=self._error(rows), misfit=misfit_cause(self._rig), rigid=tuple(self._rigid_drifts(rows)),
+            reaches=tuple(self._reach(rows)), qualities=tuple(self._marker_qualities(rows))))
 
     def _speed(self, sample: HealthSample) -> Array:
         """(M,) m/s since the sample before; NaN where not known or too long ago."""

@@ -36,8 +36,9 @@ def run(args: argparse.Namespace) -> int:
     """Fit and report; the rig is written only with ``--out``."""
     import msgspec
 
-    from rhot_app.calibration.depth.fit import fit_depth
+    from rhot_app.calibration.depth.fit import fit_depth, replaced_calibration
     from rhot_app.calibration.depth.table import read_depth_table
+    from rhot_app.calibration.verdict import judged_anew
     from rhot_app.project import load_rig
     from rhot_app.rig_history import accept
 
@@ -48,11 +49,12 @@ def run(args: argparse.Namespace) -> int:
     if rig is not None and len(rig.nodes) != 2:
         raise CalibrationError(f"{args.rig}: disparity needs two cameras, the rig has {len(rig.nodes)}.")
     report = fit_depth(read_depth_table(args.table), _geometry(args, rig))
-    written = ""
-    if rig is not None and args.out is not None and report.verdict.acceptable:
+    verdict, written = report.verdict, ""
+    if rig is not None and args.out is not None and verdict.acceptable:
+        verdict = judged_anew(verdict, replaced_calibration(rig))
         accept(args.out, msgspec.structs.replace(rig, depth=report.settings), "depth calibration")
         written = str(args.out)
-    return show(_fields(report), _lines(report), report.verdict, as_json=args.json, written=written)
+    return show(_fields(report), _lines(report), verdict, as_json=args.json, written=written)
 
 
 def _geometry(args: argparse.Namespace, rig: Rig | None) -> DepthGeometry:

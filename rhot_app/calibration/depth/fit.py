@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rhot_app.calibration.check.camera_calibration import NOT_CALIBRATED, calibration_finding, calibration_text
 from rhot_app.calibration.depth.table import DepthRow, DepthTable, RejectedRow
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
@@ -311,3 +312,15 @@ def _rows(figures: DepthFigures) -> list[Finding]:
     more = f"; and {len(figures.rejected) - 5} more" if len(figures.rejected) > 5 else ""
     return [Finding("rejected_rows", Grade.FAIR, f"{len(figures.rejected)} rows were not used ({reasons}{more}).", "",
                     "Correct them in the table or leave them out.")]
+
+
+def replaced_calibration(rig: Rig) -> list[Finding]:
+    """What is lost when `rig` finds distances from disparity alone from now on; nothing unless its cameras are
+    calibrated."""
+    found = calibration_finding(rig)
+    if rig.depth.mode == "disparity" or (found is not None and found.finding.figure == NOT_CALIBRATED):
+        return []
+    how = "" if rig.calibration is None else f" ({calibration_text(rig)})"
+    return [Finding("replaces_calibration", Grade.FAIR, f"This rig finds distances from calibrated cameras{how}.",
+                    "Disparity alone is less exact: it takes them for equal and parallel.",
+                    "Keep the calibration, or put the cameras together with a board again, unless you want this law.")]

@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.check.health import misfit_cause
 from rhot_app.calibration.observations import ObservationTable
 from rhot_app.calibration.time.fit import OffsetSearch, TimeFit, fit, search
 from rhot_app.calibration.time.model import TimeModel, Times
@@ -85,7 +86,7 @@ def calibrate_times(table: ObservationTable, rig: Rig, progress: Progress = sile
         cameras, agree, duration_s=table.duration_s, rms_px=_rms(used.left_px), rms_before_px=_rms(before),
         rivals={found.camera: found.rival for found in searches},
         drifts_s={camera: plot.drift_s for camera, plot in plots.items()},
-        clock_bounds_s=tuple(camera.clock_bound_s for camera in model.cameras))
+        clock_bounds_s=tuple(camera.clock_bound_s for camera in model.cameras), misfit=misfit_cause(rig))
     progress("times", 1.0)
     return TimeReport(cameras, agree, plots, judge_times(figures))
 
@@ -213,6 +214,7 @@ class TimeFigures:
     rivals: Mapping[int, float]
     drifts_s: Mapping[int, Array]
     clock_bounds_s: tuple[float, ...]
+    misfit: str
 
 
 def judge_times(figures: TimeFigures) -> Verdict:
@@ -262,7 +264,7 @@ def _geometry(figures: TimeFigures) -> list[Finding]:
         return []
     return [Finding("geometry", Grade.POOR if figures.rms_px > POOR_MISS_PX else Grade.FAIR,
                     f"With corrected times markers still miss their epipolar lines by {figures.rms_px:.1f} px rms.",
-                    "The stereo calibration is stale, or a marker was taken for another thing.",
+                    f"{figures.misfit} Or a marker was taken for another thing.",
                     "Calibrate the stereo geometry, then the times again.")]
 
 

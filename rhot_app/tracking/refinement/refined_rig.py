@@ -132,8 +132,8 @@ class Scale:
 
 
 def correction_sentence(camera: CameraCorrection, reference: str) -> str:
-    """How a camera stands now against its calibration: "The right camera has turned by 0.30 ± 0.02 degrees against the
-    left one since its calibration"; without a full stop."""
+    """How a camera stands otherwise than the rig says: "The right camera is turned by 0.30 ± 0.02 degrees against the
+    left one, compared with the rig"; without a full stop. The rig may never have been calibrated."""
     angle, angle_sd = camera.angle
     offset, offset_sd = camera.offset
     parts = []
@@ -142,8 +142,8 @@ def correction_sentence(camera: CameraCorrection, reference: str) -> str:
     if offset > NOTABLE * offset_sd:
         parts.append(f"moved by {_with_sd(1e3 * offset, 1e3 * offset_sd)} mm")
     if not parts:
-        parts.append("turned or moved by less than is known of each")
-    return f"The {camera.name} camera has {' and '.join(parts)} against the {reference} one since its calibration"
+        parts.append("turned or moved (which of both is not known)")
+    return f"The {camera.name} camera is {' and '.join(parts)} against the {reference} one, compared with the rig"
 
 
 def _with_sd(value: float, sd: float) -> str:

@@ -152,8 +152,10 @@ class Changes(QObject):
 
     @property
     def named_hand(self) -> HandAnatomy:
-        """The hand as it is kept: its name says how it was made."""
+        """The hand as it is kept: its name says how it was made, unless pictures have changed none of its lengths."""
         name = self.fit.shapes.base.name
+        if not self.fit.reshaped:
+            return self.fit.shapes.base
         return self.fit.renamed(name if "fitted to pictures" in name else f"{name}, fitted to pictures".lstrip(", "))
 
     def save(self) -> None:
@@ -180,6 +182,10 @@ class Changes(QObject):
         """Put the hand into the rig, in a worker."""
         use, hand = self._kept.use, self.named_hand
         if self._job is not None or use is None:
+            return
+
+        if hand == self.fit.rig.hand:
+            self.tell("The rig has this hand already: only the pose was fitted.")
             return
 
         def done(_: None) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 
+import msgspec
 import pytest
 from fake_engine import FakeEngine, synthetic_rig
 from wizard_hand import HeldMarker
 from wizard_rig import FakeRigAsker
 
-from rhot_app.project import load_rig
+from rhot_app.calibration.verdict import Grade
+from rhot_app.project import CameraCalibration, load_rig
 from rhot_app.ui.wizards import depth
 from rhot_app.ui.wizards.steps.depth_steps import DistanceStep
 
@@ -35,9 +37,10 @@ def marker():
 
 
 def test_from_distances_to_a_rig_that_uses_them(open_wizard, marker):
-    hands = open_wizard(lambda kit: depth.make_plan(kit, marker.clock), FakeRigAsker(synthetic_rig()),
-                        listen=marker.connect)
+    rig = msgspec.structs.replace(synthetic_rig(), calibration=CameraCalibration("exact"))
+    hands = open_wizard(lambda kit: depth.make_plan(kit, marker.clock), FakeRigAsker(rig), listen=marker.connect)
     page = hands.window.page
+    hands.until(lambda: "calibrated cameras" in hands.hint)
 
     def measure(distance_cm):
         """Hold the marker there, enter the distance, take it."""
@@ -64,7 +67,9 @@ def test_from_distances_to_a_rig_that_uses_them(open_wizard, marker):
     assert set(hands.window.step.view().overlays) == {"left", "right"}
     hands.next()
     assert hands.title == "The law" and hands.window.page.charts.plots
+    assert "replaces_calibration" in hands.verdict.codes
     hands.next()
+    assert "replaces_calibration" in hands.verdict.codes and hands.verdict.grade is Grade.FAIR
     assert "distance from" in hands.window.page.table.item(0, 0).text()
     hands.use()
     saved = load_rig(hands.path).depth

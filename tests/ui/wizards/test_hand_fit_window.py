@@ -267,6 +267,17 @@ def test_the_rig_gets_the_hand_or_a_sentence_says_why_not(person):
     assert "Bring back" in one.sentence
 
 
+def test_a_pose_is_no_other_hand(person, tmp_path):
+    taken = []
+    one = person(kept=Kept(taken.append, out=tmp_path / "hand.json"))
+    base = one.fit.shapes.base
+    one.drag_joint(0, INDEX_TIP, 5, 5)
+    one.click(one.frame.use_button)
+    assert taken == [] and "only the pose" in one.sentence
+    one.click(one.frame.save_button)
+    assert load_hand(tmp_path / "hand.json") == base
+
+
 def test_closing_asks_only_when_the_hand_was_changed(person, monkeypatch):
     asked = []
     monkeypatch.setattr(QMessageBox, "question", lambda *args: asked.append(1) or QMessageBox.StandardButton.Cancel)

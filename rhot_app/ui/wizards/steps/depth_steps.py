@@ -9,8 +9,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthReport, fit_depth, geometry_of
+from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthReport, fit_depth, geometry_of, replaced_calibration
 from rhot_app.calibration.depth.table import DepthRow, DepthTable
+from rhot_app.calibration.verdict import Verdict, judged_anew
 from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
 from rhot_app.state import HandState
@@ -41,6 +42,7 @@ class DistanceStep(Step):
         self.report: DepthReport | None = None
         self.problem = ""
         self._recent = recent
+        self._warning = " ".join(finding.sentence for finding in replaced_calibration(rig))
 
     @property
     def keeps(self) -> bool:
@@ -102,7 +104,8 @@ class DistanceStep(Step):
         bars = (Bar("distances", min(len(self.rows) / ENOUGH, 1.0), f"{len(self.rows)} of {ENOUGH} or more"),
                 Bar("spread", self._spread(), "from near to far: the farthest three times the nearest"))
         enough = all(bar.full for bar in bars)
-        return StepView(self._sentence(), done=self.report is not None and enough, hint=self.problem, bars=bars,
+        return StepView(self._sentence(), done=self.report is not None and enough,
+                        hint=self.problem or ("" if self.rows else self._warning), bars=bars,
                         passable=self.report is not None,
                         overlays=self._overlays(), kept=len(self.rows))
 
@@ -146,7 +149,13 @@ class LawStep(ChartedStep):
         """The verdict."""
         if self._report is None:
             return StepView(f"Go back and measure at least {LEAST_ROWS} distances.")
-        return StepView("The points should lie on the line, inside the band.", done=True, verdict=self._report.verdict)
+        return StepView("The points should lie on the line, inside the band.", done=True,
+                        verdict=verdict_of(self._report, self._distances.rig))
+
+
+def verdict_of(report: DepthReport, rig: Rig) -> Verdict:
+    """On the law, and on what it replaces in the rig."""
+    return judged_anew(report.verdict, replaced_calibration(rig))
 
 
 def chart_of(report: DepthReport) -> Chart:
@@ -169,7 +178,7 @@ def propose(report: DepthReport | None, rig: Rig, path: Path | None) -> Proposal
     rows = (Row("distance from", _way(rig.depth), _way(after.depth)),
             Row("k", _number(rig.depth.k, "m"), _number(after.depth.k, "m")),
             Row("z", _number(rig.depth.z, ""), _number(after.depth.z, "")))
-    return Proposal(REASON, report.verdict, rows, (RigChange(rig, after, path, REASON),))
+    return Proposal(REASON, verdict_of(report, rig), rows, (RigChange(rig, after, path, REASON),))
 
 
 def _way(depth: DepthSettings) -> str:
