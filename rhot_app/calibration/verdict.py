@@ -87,3 +87,10 @@ def judge(summary: str, findings: list[Finding]) -> Verdict:
 def judged_anew(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
     """The verdict with more findings: what was seen after it was reached."""
     return judge(verdict.sentence.partition(": ")[2], [*verdict.findings, *findings]) if findings else verdict
+
+
+def told_apart(value: float, limit: float, decimals: int = 0) -> str:
+    """`value` with so many decimals, and with more where those do not tell it from `limit`, which stands beside it."""
+    while decimals < 6 and value != limit and round(value, decimals) == round(limit, decimals):
+        decimals += 1
+    return f"{value:.{decimals}f}"

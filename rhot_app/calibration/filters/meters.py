@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
+from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, told_apart
 
 Array = NDArray[np.float64]
 
@@ -246,13 +246,14 @@ def _compromise(figures: FilterFigures) -> list[Finding]:
     jitter, lag = figures.worst("jitter_m"), figures.worst("lag_s")
     if lag > _TOLERANCE * targets.lag_s:
         found.append(Finding(
-            "lag", Grade.FAIR, f"Moving markers lag by {1e3 * lag:.1f} ms, more than the {1e3 * targets.lag_s:.1f} ms "
-            "asked for.", "The pictures come too seldom for so little lag at this speed.",
-            "Use a higher frame rate, or allow more."))
+            "lag", Grade.FAIR, f"Moving markers lag by {told_apart(1e3 * lag, 1e3 * targets.lag_s, 1)} ms, more than "
+            f"the {1e3 * targets.lag_s:g} ms asked for.",
+            "The pictures come too seldom for so little lag at this speed.", "Use a higher frame rate, or allow more."))
     if jitter > _TOLERANCE * targets.jitter_m:
         found.append(Finding(
-            "jitter", Grade.FAIR, f"At rest {1e3 * jitter:.2f} mm of jitter remain, more than the "
-            f"{1e3 * targets.jitter_m:.2f} mm asked for.", "Filters that follow this fast let so much noise through.",
+            "jitter", Grade.FAIR, f"At rest {told_apart(1e3 * jitter, 1e3 * targets.jitter_m, 2)} mm of jitter "
+            f"remain, more than the {1e3 * targets.jitter_m:g} mm asked for.",
+            "Filters that follow this fast let so much noise through.",
             "Allow more lag, come nearer to the cameras, or give more light."))
     return found
 

@@ -12,7 +12,7 @@ from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.poses import BoardErrors
 from rhot_app.calibration.bundle.robust_error import in_words
 from rhot_app.calibration.lens.coverage import Coverage
-from rhot_app.calibration.verdict import Finding, Grade
+from rhot_app.calibration.verdict import Finding, Grade, told_apart
 from rhot_app.geometry.camera import undistort_points
 
 # -- uncertainty of a lens, as an error in space -----------------------------------------------------------------------
@@ -148,7 +148,7 @@ def _alike(f: Figures) -> Iterator[Finding]:
     grade = _grade(-degrees, -25.0, -10.0)
     if grade:
         yield Finding("alike", grade, f"The board is seen from nearly the same side in all views: its tilts differ by "
-                      f"{degrees:.0f} degrees at most (30 and more are good).",
+                      f"{told_apart(degrees, 30.0)} degrees at most (30 and more are good).",
                       "Focal length, principal point and distance then look alike and cannot be told apart.",
                       "Add views with the board turned by 20 to 40 degrees about each of its axes.")
 
@@ -156,8 +156,8 @@ def _alike(f: Figures) -> Iterator[Finding]:
 def _covered(f: Figures) -> Iterator[Finding]:
     grade = _grade(1.0 - f.coverage.share, 0.45, 0.8)
     if grade:
-        yield Finding("coverage", grade, f"The views reach {100 * f.coverage.share:.0f} % of the picture (55 % and "
-                      "more are good).", "Where no corner was seen, the distortion is a guess.",
+        yield Finding("coverage", grade, f"The views reach {told_apart(100.0 * f.coverage.share, 55.0)} % of the "
+                      "picture (55 % and more are good).", "Where no corner was seen, the distortion is a guess.",
                       "Bring the board to the edges and corners that the image map shows empty.")
 
 
@@ -185,13 +185,15 @@ def _certainty(f: Figures) -> Iterator[Finding]:
     focal = 100.0 * float(np.max(f.std[:2] / f.lens[:2]))
     grade = _grade(focal, 0.3, 1.5)
     if grade:
-        yield Finding("focal_length", grade, f"The focal length is known to {focal:.1f} % only (0.3 % is good).",
+        yield Finding("focal_length", grade,
+                      f"The focal length is known to {told_apart(focal, 0.3, 1)} % only (0.3 % is good).",
                       "The views are few, far away, or little tilted.", MORE_VIEWS)
     centre, width = float(np.max(f.std[2:4])), f.size[0]
     grade = _grade(centre, 0.005 * width, 0.02 * width)
     if grade:
-        yield Finding("principal_point", grade, f"The principal point is known to {centre:.1f} px only "
-                      f"({0.005 * width:.0f} px is good).", "The board was little tilted.", MORE_VIEWS)
+        yield Finding("principal_point", grade, "The principal point is known to "
+                      f"{told_apart(centre, 0.005 * width, 1)} px only ({0.005 * width:.1f} px is good).",
+                      "The board was little tilted.", MORE_VIEWS)
     if f.undetermined:
         yield Finding("open_distortion", Grade.FAIR, f"The views leave {' and '.join(f.undetermined)} open; they are "
                       "taken as near zero, as for most lenses.", "No view reaches far enough from the middle.",
@@ -200,7 +202,8 @@ def _certainty(f: Figures) -> Iterator[Finding]:
     grade = Grade.POOR if not np.isfinite(typical) else _grade(typical, 1.0, 5.0) or _grade(worst, 5.0, np.inf)
     if grade:
         yield Finding("expected_error", grade, f"By the lens alone a point at {WORKING_DISTANCE_M:.1f} m may be off by "
-                      f"{typical:.1f} mm, in the picture's corners by {worst:.1f} mm (SD; 1 and 5 mm are good).",
+                      f"{told_apart(typical, 1.0, 1)} mm, in the picture's corners by {told_apart(worst, 5.0, 1)} mm "
+                      "(SD; 1 and 5 mm are good).",
                       "The views determine the lens too loosely, most where none reaches."
                       f" {in_words(f.error_inflation)}".rstrip(), f"Lay a stiff board against something. {MORE_VIEWS}"
                       if in_words(f.error_inflation) else MORE_VIEWS)
@@ -232,7 +235,8 @@ def _sharp(f: Figures) -> Iterator[Finding]:
                       "Out of focus, moved, or noise reduction.", "More light, a shorter exposure, focus at arm's "
                       "length; hold the board still.")
     if f.square_px < 7.0:
-        yield Finding("small_squares", Grade.FAIR, f"Squares are {f.square_px:.0f} px small.",
+        yield Finding("small_squares", Grade.FAIR,
+                      f"Squares are {told_apart(f.square_px, 7.0)} px small (7 and more are good).",
                       "The board is far away, or has many small squares.", "Bring it nearer, or print fewer, larger "
                       "squares.")
 

@@ -67,7 +67,8 @@ def calibrate(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool =
     progress("measuring what came out", 0.97)
     figures = figures_of(outcome, lenses, [shot.name for shot in views.shots])
     ruler = None if known.ruler is None else read_ruler(known.ruler, figures.state)
-    figures = replace(figures, ruler=ruler, lengths=known.which)
+    confirmed = known if ruler is None or ruler.tells else replace(known, ruler=None)
+    figures = replace(figures, ruler=ruler, lengths=confirmed.which)
     every = (*dropped, *outcome.dropped)
     evidence = lens_evidence(outcome, [own if own.origin == "given" else before for own, before
                                        in zip(lenses, remembered or [None] * len(lenses), strict=True)])

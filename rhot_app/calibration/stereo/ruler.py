@@ -49,6 +49,16 @@ class RulerResult:
         """Said over measured: what every length of the rig must be multiplied with."""
         return self.said_m / self.measured_m
 
+    @property
+    def doubt(self) -> float:
+        """By what share the measured length may be wrong, three standard deviations."""
+        return 3.0 * self.std_m / self.measured_m
+
+    @property
+    def tells(self) -> bool:
+        """Whether it is known better than a baseline by a tape: only then can it confirm a length."""
+        return self.doubt <= TAPE
+
 
 def read_ruler(reading: RulerReading, state: BundleState) -> RulerResult:
     """Measure a ruler with a solved rig; raises CalibrationError when its ends cannot be located."""
@@ -67,19 +77,22 @@ def read_ruler(reading: RulerReading, state: BundleState) -> RulerResult:
 def ruler_finding(result: RulerResult, square_m: float) -> Finding:
     """What the ruler says about the size of the squares."""
     off = abs(result.ratio - 1.0)
-    doubt = 3.0 * result.std_m / result.measured_m
     measured = (f"The ruler of {result.said_m * 1e3:.1f} mm measures {result.measured_m * 1e3:.1f} "
                 f"+- {result.std_m * 1e3:.1f} mm")
-    if off > max(_TOLERATED, doubt):
+    if off > max(_TOLERATED, result.doubt):
         return Finding(
             "square_size", Grade.POOR, f"{measured}, {100 * (1 / result.ratio - 1):+.1f} %.",
             f"The squares are not {square_m * 1e3:g} mm: about {square_m * result.ratio * 1e3:.2f} mm fits the ruler. "
             "A printer that scales to the page does this.",
             "Measure ten squares of the board with a ruler, divide by ten and give that as the square size.")
-    if off > max(_FAIR, doubt):
+    if off > max(_FAIR, result.doubt):
         return Finding("square_size", Grade.FAIR, f"{measured}, {100 * (1 / result.ratio - 1):+.1f} %.",
                        "The squares may not be exactly as big as said.",
                        "Measure the board again over its whole width.")
+    if not result.tells:
+        return Finding("ruler_vague", Grade.FAIR, f"{measured}, which is too vague to confirm the size of the squares.",
+                       "The ruler is short or far away, or points at the cameras.",
+                       "Take a longer ruler, nearer and across the pictures.")
     return Finding("ruler", Grade.GOOD, f"{measured}: the size of the squares is right.")
 
 

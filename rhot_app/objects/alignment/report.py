@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
+from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, told_apart
 from rhot_app.objects.alignment.fit import LASTING_M, SEARCH_S, STEP_S, AlignmentFit, OffsetSearch, align
 from rhot_app.objects.alignment.model import OFFSET, POINT, ROTATION
 from rhot_app.objects.alignment.motion_stream import MotionStream
@@ -125,13 +125,14 @@ def _rotation(coverage: Coverage) -> list[Finding]:
         return []
     enough = LASTING_M / FAIR_M
     if coverage.turn[2] < enough:
-        return [Finding("no_rotation", grade, f"The tracker turned by {math.degrees(coverage.turn[2]):.1f} degrees rms "
-                        f"only; {math.degrees(enough):.0f} are needed about two axes.",
+        return [Finding("no_rotation", grade, "The tracker turned by "
+                        f"{told_apart(math.degrees(coverage.turn[2]), math.degrees(enough), 1)} degrees rms only; "
+                        f"{math.degrees(enough):.1f} are needed about two axes.",
                         "A parallel translation does not show where the fingertip sits on the tracker.",
                         "Turn the tracker about two axes while you move it.")]
     return [Finding("one_axis", grade, f"The tracker turned by {math.degrees(coverage.turn[2]):.1f} degrees rms about "
-                    f"one axis, but by {math.degrees(coverage.turn[0]):.1f} about any other; "
-                    f"{math.degrees(enough):.0f} are needed.",
+                    f"one axis, but by {told_apart(math.degrees(coverage.turn[0]), math.degrees(enough), 1)} about "
+                    f"any other; {math.degrees(enough):.1f} are needed.",
                     "Rotation about one axis does not show how far along it the fingertip sits.",
                     "Turn the tracker about a second axis as well.")]
 

@@ -112,7 +112,7 @@ def test_a_hand_that_was_there_all_the_time_is_noticed_and_not_found(hands, node
     hands.next()
     hands.click(hands.window.page.learn_button)
     hands.until(lambda: hands.verdict is not None and "No skin" in hands.hint)
-    assert "0.5%" in hands.verdict.findings[0].sentence
+    assert "0.5 %" in hands.verdict.findings[0].sentence
     assert not hands.frame.next_button.isEnabled()
 
 

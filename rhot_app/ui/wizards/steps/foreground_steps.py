@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, judged_anew
+from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, judged_anew, told_apart
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.ui.backend.feed import ask_picture
 from rhot_app.ui.models.proposal import Command, Proposal, Row
@@ -283,13 +283,15 @@ def mask_of(png: bytes) -> Mask:
 def findings_of(camera: str, mask: Mask) -> list[Finding]:
     """What is wrong with one camera's foreground."""
     if mask.covered < LEAST:
-        return [Finding("nothing", Grade.POOR, f"{camera}: the hand covers {mask.covered:.1%} of the picture, less "
-                        f"than {LEAST:.1%}.",
+        return [Finding("nothing", Grade.POOR, f"{camera}: the hand covers "
+                        f"{told_apart(100.0 * mask.covered, 100.0 * LEAST, 1)} % of the picture, less than "
+                        f"{100.0 * LEAST:g} %.",
                         "It was in the picture while the empty scene was learnt, or is not there now.",
                         "Hold it into the picture; if it is there, go back and learn the empty scene without it.")]
     if mask.covered > MOST:
-        return [Finding("everything", Grade.POOR, f"{camera}: {mask.covered:.0%} of the picture differs from the empty "
-                        f"scene, more than {MOST:.0%}.", "Light, exposure or the camera have changed since.",
+        return [Finding("everything", Grade.POOR, f"{camera}: {told_apart(100.0 * mask.covered, 100.0 * MOST)} % "
+                        f"of the picture differs from the empty scene, more than {100.0 * MOST:g} %.",
+                        "Light, exposure or the camera have changed since.",
                         "Go back and learn the empty scene again.")]
     if mask.whole < WHOLE:
         return [Finding("pieces", Grade.FAIR, f"{camera}: {1.0 - mask.whole:.0%} of what is tinted is not the hand.",
