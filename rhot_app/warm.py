@@ -10,6 +10,7 @@ import argparse
 import contextlib
 import gc
 import os
+import signal
 import sys
 import threading
 import time
@@ -165,8 +166,14 @@ def warm(name: str) -> str:
     return f"{name}: {time.monotonic() - begun:.1f} s"
 
 
-def end_with_parent() -> None:
-    """Have this process end when its parent has ended, for whatever reason."""
+def end_on_interrupt() -> None:
+    """Have this process end at Ctrl-C at once: the pool would go on, as its workers return exceptions as results."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def start_worker() -> None:
+    """Have this process end when its parent has ended, for whatever reason, and at Ctrl-C."""
+    end_on_interrupt()
     parent = parent_process()
     assert parent is not None
 
@@ -210,7 +217,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _compile(steps: Sequence[str], workers: int) -> None:
     """Run the steps in processes of their own; prints a line after each."""
     print(f"0 of {len(steps)} steps compiled", flush=True)
-    with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn"), start_worker) as pool:
         running = {pool.submit(warm, name): name for name in steps}
         for done, step in enumerate(as_completed(running), 1):
             line = step.result()
@@ -219,4 +226,5 @@ def _compile(steps: Sequence[str], workers: int) -> None:
 
 
 if __name__ == "__main__":
+    end_on_interrupt()
     sys.exit(main())

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import msgspec
 import pytest
-from patience import eventually
+from patience import PATIENCE_S, eventually
 
 from rhot_app.engine.compilation import BackgroundCompilation, compile_part, part_of
 from rhot_app.engine.process import start_ticks
@@ -85,11 +87,28 @@ def test_every_rigs_tracker_is_a_part_that_can_be_compiled(settings: TrackerSett
     assert part_of(rig) in PARTS
 
 
+def children_of(process: subprocess.Popen[bytes]) -> list[int]:
+    return [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+
+
 def test_an_ended_compilation_leaves_no_process() -> None:
     process = subprocess.Popen([sys.executable, "-m", "rhot_app.warm", "contours"], stdout=subprocess.PIPE)
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-    eventually(lambda: len(children.read_text().split()) == 2)  # the worker, and what watches over its semaphores
-    pids = [int(pid) for pid in children.read_text().split()]
+    eventually(lambda: len(children_of(process)) == 2)  # the worker, and what watches over its semaphores
+    pids = children_of(process)
     process.terminate()
     process.communicate()
+    eventually(lambda: not any(start_ticks(pid) for pid in pids))
+
+
+def test_an_interrupt_ends_all_steps(tmp_path: Path) -> None:
+    process = subprocess.Popen([sys.executable, "-m", "rhot_app.warm", "window"], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, start_new_session=True)
+    eventually(lambda: any(tmp_path.rglob("*.nbi")))  # the first steps are being compiled, others wait
+    pids = children_of(process)
+    os.killpg(process.pid, signal.SIGINT)  # Ctrl-C reaches all processes in the terminal
+    try:
+        process.communicate(timeout=PATIENCE_S)
+    finally:
+        process.kill()
+    assert process.returncode == -signal.SIGINT
     eventually(lambda: not any(start_ticks(pid) for pid in pids))
