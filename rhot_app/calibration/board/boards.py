@@ -8,7 +8,7 @@ row by row: ``id = row * cols + col``.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import cv2
@@ -175,6 +175,15 @@ class CharucoBoard(Lattice):
 
 
 Board = Chessboard | CharucoBoard
+
+
+def same_pattern(first: Board, second: Board) -> bool:
+    """Whether two boards differ in their lengths at most, so that what was seen of one is as good for the other."""
+    if isinstance(first, CharucoBoard) and isinstance(second, CharucoBoard):
+        return replace(first, square_m=second.square_m, marker_m=second.marker_m) == second
+    if isinstance(first, Chessboard) and isinstance(second, Chessboard):
+        return replace(first, square_m=second.square_m) == second
+    return False
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -127,6 +127,10 @@ class CaptureGuide:
         self._places: list[Array] = []
         self._before: tuple[BoardView, float] | None = None
 
+    def resize(self, board: Board) -> None:
+        """The board's squares have another size: what was taken stays."""
+        self._board = board
+
     @property
     def views(self) -> tuple[BoardView, ...]:
         """What was taken so far."""

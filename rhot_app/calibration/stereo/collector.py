@@ -91,6 +91,10 @@ class StereoCollector:
         self._shots.append(BoardShot(f"{len(self._shots) + 1}", tuple(views)))
         return Offer(True, f"Taken: {len(self._shots)}.")
 
+    def resize(self, board: Board) -> None:
+        """The board's squares have another size: what was kept stays."""
+        self._board = board
+
     def discard_last(self) -> None:
         """Forget the shot that was kept last."""
         if self._shots:

@@ -97,6 +97,20 @@ def test_space_takes_a_view_and_undo_gives_it_back(steps, scene):
     assert step.undo() and step.views == () and not step.view().may_go_on
 
 
+def test_a_corrected_square_keeps_the_views_and_a_wrong_board_is_named(steps, scene):
+    board, step = steps
+    scene.place(*PLACES[0])
+    step.take(step.see(scene.pictures()))
+    assert step.capture()
+    board.change(msgspec.structs.replace(board.fields, square_mm=24.6))
+    step.enter()
+    assert len(step.views) == 1 and step.board.square_m == pytest.approx(0.0246)
+    board.change(msgspec.structs.replace(board.fields, cols=10, rows=7))
+    step.enter()
+    step.take(step.see(scene.pictures()))
+    assert step.views == () and "seems to have 9x6" in step.view().hint
+
+
 def test_another_camera_begins_anew(steps, scene):
     board, step = steps
     scene.place(*PLACES[0])

@@ -15,6 +15,7 @@ from PySide6.QtTest import QTest
 from wizard_rig import FakeRigAsker
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD, Chessboard
+from rhot_app.calibration.board.size_check import Beyond
 from rhot_app.calibration.check.checks import check_rig
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import CameraPose, load_rig
@@ -26,6 +27,7 @@ from rhot_app.ui.wizards.steps.stereo_steps import ShowStep, StereoSolveStep, kn
 from rhot_app.ui.wizards.stereo import KnownPage, make_plan
 
 CAMERAS = ("left", "right")
+replace_fields = msgspec.structs.replace
 TRUE_BASELINE_M = 0.075
 PLACES = [((0.0, 0.0, 0.0), (0.037, 0.0, 0.62)), ((-0.5, 0.0, 0.1), (0.04, -0.04, 0.6)),
           ((0.0, 0.5, 0.0), (-0.02, 0.0, 0.6)), ((0.0, -0.5, 0.0), (0.1, 0.0, 0.6)),
@@ -162,6 +164,34 @@ def solved(shown, rig, known, board=STANDARD_BOARD):
     task = step.task()
     step.take_result(task.function(*task.arguments, progress=lambda text, fraction: None, **task.options))
     return step
+
+
+def test_a_corrected_square_keeps_the_shots(compiled):
+    scene, board = BoardScene(synthetic_rig(), STANDARD_BOARD), BoardStep(BoardFields(square_mm=25.0), CAMERAS)
+    show = ShowStep(board, CAMERAS)
+    show.enter()
+    scene.place(*PLACES[0])
+    show.take(show.see(scene.pictures()))
+    assert show.capture()
+    board.change(replace_fields(board.fields, square_mm=24.6))
+    show.enter()
+    assert len(show.views.shots) == 1 and show.views.board == Chessboard(9, 6, 0.0246)
+    board.change(replace_fields(board.fields, cols=8))
+    show.enter()
+    assert show.views.shots == (), "shots of another board are useless"
+
+
+@pytest.mark.parametrize(("cols", "rows", "said"), [(10, 7, "seems to have 9x6"), (8, 5, "seems to have 9x6"),
+                                                 (9, 6, "larger than 9x6")])
+def test_a_wrong_board_is_named_where_it_is_shown_and_gives_no_shots(compiled, cols, rows, said):
+    scene = BoardScene(synthetic_rig(), STANDARD_BOARD)
+    show = ShowStep(BoardStep(BoardFields(cols=cols, rows=rows, square_mm=25.0), CAMERAS), CAMERAS)
+    show.enter()
+    for place in PLACES[:3]:
+        scene.place(*place)
+        seen = show.see(scene.pictures())
+        show.take(replace(seen, beyond=(Beyond(column=True, row=False),) * 2) if cols == 9 else seen)
+    assert said in show.view().hint and not show.capture() and not show.view().may_go_on
 
 
 def test_a_length_check_is_skipped_knowingly_and_the_rig_says_so(shown, wrong_rig, tmp_path):

@@ -9,7 +9,14 @@ from typing import Literal
 
 import msgspec
 
-from rhot_app.calibration.board.boards import DEFAULT_DICTIONARY, Board, CharucoBoard, Chessboard, parse_size
+from rhot_app.calibration.board.boards import (
+    DEFAULT_DICTIONARY,
+    Board,
+    CharucoBoard,
+    Chessboard,
+    parse_size,
+    same_pattern,
+)
 from rhot_app.calibration.board.corners import BoardView, detect, to_gray
 from rhot_app.calibration.board.size_check import Beyond, look_beyond, size_finding, why_missing
 from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
@@ -85,6 +92,60 @@ class BoardObservation:
     missing: str | None = None
 
 
+class BoardSearch:
+    """Looks for a board in pictures, and finds out what is wrong where none is seen for a while, or a larger one."""
+
+    def __init__(self) -> None:
+        self._beyond: deque[Beyond] = deque(maxlen=_JUDGED)
+        self.forget()
+
+    def forget(self) -> None:
+        """What was seen is of another board or camera."""
+        self.views: dict[str, BoardView | None] = {}
+        self.recognised = False
+        self._missing = ""
+        self._next_why_s = 0.0
+        self._beyond.clear()
+
+    def look(self, pictures: Pictures, board: Board) -> BoardObservation:
+        """Look for the board in each picture; where it is in none, find out why now and then, for that takes long."""
+        views = {name: detect(picture.bgr, board, thorough=False, source=name) for name, picture in pictures.items()}
+        seen = {name: view for name, view in views.items() if view is not None}
+        now_s = time.monotonic()
+        if seen:
+            self._next_why_s = now_s + _WHY_S
+            beyond = tuple(look_beyond(to_gray(pictures[name].bgr), view, board) for name, view in seen.items()
+                           ) if isinstance(board, Chessboard) else ()
+            return BoardObservation(board, views, beyond, "")
+        if now_s < self._next_why_s or not pictures:
+            return BoardObservation(board, views)
+        self._next_why_s = now_s + _WHY_S
+        return BoardObservation(board, views, missing=why_missing(to_gray(next(iter(pictures.values())).bgr), board))
+
+    def take(self, seen: BoardObservation) -> None:
+        """What a look has seen."""
+        self.views = seen.views
+        self.recognised = self.recognised or any(view is not None for view in seen.views.values())
+        self._beyond.extend(seen.beyond)
+        if seen.missing is not None:
+            self._missing = seen.missing
+
+    def size_finding(self, board: Board | None) -> Finding | None:
+        """What the pictures say against the board's size."""
+        if not isinstance(board, Chessboard) or len(self._beyond) < _JUDGED_LEAST:
+            return None
+        return size_finding(tuple(self._beyond), board)
+
+    @property
+    def missing(self) -> str:
+        """Why no camera sees the board, in a sentence; empty while one does, or nobody has looked into it."""
+        unseen = all(view is None for view in self.views.values())
+        return f"Not seen: {self._missing}." if unseen and self._missing else ""
+
+
+OTHER_BOARD = "Go back: the board is another one than the form says."
+
+
 class BoardStep(Step):
     """Choose the board, and see at once whether the cameras recognise it."""
 
@@ -95,11 +156,7 @@ class BoardStep(Step):
         self.cameras = cameras
         self._fields = fields
         self._undone: list[BoardFields] = []
-        self._views: dict[str, BoardView | None] = {}
-        self._beyond: deque[Beyond] = deque(maxlen=_JUDGED)
-        self._missing = ""
-        self._recognised = False
-        self._next_why_s = 0.0  # the looker's own
+        self._search = BoardSearch()
         self.board: Board | None = None
         self.problem = ""
         self._build()
@@ -126,73 +183,51 @@ class BoardStep(Step):
 
     def forget_views(self) -> None:
         """What was seen is of another board or camera."""
-        self._views, self._missing = {}, ""
-        self._recognised = False
-        self._beyond.clear()
+        self._search.forget()
 
     def _build(self) -> None:
-        self.forget_views()
+        before = self.board
         try:
             self.board, self.problem = self._fields.board(), ""
         except CalibrationError as exc:
             self.board, self.problem = None, str(exc)
+        if before is None or self.board is None or not same_pattern(before, self.board):
+            self.forget_views()
 
     def see(self, pictures: Pictures) -> BoardObservation | None:
-        """Look for the board in each picture; where it is in none, find out why now and then, for that takes long."""
+        """Look for the board in each picture."""
         board = self.board
-        if board is None:
-            return None
-        views = {name: detect(picture.bgr, board, thorough=False, source=name) for name, picture in pictures.items()}
-        seen = {name: view for name, view in views.items() if view is not None}
-        if seen:
-            beyond = tuple(look_beyond(to_gray(pictures[name].bgr), view, board) for name, view in seen.items()
-                           ) if isinstance(board, Chessboard) else ()
-            return BoardObservation(board, views, beyond, "")
-        now_s = time.monotonic()
-        if now_s < self._next_why_s:
-            return BoardObservation(board, views)
-        self._next_why_s = now_s + _WHY_S
-        return BoardObservation(board, views, missing=why_missing(to_gray(next(iter(pictures.values())).bgr), board))
+        return None if board is None else self._search.look(pictures, board)
 
     def take(self, seen: BoardObservation) -> None:
         """Where the board was seen."""
         if seen.board == self.board:
-            self._views = seen.views
-            self._recognised = self._recognised or any(view is not None for view in seen.views.values())
-            self._beyond.extend(seen.beyond)
-            if seen.missing is not None:
-                self._missing = seen.missing
-
-    @property
-    def size_finding(self) -> Finding | None:
-        """What the pictures say against the board's size."""
-        if not isinstance(self.board, Chessboard) or len(self._beyond) < _JUDGED_LEAST:
-            return None
-        return size_finding(tuple(self._beyond), self.board)
+            self._search.take(seen)
 
     def view(self) -> StepView:
         """The question, and whether the answer fits what is seen."""
         if self.board is None:
             return StepView("Say which board you hold.", hint=self.problem)
-        overlays = {name: board_marks(view, self.board) for name, view in self._views.items() if view is not None}
-        wrong = self.size_finding
+        search = self._search
+        overlays = {name: board_marks(view, self.board) for name, view in search.views.items() if view is not None}
+        wrong = search.size_finding(self.board)
         if wrong is not None:
             return StepView("Count the corners again.", hint=f"{wrong.figure} {wrong.cause}", overlays=overlays)
         if self._fields.square_mm is None:
-            hint = " ".join(filter(None, (UNMEASURED, self._hint(len(overlays)))))
+            hint = " ".join(filter(None, (UNMEASURED, self._hint())))
             return StepView("Measure the squares and type their size.", hint=hint, overlays=overlays)
-        return StepView(self._sentence(len(overlays)), done=self._recognised, passable=True,
-                        hint=self._hint(len(overlays)), overlays=overlays)
+        return StepView(self._sentence(len(overlays)), done=search.recognised, passable=True,
+                        hint=self._hint(), overlays=overlays)
 
     def _sentence(self, found: int) -> str:
         if found == 0:
-            return "Show the board to check it." if not self._recognised else "Seen: this is the board. Press Next."
-        names = " and ".join(name for name, view in self._views.items() if view is not None)
+            return "Seen: this is the board. Press Next." if self._search.recognised else "Show the board to check it."
+        names = " and ".join(name for name, view in self._search.views.items() if view is not None)
         return f"Seen by {names}: this is the board."
 
-    def _hint(self, found: int) -> str:
-        if found == 0 and self._missing:
-            return f"Not seen: {self._missing}."
+    def _hint(self) -> str:
+        if self._search.missing:
+            return self._search.missing
         if isinstance(self.board, Chessboard) and not self.board.one_way_up:
             return ("This board looks the same turned by 180°: hold it the same way up all the time, or use one with "
                     "an even and an odd number of corners.")

@@ -9,8 +9,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from rhot_app.calibration.board.boards import Board
-from rhot_app.calibration.board.corners import BoardView, detect
+from rhot_app.calibration.board.boards import Board, same_pattern
+from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.check.camera_calibration import with_lens
 from rhot_app.calibration.lens.coverage import CaptureGuide, Coverage
 from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
@@ -19,7 +19,7 @@ from rhot_app.project import Intrinsics, Rig
 from rhot_app.ui.backend.feed import Image, Picture
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import lens_figures
-from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep
+from rhot_app.ui.wizards.models.board_form import OTHER_BOARD, BoardFields, BoardObservation, BoardSearch, BoardStep
 from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Mark, Overlay, Tag, board_marks
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView, Task
 
@@ -58,18 +58,23 @@ class LensShowStep(Step):
         self._board_step = board_step
         self._guide: CaptureGuide | None = None
         self._of: tuple[str, Board] | None = None
+        self._search = BoardSearch()
         self._seen: tuple[BoardView | None, float] = (None, 0.0)
         self._sentence = ""
         self._covered: tuple[int, Coverage, bool] | None = None  # by the number of views: it takes milliseconds
 
     def enter(self) -> None:
-        """Another board or camera makes the views useless."""
+        """Another board or camera makes the views useless; a corrected size of the squares does not."""
         board, camera = self._board_step.board, self._board_step.camera
         assert board is not None, "the first step is not done without a board"
         self.cameras = (camera,)
-        if self._of != (camera, board):
+        if self._of is None or self._guide is None or self._of[0] != camera or not same_pattern(self._of[1], board):
             self._of, self._guide = (camera, board), CaptureGuide(board)
             self._seen, self._sentence, self._covered = (None, 0.0), "", None
+            self._search.forget()
+        elif self._of[1] != board:
+            self._of = camera, board
+            self._guide.resize(board)
 
     @property
     def camera(self) -> str:
@@ -97,24 +102,26 @@ class LensShowStep(Step):
         """Whether anything was taken."""
         return bool(self.views)
 
-    def see(self, pictures: Pictures) -> tuple[str, Board, BoardView | None, float]:
+    def see(self, pictures: Pictures) -> tuple[str, BoardObservation, float]:
         """The board in the picture, and when that was taken, s of the node's clock."""
-        camera, board = self.camera, self.board
-        picture = pictures[camera]
-        view = detect(picture.bgr, board, thorough=False, source=camera)
-        return camera, board, view, 1e-9 * picture.t_node_ns
+        camera = self.camera
+        return (camera, self._search.look({camera: pictures[camera]}, self.board),
+                1e-9 * pictures[camera].t_node_ns)
 
-    def take(self, seen: tuple[str, Board, BoardView | None, float]) -> None:
+    def take(self, seen: tuple[str, BoardObservation, float]) -> None:
         """Offer what is seen; the guide decides and says what to do."""
-        camera, board, view, t_s = seen
-        if self._guide is not None and (camera, board) == self._of:
+        camera, look, t_s = seen
+        if self._guide is not None and (camera, look.board) == self._of:
+            self._search.take(look)
+            view = look.views[camera]
             self._seen = view, t_s
-            self._sentence = self._guide.offer(view, t_s).sentence
+            if self._search.size_finding(self.board) is None:
+                self._sentence = self._guide.offer(view, t_s).sentence
 
     def capture(self) -> bool:
         """Space: take what is seen now, unless it adds nothing or is blurred."""
         view, t_s = self._seen
-        if self._guide is None or view is None:
+        if self._guide is None or view is None or self._search.size_finding(self.board) is not None:
             return False
         decision = self._guide.offer(view, t_s + _VOUCHED_S)
         self._sentence = decision.sentence
@@ -140,8 +147,13 @@ class LensShowStep(Step):
         overlay: Overlay = (Cells(coverage.cells / _CELL_FULL),)
         if self._seen[0] is not None:
             overlay = (*overlay, *board_marks(self._seen[0], self.board))
+        wrong = self._search.size_finding(self.board)
+        if wrong is not None:
+            return StepView(OTHER_BOARD, hint=f"{wrong.figure} {wrong.cause}", bars=tuple(bars),
+                            overlays={self.camera: overlay}, kept=count)
         sentence = "Enough: press Next." if complete else self._sentence or "Show the whole board to the camera."
-        return StepView(sentence, done=complete, hint=f"{count} pictures taken." if count else "", bars=tuple(bars),
+        taken = f"{count} pictures taken." if count else ""
+        return StepView(sentence, done=complete, hint=self._search.missing or taken, bars=tuple(bars),
                         overlays={self.camera: overlay}, kept=count, passable=count >= FEWEST)
 
 
@@ -160,7 +172,7 @@ class LensSolveStep(Step):
 
     def __init__(self, show: LensShowStep) -> None:
         self._show = show
-        self._asked: tuple[int, ...] = ()
+        self._asked: tuple[Board | None, tuple[int, ...]] = None, ()
         self._straight: dict[str, Picture] = {}
         self.report: IntrinsicsReport | None = None
         self.problem = ""
@@ -173,9 +185,9 @@ class LensSolveStep(Step):
             self.square_pixels, self.report = on, None
 
     def enter(self) -> None:
-        """Other views need another solve."""
+        """Other views, or another size of the squares, need another solve."""
         self.cameras = (self._show.camera,)
-        asked = tuple(id(view) for view in self._show.views)
+        asked = self._show.board, tuple(id(view) for view in self._show.views)
         if asked != self._asked:
             self._asked, self.report, self.problem, self._straight = asked, None, "", {}
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rhot_app.calibration.board.boards import Board
-from rhot_app.calibration.board.corners import BoardView, detect
+from rhot_app.calibration.board.boards import Board, same_pattern
+from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.shared_views import SharedViews
 from rhot_app.calibration.check.camera_calibration import lengths_text
 from rhot_app.calibration.lens.fit import LensStart, find_lens
@@ -23,7 +23,7 @@ from rhot_app.progress import Progress
 from rhot_app.project import Rig, RigNode
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import place_figures
-from rhot_app.ui.wizards.models.board_form import BoardStep
+from rhot_app.ui.wizards.models.board_form import OTHER_BOARD, BoardObservation, BoardSearch, BoardStep
 from rhot_app.ui.wizards.models.drawing import Dots, Overlay, board_marks
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView, Task
 
@@ -56,6 +56,7 @@ class BoardFinder(Step):
     def __init__(self, board_step: BoardStep, cameras: tuple[str, ...]) -> None:
         self.cameras = cameras
         self._board_step = board_step
+        self.search = BoardSearch()
         self.seen: Views = dict.fromkeys(cameras)
 
     @property
@@ -65,14 +66,15 @@ class BoardFinder(Step):
         assert board is not None, "the first step is not done without a board"
         return board
 
-    def see(self, pictures: Pictures) -> Views:
+    def see(self, pictures: Pictures) -> BoardObservation:
         """The board in each picture."""
-        board = self.board
-        return {name: detect(picture.bgr, board, thorough=False, source=name) for name, picture in pictures.items()}
+        return self.search.look(pictures, self.board)
 
-    def take(self, seen: Views) -> None:
+    def take(self, seen: BoardObservation) -> None:
         """What the cameras see now; a camera without a picture sees nothing."""
-        self.seen = {name: seen.get(name) for name in self.cameras or ()}
+        if seen.board == self.board:
+            self.search.take(seen)
+            self.seen = {name: seen.views.get(name) for name in self.cameras or ()}
 
     def marks(self, colour: str = "good") -> dict[str, Overlay]:
         """The corners in each picture."""
@@ -94,10 +96,14 @@ class ShowStep(BoardFinder):
         self._guided = 0
 
     def enter(self) -> None:
-        """Another board makes what was kept useless."""
-        if self._collector is None or self._of != self.board:
+        """Another board makes what was kept useless; a corrected size of its squares does not."""
+        if self._collector is None or self._of is None or not same_pattern(self._of, self.board):
             self._of, self._collector = self.board, StereoCollector(self.cameras or (), self.board)
             self._offer, self._guidance = Offer(False, ""), None
+            self.search.forget()
+        elif self._of != self.board:
+            self._of = self.board
+            self._collector.resize(self.board)
 
     @property
     def views(self) -> SharedViews:
@@ -110,7 +116,7 @@ class ShowStep(BoardFinder):
         """Whether anything was kept."""
         return self._collector is not None and bool(self.views.shots)
 
-    def take(self, seen: Views) -> None:
+    def take(self, seen: BoardObservation) -> None:
         """Offer what is seen; the collector decides."""
         super().take(seen)
         self._put(still=False)
@@ -120,7 +126,7 @@ class ShowStep(BoardFinder):
         return self._put(still=True)
 
     def _put(self, *, still: bool) -> bool:
-        if self._collector is None:
+        if self._collector is None or self.search.size_finding(self.board) is not None:
             return False
         self._offer = self._collector.offer([self.seen[name] for name in self.cameras or ()], still=still)
         return self._offer.taken
@@ -137,6 +143,10 @@ class ShowStep(BoardFinder):
         if self._collector is None:
             return StepView("Show the board to both cameras.")
         shots = self.views.shots
+        wrong = self.search.size_finding(self.board)
+        if wrong is not None:
+            return StepView(OTHER_BOARD, hint=f"{wrong.figure} {wrong.cause}", overlays=self._overlays(shots),
+                            kept=len(shots))
         if self._guidance is None or len(shots) != self._guided:
             self._guidance, self._guided = self._collector.guidance(), len(shots)
         guidance = self._guidance
@@ -148,7 +158,7 @@ class ShowStep(BoardFinder):
                  in zip(self.cameras or (), guidance.covered, strict=True)]
         bars += [Bar("tilted", float(guidance.tilted), "the board was seen tilted: this tells the focal length"),
                  Bar("near and far", float(guidance.near_and_far), "the board was seen large and small")]
-        hint = self._offer.why.removesuffix(guidance.advice).strip()
+        hint = self.search.missing or self._offer.why.removesuffix(guidance.advice).strip()
         return StepView(self._sentence(guidance.advice), done=guidance.complete, hint=hint,
                         bars=tuple(bars), overlays=self._overlays(shots), kept=len(shots),
                         passable=len(shots) >= FEWEST)
@@ -266,7 +276,8 @@ class TableStep(BoardFinder):
         if self.world is None:
             first = (self.cameras or ("first",))[0]
             sentence = "Lay the board flat on the table and press Space, or press Next."
-            hint = self.problem or f"Without a table the world begins at camera {first}, and the scene is not level."
+            hint = self.problem or self.search.missing or (
+                f"Without a table the world begins at camera {first}, and the scene is not level.")
         else:
             sentence = "Lay the board flat and press Space again." if wrong else "The table is known: press Next."
             hint = ""
