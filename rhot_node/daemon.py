@@ -21,6 +21,7 @@ from rhot_node.network.requests import SettingsStore
 from rhot_node.network.session import Sessions, Stream
 from rhot_node.slice_search import SliceSearch
 from rhot_node.tag_search import TagSearch
+from rhot_node.threads import Watch, complaints
 from rhot_node.wire.messages import (
     Fiducials,
     ForegroundPart,
@@ -36,6 +37,9 @@ READ_S = 0.05  # how long to wait for a frame before looking at everything else
 REOPEN_S = 1.0  # between tries to open a lost camera
 U32_MAX = 2**32 - 1
 _LIGHT_PERIOD_S = 1.0
+_OPENING_S = 10.0  # a webcam is given five seconds for its first frame
+_READS = "reads the camera"
+_SENDS = "sends what was found"
 
 OpenCamera = Callable[[CameraSettings], Camera]
 MakeDetector = Callable[[NodeSettings], Detector]
@@ -87,6 +91,7 @@ class NodeDaemon:
         self._tags = TagSearch(store.current, clock)
         self.foreground = ForegroundStore(None) if foreground is None else foreground
         self.slices = SliceSearch(store.current.node_id, clock, self.foreground)
+        self._frames, self._opening = Watch(_SENDS), Watch("opens the camera", _OPENING_S)
         self._camera: Camera | None = None
         self._detector: Detector | None = None
         self._prepared = False
@@ -105,7 +110,7 @@ class NodeDaemon:
         """What the node does now."""
         if not self._prepared:
             return NodeState.STARTING
-        if self._camera is None:
+        if self._camera is None or self._hangs():
             return NodeState.FAULT
         return NodeState.STREAMING if self.sessions.current else NodeState.READY
 
@@ -118,13 +123,14 @@ class NodeDaemon:
         """State, for the control channel."""
         stream, camera = self.sessions.current, self._camera
         return {"node_id": self._settings.node_id, "name": self._settings.name, "state": self.state.name.lower(),
-                "message": self._message, "session": stream.session if stream else 0,
+                "message": self._hangs() or self._message, "session": stream.session if stream else 0,
                 "width": self._size[0], "height": self._size[1], "detector": self._settings.detector,
                 "tags": list(self._settings.tags.sought),
                 "foreground": self.foreground.report(*self._size),
                 "marker_checksum": self._settings.markers.checksum, "t_node_ns": self._clock.now_ns(),
                 "camera": camera.report() if isinstance(camera, Reporting) else {},
-                "health": [*self._troubles(), *([BLACK_PICTURE] if self._black else [])]}
+                "health": [*self._troubles(), *([BLACK_PICTURE] if self._black else []),
+                           *(Check("threads", "error", text) for text in complaints())]}
 
     def introduce(self) -> dict[str, Any]:
         """What anybody may know, paired or not."""
@@ -145,6 +151,8 @@ class NodeDaemon:
 
     def close(self) -> None:
         """Close the camera and end the searches beside that for markers."""
+        self._frames.dismiss()
+        self._opening.dismiss()
         self._tags.close()
         self.slices.close()
         self.foreground.close()
@@ -157,6 +165,10 @@ class NodeDaemon:
 
     def step(self, sender: ObservationSender, pictures: PictureBox) -> bool:
         """Handle one frame, or wait for one a moment. False when the recording is over and the node with it."""
+        with self._frames.timed():
+            return self._step(sender, pictures)
+
+    def _step(self, sender: ObservationSender, pictures: PictureBox) -> bool:
         self.sessions.expire(time.monotonic())
         if self._store.current is not self._settings:
             self._take_settings(self._store.current, pictures)
@@ -165,6 +177,7 @@ class NodeDaemon:
             self._wait_to_reopen()
             return True
         try:
+            self._frames.what = _READS
             frame = self._camera.read(READ_S)
         except EndOfRecording:
             return self._begin_again(self._camera)
@@ -174,7 +187,9 @@ class NodeDaemon:
         if frame is None:
             return True
         self._look_at_light(frame)
+        self._frames.what = f"finds markers by the detector {self._settings.detector}"
         markers = self._detector.detect(frame.image)
+        self._frames.what = _SENDS
         late = self._count_frame(frame)
         stream = self.sessions.current
         if stream is not None and frame.t_node_ns >= stream.t_start_node_ns:
@@ -231,9 +246,15 @@ class NodeDaemon:
     def _open(self) -> None:
         self._last_frame = None
         self._black = False
-        self._camera = self._open_camera(self._settings.camera)
+        with self._opening.timed():
+            self._camera = self._open_camera(self._settings.camera)
         self._size = self._camera.size
         self._message = ""
+
+    def _hangs(self) -> str:
+        """What of the frame loop does not come back, as a sentence; empty when all does."""
+        now_s = time.monotonic()
+        return self._opening.complaint(now_s) or ("" if self._camera is None else self._frames.complaint(now_s))
 
     def _fail(self, error: CameraError) -> None:
         self.counters.faults += 1

@@ -226,10 +226,10 @@ def read_input(path: Path, limit: int | None = None) -> bytes:
     return data
 
 
-def open_input(path: Path) -> BinaryIO:
+def open_input(path: Path, buffering: int = -1) -> BinaryIO:
     """Open a regular file for reading; a pipe or a device, which might never end, is refused. Raises OSError."""
     require_file(path)  # before it is opened: that alone does something to some devices
-    file = os.fdopen(os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK), "rb")
+    file = os.fdopen(os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK), "rb", buffering)
     try:
         _require_regular(os.fstat(file.fileno()).st_mode, path, "read")
     except OSError:
@@ -259,6 +259,16 @@ def _require_regular(mode: int, path: Path, done: str) -> None:
         kind = next((name for test, name in _OTHER_FILES if test(mode)), "something else")
         code = errno.EISDIR if stat.S_ISDIR(mode) else errno.EINVAL
         raise OSError(code, f"it is {kind}; only files are {done}", str(path))
+
+
+def sync_folder(path: Path) -> None:
+    """Have the disk take the name of a new file, too: without it a power cut may lose the whole file."""
+    with contextlib.suppress(OSError):  # some file systems cannot
+        handle = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def write_document(path: Path, document: Any) -> None:
@@ -293,6 +303,7 @@ def replacing(path: Path, *, private: bool = False) -> Iterator[BinaryIO]:
             mode = path.stat().st_mode & 0o777 if path.exists() else 0o644
             Path(name).chmod(mode)
         Path(name).replace(path)
+        sync_folder(path)
     except BaseException:
         with contextlib.suppress(OSError):
             Path(name).unlink()

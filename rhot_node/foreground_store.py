@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import logging
 import threading
@@ -27,6 +28,7 @@ from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import NodeError
 from rhot_node.files import open_input, write_atomically
 from rhot_node.network.pictures import PictureBox
+from rhot_node.threads import Task
 
 log = logging.getLogger(__name__)
 
@@ -63,7 +65,7 @@ class ForegroundStore:
         self.current = _FLAT
         self._failure = ""
         self._until_s = 0.0
-        self._thread: threading.Thread | None = None
+        self._task: Task | None = None
         self._ending = threading.Event()  # of the thread
         self._changing = threading.Lock()
         if path is not None and path.exists():
@@ -95,7 +97,7 @@ class ForegroundStore:
     @property
     def learning(self) -> bool:
         """Whether a background is being learnt."""
-        return self._thread is not None and self._thread.is_alive()
+        return self._task is not None and self._task.running
 
     def learn_background(self, pictures: PictureBox, seconds: float, *, save: bool = True) -> None:
         """Begin to learn the scene as it is during the next seconds; with `save` False it is in force until the node
@@ -103,9 +105,8 @@ class ForegroundStore:
         if self.learning:
             raise NodeError("the background is being learnt already; wait for its end.")
         self._failure, self._until_s, self._ending = "", time.monotonic() + seconds, threading.Event()
-        self._thread = threading.Thread(target=self._learn, args=(pictures, save, self._until_s, self._ending),
-                                        name="background", daemon=True)
-        self._thread.start()
+        self._task = Task("learns the background", functools.partial(self._learn, pictures, save, self._until_s,
+                                                                     self._ending))
 
     def learn_skin(self, pictures: PictureBox, *, save: bool = True) -> bool:
         """Learn the skin's colours from the next picture. False when it shows no skin; generic colours are then used.
@@ -138,7 +139,7 @@ class ForegroundStore:
             raise NodeError("the background is being learnt; wait for its end.")
         with self._changing:
             self._ending.set()
-            self._thread = None
+            self._task = None
         if earlier and self.path is not None:
             kept, saved = self._before(), self.path.read_bytes() if self.path.exists() else None
             self._use(load_foreground(kept) if kept.exists() else _FLAT, save=True)
@@ -179,8 +180,8 @@ class ForegroundStore:
     def close(self) -> None:
         """End what is being learnt."""
         self._ending.set()
-        if self._thread is not None:
-            self._thread.join()
+        if self._task is not None:
+            self._task.join()
 
     def _learn(self, pictures: PictureBox, save: bool, until_s: float, ending: threading.Event) -> None:
         sums = BackgroundSums()

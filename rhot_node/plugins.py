@@ -15,6 +15,7 @@ from rhot_node.health.checks import Check
 from rhot_node.keypoints.detector import PREFIX as KEYPOINTS
 from rhot_node.keypoints.detector import keypoint_detector
 from rhot_node.markers import MarkerSet
+from rhot_node.threads import FOREIGN, TimedCalls
 from rhot_node.wire.messages import CANDIDATES_MAX, MarkerFlag, MarkerObservation
 
 PREFIX = "plug:"
@@ -34,7 +35,7 @@ def load_plugin(group: str, name: str) -> Any:
         raise PluginError(f"there is no plug-in {name!r} of the kind {group}; installed: {names or 'none'}.")
     try:
         return points[0].load()
-    except Exception as exc:  # it is somebody else's program
+    except FOREIGN as exc:  # it is somebody else's program
         raise PluginError(f"{about_plugin(group, name)} cannot be loaded ({type(exc).__name__}: {exc}). Repair or "
                           "remove it.") from exc
 
@@ -63,39 +64,70 @@ log = logging.getLogger(__name__)
 GROUP: Final = "rhot.detectors"
 
 
-class PluginDetector:
-    """A detector of a plug-in. A frame over which it fails has no markers; `trouble` says why, until one succeeds."""
+BEGIN_S: Final = 120.0
+"""A detector may compile or load a network when it begins."""
 
-    def __init__(self, name: str, markers: MarkerSet) -> None:
+DETECT_S: Final = 2.0
+"""A detector that takes longer over a frame, or to begin anew, is not asked again."""
+
+
+class PluginDetector:
+    """A detector of a plug-in, in a thread of its own. A frame over which it fails has no markers; `trouble` says why,
+    until one succeeds. One that hangs is given up, and `otherwise` detects in its place."""
+
+    def __init__(self, name: str, markers: MarkerSet, otherwise: Callable[[], Detector]) -> None:
         """Raises PluginError when there is no such plug-in, or when it cannot begin."""
         self.trouble = ""
         self._name = name
         self._count = len(markers.markers)
+        self._otherwise = otherwise
+        self._instead: Detector | None = None
+        self._thread = TimedCalls(f"runs the detector {name!r}")
         make = load_plugin(GROUP, name)
         try:
-            self._detector: Detector = make(markers)
-            self._detector.reset()
-        except Exception as exc:  # it is somebody else's program
+            self._detector: Detector = self._thread.call(lambda: make(markers), BEGIN_S)
+            self._thread.call(self._detector.reset, BEGIN_S)
+        except FOREIGN as exc:  # it is somebody else's program
+            self._thread.close()
             raise PluginError(self._failed("cannot begin", exc)) from exc
 
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """All markers of one image, as `Detector.detect`; all lost when the plug-in fails."""
+        if self._instead is not None:
+            return self._instead.detect(image)
         try:
-            found = tuple(self._detector.detect(image))
+            found = self._thread.call(lambda: tuple(self._detector.detect(image)), DETECT_S)
             self._check(found)
-        except Exception as exc:
+        except TimeoutError as exc:
+            self._give_up(exc)
+            return lost(self._count)
+        except FOREIGN as exc:
             self._say(self._failed("failed over a frame", exc))
-            return tuple(MarkerObservation(index, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
-                         for index in range(self._count))
+            return lost(self._count)
         self.trouble = ""
         return found
 
     def reset(self) -> None:
         """Forget all tracks."""
         try:
-            self._detector.reset()
-        except Exception as exc:
+            if self._instead is None:
+                self._thread.call(self._detector.reset, DETECT_S)
+            else:
+                self._instead.reset()
+        except TimeoutError as exc:
+            self._give_up(exc)
+        except FOREIGN as exc:
             self._say(self._failed("failed to begin anew", exc))
+
+    def close(self) -> None:
+        """End its thread, or leave it to itself when it hangs."""
+        self._thread.close()
+
+    def _give_up(self, exc: TimeoutError) -> None:
+        self._instead = self._otherwise()
+        self._say(f"{about_plugin(GROUP, self._name)} hangs ({exc}), and is not asked any more. "
+                  + ("All markers are lost." if isinstance(self._instead, NoDetector) else
+                     "The fast detector works in its place."))
 
     def _check(self, found: tuple[MarkerObservation, ...]) -> None:
         if not all(isinstance(one, MarkerObservation) for one in found):
@@ -106,13 +138,19 @@ class PluginDetector:
         if any(not 0 <= index < self._count or indices.count(index) > CANDIDATES_MAX for index in indices):
             raise ValueError(f"there are more than {CANDIDATES_MAX} candidates of a marker, or one of no marker")
 
-    def _failed(self, what: str, exc: Exception) -> str:
+    def _failed(self, what: str, exc: BaseException) -> str:
         return f"{about_plugin(GROUP, self._name)} {what} ({type(exc).__name__}: {exc})."
 
     def _say(self, sentence: str) -> None:
         if not self.trouble:
             log.error("%s", sentence)
         self.trouble = sentence
+
+
+def lost(count: int) -> tuple[MarkerObservation, ...]:
+    """One observation of each of `count` markers: it is lost."""
+    return tuple(MarkerObservation(index, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
+                 for index in range(count))
 
 
 class NoDetector:
@@ -123,8 +161,7 @@ class NoDetector:
 
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """See `Detector`."""
-        return tuple(MarkerObservation(index, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
-                     for index in range(self._count))
+        return lost(self._count)
 
     def reset(self) -> None:
         """See `Detector`."""
@@ -142,8 +179,14 @@ class DetectorChoice:
 
     def make(self, settings: NodeSettings) -> Detector:
         """A new detector."""
+        if self._detector is not None:
+            self._detector.close()
         self._refusal, self._detector = "", None
         landmarks = any(marker.shape == "landmark" for marker in settings.markers.markers)
+
+        def instead() -> Detector:
+            return NoDetector(settings.markers) if landmarks else self._otherwise(settings)
+
         if settings.detector.startswith(KEYPOINTS):
             try:
                 return keypoint_detector(settings.detector.removeprefix(KEYPOINTS), settings.markers)
@@ -154,7 +197,7 @@ class DetectorChoice:
                                           "set has. Choose keypoints:NAME or a plug-in.")
         if settings.detector.startswith(PREFIX):
             try:
-                self._detector = PluginDetector(settings.detector.removeprefix(PREFIX), settings.markers)
+                self._detector = PluginDetector(settings.detector.removeprefix(PREFIX), settings.markers, instead)
             except PluginError as exc:
                 if landmarks:
                     return self._refuse(settings, str(exc))

@@ -6,7 +6,6 @@ that comes while one is being searched is left out and counted.
 
 from __future__ import annotations
 
-import logging
 import threading
 import time
 from dataclasses import dataclass
@@ -22,13 +21,12 @@ from rhot_node.detect.foreground import foreground_map
 from rhot_node.detect.image import YuvImage
 from rhot_node.foreground_store import ForegroundStore, rgb_of
 from rhot_node.network.session import Stream
+from rhot_node.threads import Worker
 from rhot_node.wire.codec import EDGES_FIT, FOREGROUND_FIT
 from rhot_node.wire.edges import pack_edges
 from rhot_node.wire.foreground_map import pack_map
 from rhot_node.wire.messages import ForegroundPart, SliceEdges, Slices
 from rhot_node.wire.slices import unpack_slices
-
-log = logging.getLogger(__name__)
 
 VALID_S = 1.0
 """How long a request is in force: a hand has moved on by then."""
@@ -82,13 +80,13 @@ class SliceSearch:
         self._changed = threading.Condition()
         self._waiting: _Waiting | None = None
         self._busy = self._ending = False
-        self._thread: threading.Thread | None = None
+        self._worker: Worker | None = None
 
     def prepare(self) -> None:
         """Compile, because slices may be asked for while frames come, and start the thread."""
         self.warm_up()
-        self._thread = threading.Thread(target=self._run, name="slices", daemon=True)
-        self._thread.start()
+        self._worker = Worker("searches along slices", self.step, wait=self._await_frame)
+        self._worker.start()
 
     def warm_up(self) -> None:
         """Have everything compiled that a search needs."""
@@ -159,20 +157,13 @@ class SliceSearch:
         with self._changed:
             self._ending = True
             self._changed.notify()
-        if self._thread is not None:
-            self._thread.join()
+        if self._worker is not None:
+            self._worker.close()
 
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                while self._waiting is None and not self._ending:
-                    self._changed.wait()
-                if self._ending:
-                    return
-            try:
-                self.step()
-            except Exception:  # a frame must not end the search for good
-                log.exception("the search along slices failed over a frame")
+    def _await_frame(self) -> None:
+        with self._changed:
+            while self._waiting is None and not self._ending:
+                self._changed.wait()
 
     def _search(self, waiting: _Waiting) -> None:
         order, image = waiting.order, rgb_of(waiting.image)

@@ -6,7 +6,6 @@ counted.
 
 from __future__ import annotations
 
-import logging
 import threading
 from typing import TYPE_CHECKING, Protocol
 
@@ -17,12 +16,11 @@ from rhot_node.capture.camera import NS_PER_S, Frame
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, TagSettings
 from rhot_node.network.session import Stream
+from rhot_node.threads import Worker
 from rhot_node.wire.messages import FAMILIES, Fiducials
 
 if TYPE_CHECKING:
     from rhot_node.detect.tags import TagDetector
-
-log = logging.getLogger(__name__)
 
 U32_MAX = 2**32 - 1
 WARM_UP_PX = 96  # side of the tag that compiles what refines corners
@@ -59,7 +57,7 @@ class TagSearch:
         self._changed = threading.Condition()
         self._waiting: _Waiting | None = None
         self._busy = self._ending = False
-        self._thread: threading.Thread | None = None
+        self._worker: Worker | None = None
 
     def prepare(self) -> None:
         """Compile the detector, because tags may be asked for while frames come, and start the thread if they are."""
@@ -105,25 +103,18 @@ class TagSearch:
         with self._changed:
             self._ending = True
             self._changed.notify()
-        if self._thread is not None:
-            self._thread.join()
+        if self._worker is not None:
+            self._worker.close()
 
     def _start(self) -> None:
-        if self._settings.enabled and self._thread is None and not self._ending:
-            self._thread = threading.Thread(target=self._run, name="tags", daemon=True)
-            self._thread.start()
+        if self._settings.enabled and self._worker is None and not self._ending:
+            self._worker = Worker("searches for tags", self.step, wait=self._await_frame)
+            self._worker.start()
 
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                while self._waiting is None and not self._ending:
-                    self._changed.wait()
-                if self._ending:
-                    return
-            try:
-                self.step()
-            except Exception:  # a frame must not end the search for good
-                log.exception("the search for tags failed over a frame")
+    def _await_frame(self) -> None:
+        with self._changed:
+            while self._waiting is None and not self._ending:
+                self._changed.wait()
 
     def _due(self, t_node_ns: int) -> bool:
         if self._settings.rate_hz is None:

@@ -127,6 +127,8 @@ def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:
         return [Advice("error", f"Node {name} at {facts.address} does not know this computer: it was reset or made "
                                 "open, or never paired with it. Pair it: `rhot-node pair` on the node, "
                                 f"`rhot pair {name} --rig FILE` here.")]
+    if status.state == "silent" and status.message:
+        return [Advice("error", f"Node {name} does not answer. {status.message}")]
     if status.state == "silent":
         return [Advice("error", f"Node {name} does not answer at {facts.address}:{facts.udp_port}. Is it switched on, "
                                 "is rhot-node running there, and on the same network? It is looked for by its id."

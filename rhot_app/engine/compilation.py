@@ -3,16 +3,17 @@ time while the window is open. No Qt."""
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Sequence
 
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig
 from rhot_node.compiled import ALL, VARIABLE, WINDOW, is_complete
+from rhot_node.threads import Task
 
 Report = Callable[[str, float], None]
 
@@ -82,7 +83,7 @@ class BackgroundCompilation:
         """Start, unless it has started or everything is compiled."""
         if self._process is None and is_missing(ALL):
             self._process = _start([*self._command, ALL, "--background"])
-            threading.Thread(target=self._watch, args=(self._process,), name="compilation", daemon=True).start()
+            self._task = Task("follows the compilation", functools.partial(self._watch, self._process))
 
     def close(self) -> None:
         """End it. The next start goes on where it ended."""

@@ -33,6 +33,12 @@ from rhot_app.sources.links import new_session
 from rhot_app.sources.source import ObservationSource, same_network
 from rhot_app.state import SeenContour
 from rhot_app.tracking.tracker import ShowsContours, Tracker
+from rhot_node.threads import complaints
+
+_REPORT = "If that goes on, start the engine again, and send us a report (`rhot report`)."
+
+PREPARING_S = 1.0
+"""A change of the rig that takes longer is told."""
 
 MakeSource = Callable[[Rig], ObservationSource]
 MakeTracker = Callable[[Rig], Tracker]
@@ -64,12 +70,15 @@ class Engine:
         self._moved: dict[int, str] = {}  # where nodes were that have moved since the rig was read or saved
         self._shown: dict[str, int] = {}  # times of the contours that were published last
         self._lock = threading.RLock()
+        self._changing = threading.Lock()  # of the rig: one change after the other, while everything else goes on
+        self._preparing_s: float | None = None  # since when a new rig's tracker is made
+        self._closed = False
         self._outputs = outputs
         if outputs is not None:
             outputs.check(rig)
         self._source = make_source(rig)
         try:
-            self._pipeline = Pipeline(self._work(rig), publish, after_state)
+            self._pipeline = Pipeline(self._work(rig, self._tracker(rig)), publish, after_state)
         except BaseException:
             self._source.close()
             raise
@@ -145,33 +154,49 @@ class Engine:
 
     def set_rig(self, rig: Rig) -> None:
         """Go on with another rig. Ports and sessions stay when the nodes are reached as before; where only outputs
-        differ, tracking is not touched.
+        differ, tracking is not touched. May take a minute, when the rig's tracker is compiled; everything else goes on
+        meanwhile, by other threads.
 
         Raises SourceError (a port is taken), OutputError (an output cannot be) or what the tracker objects to; the old
         rig then stays.
         """
-        with self._lock:
-            if self._outputs is not None:
-                self._outputs.check(rig)
-            if msgspec.structs.replace(rig, outputs=self.rig.outputs) == self.rig:
-                self._change_outputs(rig)
-                return
-            kept = same_network(self.rig, rig)
-            if kept:
-                work = self._work(rig)
-                self._source.configure(rig)
-            else:
-                if self.recorder is not None:
-                    raise EngineError("other nodes cannot be used while recording; stop the recording first.")
-                work = self._change_source(rig)
-            self._pipeline.use(work)
-            self._listen()
-            self.rig = rig
-            if self._outputs is not None:
-                self._outputs.configure(rig)
-            self._observer = Observer(rig, self._source, self._pipeline)
-            if self.running and not kept:
-                self.start()
+        with self._changing:
+            with self._lock:
+                if self._outputs is not None:
+                    self._outputs.check(rig)
+                if msgspec.structs.replace(rig, outputs=self.rig.outputs) == self.rig:
+                    self._change_outputs(rig)
+                    return
+                self._require_same_nodes_while_recording(rig)
+            self._preparing_s = time.monotonic()
+            try:
+                tracker = self._tracker(rig)
+            finally:
+                self._preparing_s = None
+            with self._lock:
+                self._take_up(rig, tracker)
+
+    def _take_up(self, rig: Rig, tracker: Tracker) -> None:
+        if self._closed:
+            raise EngineError("the engine is ending.")
+        self._require_same_nodes_while_recording(rig)
+        kept = same_network(self.rig, rig)
+        if kept:
+            self._source.configure(rig)
+        else:
+            self._change_source(rig)
+        self._pipeline.use(self._work(rig, tracker))
+        self._listen()
+        self.rig = rig
+        if self._outputs is not None:
+            self._outputs.configure(rig)
+        self._observer = Observer(rig, self._source, self._pipeline)
+        if self.running and not kept:
+            self.start()
+
+    def _require_same_nodes_while_recording(self, rig: Rig) -> None:
+        if self.recorder is not None and not same_network(self.rig, rig):
+            raise EngineError("other nodes cannot be used while recording; stop the recording first.")
 
     def save_rig(self, path: Path | None) -> Path:
         """Write the rig to `path`, by default where it came from; what stood there is kept (`rig_history`).
@@ -196,8 +221,13 @@ class Engine:
             self._follow_nodes()
             extra = [Advice("error", self._notice)] if self._notice else []
             if self.recorder is not None:
+                extra += [Advice("warning", self.recorder.notice)] if self.recorder.notice else []
                 extra += disk_advice(str(self.recorder.path.parent), self.recorder.disk.seconds_left)
             extra += moved_advice(self.rig, self._moved) + hands_advice(self.rig)
+            since_s = self._preparing_s
+            if since_s is not None and time.monotonic() - since_s > PREPARING_S:
+                extra.append(Advice("info", "The new rig is being prepared; the one before is tracked until then."))
+            extra += [Advice("error", f"{text} {_REPORT}") for text in complaints()]
             outputs = self._outputs
             extra += [] if outputs is None else [Advice("warning", text) for text in outputs.complaints()]
             status = self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,
@@ -225,6 +255,7 @@ class Engine:
     def close(self) -> None:
         """Stop the nodes, finish the log, close all ports. May be called twice."""
         with self._lock:
+            self._closed = True
             if self.running:
                 self.stop()
             self.record_stop()
@@ -251,25 +282,28 @@ class Engine:
     def _listen(self) -> None:
         self._source.deliver_to(functools.partial(self._pipeline.take, self._source))
 
-    def _work(self, rig: Rig) -> Work:
+    def _tracker(self, rig: Rig) -> Tracker:
+        """The tracker of a rig, compiled."""
         tracker = self._make_tracker(rig)
         warm_up(tracker, rig)
+        return tracker
+
+    def _work(self, rig: Rig, tracker: Tracker) -> Work:
         unseen = np.full((len(rig.nodes), len(rig.markers.markers)), time.monotonic_ns(), dtype=np.int64)
         return Work(self._source, tracker, unseen)
 
-    def _change_source(self, rig: Rig) -> Work:
+    def _change_source(self, rig: Rig) -> None:
         """Other nodes: the old ports must be closed before the new ones, which may be the same, are opened."""
-        old_rig = self.rig
+        old_rig, old_tracker = self.rig, self._pipeline.work.tracker
         if self.running:
             self._source.stop()
         self._source.close()
         try:
             self._source = self._make_source(rig)
-            return self._work(rig)
         except Exception:
-            self._source.close()
             self._source = self._make_source(old_rig)
-            self._pipeline.use(self._work(old_rig))
+            old_tracker.reset()
+            self._pipeline.use(self._work(old_rig, old_tracker))
             self._listen()
             self._observer = Observer(old_rig, self._source, self._pipeline)
             if self.running:

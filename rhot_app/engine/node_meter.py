@@ -81,7 +81,8 @@ class NodeMeter:
             node_id=link.node.node_id, name=link.node.name, state=self._word(now_ns),
             text_datagrams=link.node.text_datagrams, rate_hz=self.rate_hz(), received=link.door.received,
             lost=link.door.sequence.lost, dropped=self._dropped(), clock_offset_s=clock.offset_s,
-            clock_bound_s=clock.bound_s, clock_round_trip_s=clock.round_trip_s, message=message,
+            clock_bound_s=clock.bound_s, clock_round_trip_s=clock.round_trip_s,
+            message=message or (link.address_problem if link.silent(now_ns) else ""),
             paired=link.paired, turned_away=link.turned_away and link.silent(now_ns))
 
     def _word(self, now_ns: int) -> NodeWord:

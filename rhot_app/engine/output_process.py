@@ -10,6 +10,7 @@ standard output. It ends when its input does.
 from __future__ import annotations
 
 import contextlib
+import functools
 import logging
 import os
 import secrets
@@ -33,10 +34,11 @@ from rhot_app.outputs.spec import SECRET_VARIABLE, OutputStatus, as_run
 from rhot_app.project import OutputSettings, Rig, parse_rig
 from rhot_app.state import HandState
 from rhot_node.logs import log_to_stderr
+from rhot_node.threads import Task, Watch, Worker, complaints
 
-RESTART_S: Final = 3.0
+RESTART_S: Final = 1.0
 SETTLE_S: Final = 15.0  # a process that starts, on a busy computer
-SILENT_S: Final = 60.0  # nothing heard for so long: it hangs, and is ended; its first start may compile for a while
+SILENT_S: Final = 15.0  # nothing heard for so long: it hangs, and is ended
 STATUS_S: Final = 0.2
 NICE: Final = 5  # gives way to the engine, whose own threads hold the interpreter for those that track
 _END_S: Final = 5.0
@@ -61,6 +63,7 @@ class OutputProcess:
         self._process: subprocess.Popen[bytes] | None = None
         self._status: tuple[OutputStatus, ...] = ()
         self._failure = ""
+        self._faults: tuple[str, ...] = ()  # of the process's own threads
         self._ended_s = 0.0
         self._heard_s = 0.0
         self._lock = threading.Lock()
@@ -112,7 +115,7 @@ class OutputProcess:
         """A sentence for each output that does not do what it should."""
         found = [f"Output {status.spec}: {status.message} Tracking goes on." for status in self.status()
                  if status.message]
-        return [*([self._failure] if self._failure else []), *found]
+        return [*([self._failure] if self._failure else []), *found, *self._faults]
 
     def close(self) -> None:
         """End the process. May be called twice."""
@@ -144,7 +147,8 @@ class OutputProcess:
         self._ended_s, self._heard_s = 0.0, time.monotonic()
         self._process = subprocess.Popen([sys.executable, "-m", "rhot_app.engine.output_process", self._endpoint],
                                          stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=self._environment)
-        threading.Thread(target=self._read, args=(self._process,), name="output status", daemon=True).start()
+        self._faults = ()
+        self._reader = Task("reads the outputs' status", functools.partial(self._read, self._process))
         self._tell()
 
     def _tell(self) -> None:
@@ -155,27 +159,45 @@ class OutputProcess:
 
     def _read(self, process: subprocess.Popen[bytes]) -> None:
         assert process.stdout is not None
-        decoder = msgspec.json.Decoder(tuple[OutputStatus, ...])
+        decoder = msgspec.json.Decoder(_Told)
         for line in process.stdout:
             with contextlib.suppress(msgspec.MsgspecError):  # a plug-in may print, too
-                status = decoder.decode(line)
+                told = decoder.decode(line)
                 with self._lock:
                     if process is self._process and process.poll() is None:
                         self._failure, self._heard_s = "", time.monotonic()
-                        self._status = self._of_wanted(status)
+                        self._status, self._faults = self._of_wanted(told.outputs), told.faults
+
+
+class _Told(msgspec.Struct):
+    """What the process says of itself: its outputs, and what is wrong with its threads."""
+
+    outputs: tuple[OutputStatus, ...]
+    faults: tuple[str, ...]
 
 
 class OutputProgram:
-    """The process's own side: states in, outputs fed, status out. `step` belongs to one thread."""
+    """The process's own side: states in, outputs fed, status out. `step` belongs to one thread, `tell` to another."""
 
     def __init__(self, states: zmq.Socket[bytes], rigs: deque[bytes], status: IO[bytes]) -> None:
         """`states`: subscribed to the hand states. `rigs`: documents that came, oldest first."""
         self._states, self._rigs, self._out = states, rigs, status
         self._outputs = Outputs()
-        self._told_s: float | None = None  # None: nothing to tell before there is a rig
+        self._has_rig = False  # nothing to tell before
+        self._watch = Watch("passes states on to the outputs")
 
     def step(self) -> None:
-        """Take a rig up, pass on what states there are, and tell the status when that is due."""
+        """Take a rig up, and pass on what states there are."""
+        with self._watch.timed():
+            self._step()
+
+    def tell(self) -> None:
+        """Tell the status."""
+        if self._has_rig:
+            self._out.write(msgspec.json.encode(_Told(self._outputs.status(), tuple(complaints()))) + b"\n")
+            self._out.flush()
+
+    def _step(self) -> None:
         if self._rigs:
             document = self._rigs.pop()
             self._rigs.clear()
@@ -183,7 +205,7 @@ class OutputProgram:
                 self._outputs.configure(parse_rig(document, "the engine's rig"))
             except OutputError as exc:
                 log.warning("rhot: %s", exc)
-            self._told_s = self._told_s or 0.0
+            self._has_rig = True
         if self._states.poll(_POLL_MS):
             with contextlib.suppress(zmq.Again):
                 while True:
@@ -191,10 +213,6 @@ class OutputProgram:
                     state = decode(topic, payload)
                     assert isinstance(state, HandState)
                     self._outputs.send(state)
-        if self._told_s is not None and time.monotonic() - self._told_s > STATUS_S:
-            self._told_s = time.monotonic()
-            self._out.write(msgspec.json.encode(self._outputs.status()) + b"\n")
-            self._out.flush()
 
     def close(self) -> None:
         """Close all outputs."""
@@ -214,18 +232,27 @@ def main() -> int:
         for line in sys.stdin.buffer:
             rigs.append(line)
         ended.set()
-    threading.Thread(target=read, name="rigs", daemon=True).start()
+    rig_reader = Task("reads the engine's rigs", read)
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     states = context.socket(zmq.SUB)
     states.setsockopt(zmq.RCVHWM, _RECEIVE_QUEUE)
     states.setsockopt(zmq.SUBSCRIBE, TOPIC_STATE)
     states.connect(sys.argv[1])
     program = OutputProgram(states, rigs, status)
+
+    def tell() -> None:
+        try:
+            program.tell()
+        except BrokenPipeError:  # the engine has ended
+            ended.set()
+        teller.ending.wait(STATUS_S)
+    teller = Worker("tells the engine how the outputs go", tell)
+    teller.start()
     try:
-        with contextlib.suppress(BrokenPipeError):
-            while not ended.is_set():
-                program.step()
+        while not ended.is_set() and rig_reader.running:
+            program.step()
     finally:
+        teller.close()
         program.close()
         context.destroy(0)
     return 0

@@ -6,8 +6,8 @@ thread of its own (`benchmarks/self_calibration.py`).
 
 from __future__ import annotations
 
+import functools
 import logging
-import threading
 from collections import deque
 from typing import Any
 
@@ -30,6 +30,7 @@ from rhot_app.tracking.refinement.refined_rig import (
 )
 from rhot_app.tracking.refinement.rig_refinement import Gathered, RigRefiner
 from rhot_app.tracking.tracker import CameraObservations, KeepsKeyFrames, Tracker
+from rhot_node.threads import Task
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +52,7 @@ class RigWatch:
         self._newest: Refinement | None = None
         self._judged_ns = 0
         self._run = 0
-        self._thread: threading.Thread | None = None
+        self._task: Task | None = None
 
     def restart(self) -> None:
         """A new run begins; what is being judged is of the last one."""
@@ -66,12 +67,9 @@ class RigWatch:
 
     def advice(self, now_ns: int) -> list[Advice]:
         """Judge anew every ten seconds; mostly what was said before."""
-        if now_ns - self._judged_ns >= JUDGE_NS and (self._thread is None or not self._thread.is_alive()):
+        if now_ns - self._judged_ns >= JUDGE_NS and (self._task is None or not self._task.running):
             self._judged_ns = now_ns
-            gathered, run = self._refiner.gather(), self._run
-            self._thread = threading.Thread(target=self._judge, args=(gathered, run), name="refining the rig",
-                                            daemon=True)
-            self._thread.start()
+            self._task = Task("refines the rig", functools.partial(self._judge, self._refiner.gather(), self._run))
         found = self._newest
         if found is None or found.holds:
             return []
@@ -79,8 +77,8 @@ class RigWatch:
 
     def wait(self, timeout_s: float | None = None) -> None:
         """Until what is being judged is judged."""
-        if self._thread is not None:
-            self._thread.join(timeout_s)
+        if self._task is not None:
+            self._task.join(timeout_s)
 
     def refined(self, rig: Rig) -> dict[str, Any]:
         """The answer to the command `refined`. `rig` is the one in force: its nodes may have moved meanwhile.
@@ -110,7 +108,7 @@ class HandWatch:
         self._newest: Adapted | None = None
         self._judged_ns = self._solved_ns = -JUDGE_NS
         self._enough, self._run = False, 0
-        self._thread: threading.Thread | None = None
+        self._task: Task | None = None
 
     def restart(self) -> None:
         """A new run begins."""
@@ -128,18 +126,16 @@ class HandWatch:
 
     def wait(self, timeout_s: float | None = None) -> None:
         """Until what is being solved is solved."""
-        if self._thread is not None:
-            self._thread.join(timeout_s)
+        if self._task is not None:
+            self._task.join(timeout_s)
 
     def adapted(self, tracker: Tracker, now_ns: int) -> dict[str, Any]:
         """The answer to the command `adapted`: `known`, whether there is a solution yet; the verdict's fields; `rows`
         of (what, before, after); `document`, the rig with the adapted hand. Solved anew every ten seconds."""
         kept = _kept(tracker)
-        if kept and now_ns - self._solved_ns >= JUDGE_NS and (self._thread is None or not self._thread.is_alive()):
+        if kept and now_ns - self._solved_ns >= JUDGE_NS and (self._task is None or not self._task.running):
             self._solved_ns = now_ns
-            self._thread = threading.Thread(target=self._solve, args=(kept, self._run), name="adapting the hand",
-                                            daemon=True)
-            self._thread.start()
+            self._task = Task("adapts the hand", functools.partial(self._solve, kept, self._run))
         found = self._newest
         if found is None:
             return {"known": False}

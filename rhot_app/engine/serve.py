@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import gc
 import os
 import signal
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +16,7 @@ from pathlib import Path
 import msgspec
 import zmq
 
-from rhot_app.engine.commands import Answer, Commands, parse, refusal
+from rhot_app.engine.commands import Answer, Arguments, Commands, parse, refusal
 from rhot_app.engine.core import Engine, MakeSource, MakeTracker
 from rhot_app.engine.directory import EngineDirectory, EngineLock, open_directory
 from rhot_app.engine.node_control import NodeControl
@@ -28,6 +30,7 @@ from rhot_app.tracking.trackers import make_tracker
 from rhot_node.compiled import announce_compilation
 from rhot_node.keys import KeyPair
 from rhot_node.logs import cut_log
+from rhot_node.threads import Task
 
 _COLLECT_S = 5.0
 
@@ -104,6 +107,9 @@ class GarbageMan:
 STATUS_NS = 100_000_000
 """Status is published ten times a second, so that a client misses an engine within one."""
 
+SLOW = frozenset({"set_rig"})
+"""Commands that may compile for a minute."""
+
 _SEND_QUEUE = 1000  # messages kept for a slow client before it misses some
 _POLL_MS = 20
 
@@ -139,6 +145,8 @@ class Server:
         self._poller = zmq.Poller()
         self._poller.register(self._commands_socket, zmq.POLLIN)
         self._status_due_ns = 0
+        self._slow: deque[tuple[bytes, str, Arguments]] = deque()  # commands that wait for the one before
+        self._change: _Change | None = None
         self._log_file = directory.log_file
 
     def end(self) -> None:
@@ -151,6 +159,7 @@ class Server:
         self._nodes.record_video(self._engine.video)
         if self._poller.poll(timeout_ms):
             self._answer_commands()
+        self._follow_slow_commands()
         for client, node_answer in self._nodes.answers():
             self._send(client, *node_answer)
         for preview in self._nodes.previews():
@@ -199,11 +208,36 @@ class Server:
         except EngineError as exc:
             self._send(client, refusal(exc))
             return
+        if name in SLOW:
+            self._slow.append((client, name, arguments))
+            return
         self._send(client, *self._commands.answer(name, arguments))
+
+    def _follow_slow_commands(self) -> None:
+        """Have them carried out one after the other, in a thread: the status goes on meanwhile."""
+        if self._change is not None and not self._change.task.running:
+            done, self._change = self._change, None
+            self._send(done.client, *done.answer)
+        if self._change is None and self._slow:
+            client, name, arguments = self._slow.popleft()
+            self._change = _Change(client, functools.partial(self._commands.answer, name, arguments))
 
     def _send(self, client: bytes, answer: Answer, attachment: bytes | None = None) -> None:
         frames = [client, b"", msgspec.json.encode(answer)]
         self._commands_socket.send_multipart(frames if attachment is None else [*frames, attachment])
+
+
+class _Change:
+    """A command that is being carried out in a thread of its own."""
+
+    def __init__(self, client: bytes, carry_out: Callable[[], tuple[Answer, bytes | None]]) -> None:
+        self.client = client
+        self.answer: tuple[Answer, bytes | None] = refusal(EngineError("the engine could not do that.")), None
+        self._carry_out = carry_out
+        self.task = Task("changes the rig", self._run)
+
+    def _run(self) -> None:
+        self.answer = self._carry_out()
 
 
 def _bind(context: zmq.Context[zmq.Socket[bytes]], kind: int, endpoint: str) -> zmq.Socket[bytes]:

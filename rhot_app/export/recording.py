@@ -117,8 +117,8 @@ class TrackedLog:
             self.losses.append(str(exc).removeprefix(f"{self.path}: "))
         if self._reader.losses.damage:
             self.losses.append(self._reader.losses.damage)
-        if self._reader.torn_bytes:
-            self.losses.append(f"its last {self._reader.torn_bytes} bytes are torn")
+        if self._reader.losses.end:
+            self.losses.append(self._reader.losses.end)
         take_losses()  # they are said by whoever exports
 
     def _why_nothing(self) -> str:

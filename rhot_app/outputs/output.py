@@ -7,10 +7,12 @@ delays nobody: when its queue is full, the oldest state is dropped.
 from __future__ import annotations
 
 import contextlib
+import functools
 import logging
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import Final, Protocol, runtime_checkable
 
 from rhot_app.errors import OutputError
@@ -18,6 +20,7 @@ from rhot_app.outputs.joints import JointConverter, Sample
 from rhot_app.outputs.spec import OutputStatus, OutputWord
 from rhot_app.project import OutputSettings
 from rhot_app.state import HandState
+from rhot_node.threads import FOREIGN, Worker
 
 log = logging.getLogger(__name__)
 
@@ -49,7 +52,7 @@ class Serving(Protocol):
     """A sink that clients connect to."""
 
     @property
-    def clients(self) -> int:
+    def clients(self) -> int | None:
         """How many are connected. Any thread may ask."""
         ...
 
@@ -68,18 +71,17 @@ class Output:
         self._converter = converter
         self._queue: deque[HandState] = deque(maxlen=QUEUE)
         self._wake = threading.Event()
-        self._ending = threading.Event()
         self._word: OutputWord = "starting"
         self._message = ""
         self._sent = self._dropped = 0
         self._period_ns = 0 if settings.rate_hz is None else round(1e9 / settings.rate_hz)
         self._due_ns = 0
-        self._writing_s: float | None = None  # since when, while it writes
-        self._thread = threading.Thread(target=self._run, name=f"output {settings.kind}", daemon=True)
+        self._since_s: tuple[str, float] | None = None  # what the sink does, and since when
+        self._worker = Worker(f"serves the output {settings.spec}", self._turn, hang_s=None)
 
     def start(self) -> None:
         """Open the sink, in the output's thread."""
-        self._thread.start()
+        self._worker.start()
 
     def send(self, state: HandState) -> None:
         """Queue one state; the oldest gives way when the queue is full. For one thread at a time."""
@@ -100,52 +102,54 @@ class Output:
 
     def stop(self) -> None:
         """Close the sink; whatever does not end within `END_S` is left to itself."""
-        self._ending.set()
+        self._worker.ending.set()
         self._wake.set()
-        if self._thread.is_alive():
-            self._thread.join(END_S)
+        self._worker.close(END_S)
         self._word = "stopped"
 
     def status(self) -> OutputStatus:
         """How it goes, now."""
-        message, since_s = self._message, self._writing_s
-        if since_s is not None and time.monotonic() - since_s > STUCK_S:
-            message = f"it has not taken a state for {time.monotonic() - since_s:.0f} s; states are dropped."
+        message, since = self._message, self._since_s
+        if since is not None and (lasts_s := time.monotonic() - since[1]) > STUCK_S:
+            message = f"it has not {since[0]} for {lasts_s:.0f} s; states are dropped."
         serving = self._sink if isinstance(self._sink, Serving) else None
         return OutputStatus(self.settings.spec, self.settings.kind, self._word, message, self._sent, self._dropped,
                             None if serving is None else serving.clients, "" if serving is None else serving.url)
 
-    def _run(self) -> None:
-        while not self._ending.is_set():
-            try:
-                self._sink.open()
-                self._word, self._message = "running", ""
-                self._write_all()
-            except OutputError as exc:
-                self._fail(str(exc))
-            except Exception as exc:  # a plug-in may raise anything
-                log.debug("output %s failed", self.settings.spec, exc_info=True)
-                self._fail(f"it failed ({type(exc).__name__}: {exc}).")
-            finally:
-                with contextlib.suppress(Exception):
-                    self._sink.close()
-            self._ending.wait(REOPEN_S)
-            self._queue.clear()  # nobody wants what is as old as that
+    def _turn(self) -> None:
+        try:
+            self._timed("opened", self._sink.open)
+            self._word, self._message = "running", ""
+            self._write_all()
+        except OutputError as exc:
+            self._fail(str(exc))
+        except FOREIGN as exc:  # a plug-in may raise anything
+            log.debug("output %s failed", self.settings.spec, exc_info=True)
+            self._fail(f"it failed ({type(exc).__name__}: {exc}).")
+        finally:
+            with contextlib.suppress(*FOREIGN):
+                self._sink.close()
+        self._worker.ending.wait(REOPEN_S)
+        self._queue.clear()  # nobody wants what is as old as that
+
+    def _timed(self, what: str, work: Callable[[], None]) -> None:
+        """Have the sink do something that may take too long."""
+        self._since_s = what, time.monotonic()
+        try:
+            work()
+        finally:
+            self._since_s = None
 
     def _write_all(self) -> None:
         """Write what comes, until the end."""
         while True:
             self._wake.wait()
             self._wake.clear()
-            while self._queue and not self._ending.is_set():
+            while self._queue and not self._worker.ending.is_set():
                 sample = self._converter.sample(self._queue.popleft(), self.settings.joints)
-                self._writing_s = time.monotonic()
-                try:
-                    self._sink.write(sample)
-                finally:
-                    self._writing_s = None
+                self._timed("taken a state", functools.partial(self._sink.write, sample))
                 self._sent += 1
-            if self._ending.is_set():
+            if self._worker.ending.is_set():
                 return
 
     def _fail(self, message: str) -> None:

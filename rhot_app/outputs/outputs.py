@@ -14,6 +14,7 @@ from rhot_app.project import OutputSettings, Rig
 from rhot_app.state import HandState
 from rhot_node.errors import PluginError
 from rhot_node.plugins import about_plugin, load_plugin, plugin_names
+from rhot_node.threads import FOREIGN
 
 # -- outputs from other packages ---------------------------------------------------------------------------------------
 # Entry points of the group ``rhot.outputs`` (docs/plugins.md).
@@ -32,37 +33,49 @@ def output_plugins() -> tuple[str, ...]:
         return ()
 
 
-def plugin_sink(settings: OutputSettings) -> Sink:
-    """The sink that the plug-in makes; one that refuses the settings, or is broken, becomes a sink that says so
-    whenever it is opened."""
-    try:
-        sink: Sink = load_plugin(GROUP, settings.kind)(settings)
-    except (OutputError, PluginError) as exc:
-        return _BrokenSink(str(exc))
-    except Exception as exc:
-        return _BrokenSink(f"{about_plugin(GROUP, settings.kind)} failed to begin ({type(exc).__name__}: {exc}).")
-    missing = [name for name in _MUST if not callable(getattr(sink, name, None))]
-    if missing:
-        return _BrokenSink(f"{about_plugin(GROUP, settings.kind)} has no {' and no '.join(missing)}(); see "
-                           "docs/plugins.md.")
-    return sink
+class PluginSink:
+    """The sink that a plug-in makes. All of its code runs in the output's own thread, its import and its constructor
+    too: it is made anew whenever it is opened."""
 
+    def __init__(self, settings: OutputSettings) -> None:
+        self._settings = settings
+        self._sink: Sink | None = None
 
-class _BrokenSink:
-    """Stands in for a plug-in that cannot work."""
+    @property
+    def clients(self) -> int | None:
+        """How many are connected; None when the plug-in does not say."""
+        return getattr(self._sink, "clients", None)
 
-    def __init__(self, complaint: str) -> None:
-        self._complaint = complaint
+    @property
+    def url(self) -> str:
+        """Where they connect; empty when the plug-in does not say."""
+        return str(getattr(self._sink, "url", ""))
 
     def open(self) -> None:
-        """Say why; always raises OutputError."""
-        raise OutputError(self._complaint)
+        """Make the sink and open it. Raises OutputError when the plug-in is broken or refuses the settings."""
+        about = about_plugin(GROUP, self._settings.kind)
+        try:
+            sink: Sink = load_plugin(GROUP, self._settings.kind)(self._settings)
+        except (OutputError, PluginError) as exc:
+            raise OutputError(str(exc)) from exc
+        except FOREIGN as exc:
+            raise OutputError(f"{about} failed to begin ({type(exc).__name__}: {exc}).") from exc
+        missing = [name for name in _MUST if not callable(getattr(sink, name, None))]
+        if missing:
+            raise OutputError(f"{about} has no {' and no '.join(missing)}(); see docs/plugins.md.")
+        self._sink = sink
+        sink.open()
 
     def write(self, sample: Sample) -> None:
-        """Never called."""
+        """See `Sink`."""
+        assert self._sink is not None
+        self._sink.write(sample)
 
     def close(self) -> None:
-        """Nothing to release."""
+        """See `Sink`."""
+        sink, self._sink = self._sink, None
+        if sink is not None:
+            sink.close()
 
 
 # -- the outputs of a rig ----------------------------------------------------------------------------------------------
@@ -79,7 +92,7 @@ def make_sink(settings: OutputSettings) -> Sink:
     place = _KINDS.get(settings.kind)
     if place is None:
         _check_plugin(settings)
-        return plugin_sink(settings)
+        return PluginSink(settings)
     module, name = place
     try:
         make: MakeSink = getattr(importlib.import_module(f"rhot_app.outputs.{module}"), name)  # only where it is used

@@ -19,6 +19,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from rhot_app.errors import OutputError
+from rhot_node.threads import FOREIGN, Task
 
 CLIENTS_MAX: Final = 32
 CLIENT_QUEUE: Final = 4  # messages that wait for one client
@@ -54,7 +55,7 @@ class WebServer:
         self._ending: asyncio.Event | None = None
         self._opened = threading.Event()
         self._failure: OutputError | None = None
-        self._thread: threading.Thread | None = None
+        self._task: Task | None = None
 
     @property
     def clients(self) -> int:
@@ -65,12 +66,16 @@ class WebServer:
         """Listen; raises OutputError when the port cannot be had."""
         self._opened.clear()
         self._failure = None
-        self._thread = threading.Thread(target=self._run, name="web server", daemon=True)
-        self._thread.start()
+        self._task = Task(f"serves port {self._port}", self._run)
         if not self._opened.wait(OPEN_S):
             raise OutputError(f"port {self._port} of {self._host} could not be opened within {OPEN_S:g} s.")
         if self._failure is not None:
             raise self._failure
+
+    def require_running(self) -> None:
+        """Raises OutputError when the server has ended by itself."""
+        if self._task is not None and not self._task.running:
+            raise OutputError(f"the server on port {self._port} has ended ({self._task.failure or 'unasked'}).")
 
     def broadcast(self, message: bytes) -> None:
         """Send a text message, UTF-8, to whoever is connected. Never blocks."""
@@ -85,9 +90,9 @@ class WebServer:
         if loop is not None and ending is not None:
             with contextlib.suppress(RuntimeError):
                 loop.call_soon_threadsafe(ending.set)
-        if self._thread is not None:
-            self._thread.join(OPEN_S)
-            self._thread = None
+        if self._task is not None:
+            self._task.join(OPEN_S)
+            self._task = None
 
     def _run(self) -> None:
         try:
@@ -96,6 +101,9 @@ class WebServer:
             self._failure = exc
         except OSError as exc:
             self._failure = OutputError(self._why(exc))
+        except FOREIGN as exc:
+            self._failure = OutputError(f"port {self._port} cannot be served ({type(exc).__name__}: {exc}).")
+            raise
         finally:
             self._clients = set()
             self._opened.set()

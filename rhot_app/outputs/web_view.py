@@ -78,6 +78,7 @@ class WebViewSink:
 
     def write(self, sample: Sample) -> None:
         """Send one state to the open pages."""
+        self._server.require_running()
         if self._server.clients:
             self._server.broadcast(json_message(sample))
 

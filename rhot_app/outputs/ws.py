@@ -30,6 +30,7 @@ class WebSocketSink:
 
     def write(self, sample: Sample) -> None:
         """Send one state to whoever is connected."""
+        self._server.require_running()
         if self._server.clients:
             self._server.broadcast(json_message(sample))
 

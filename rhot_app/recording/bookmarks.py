@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import fcntl
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from io import FileIO
 from pathlib import Path
 from typing import Final
 
@@ -57,17 +60,21 @@ def append_bookmark(path: Path, bookmark: Bookmark) -> None:
     data = encode_record(bookmark_record(bookmark))
     reader = LogReader(path)
     try:
-        with path.open("r+b", buffering=0) as file:
+        with FileIO(path, "r+b") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             for _ in reader:
                 pass
             end = file.seek(0, 2) - reader.torn_bytes
             file.truncate(end)
             file.seek(end)
-            if file.write(data) != len(data):
-                file.truncate(end)
-                raise RecordingError(f"{path}: no room for the bookmark.")
-            os.fsync(file.fileno())
+            try:
+                if file.write(data) != len(data):
+                    raise OSError(errno.ENOSPC, "there is no room for it")
+                os.fsync(file.fileno())
+            except OSError:
+                with contextlib.suppress(OSError):
+                    file.truncate(end)
+                raise
     except BlockingIOError as exc:
         raise RecordingError(f"{path}: is being recorded; only its engine can set a bookmark now.") from exc
     except OSError as exc:

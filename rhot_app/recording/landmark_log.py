@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import RecordingError
 from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.project import Rig, RigNode
-from rhot_app.recording.raw_log import Record, RecordKind, begun_now, encode_header, encode_record
+from rhot_app.recording.raw_log import Record, RecordKind, begun_now, encode_log
 from rhot_node.files import replacing
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import (
@@ -138,9 +138,8 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable], ti
                                   _observations(node, order, table, number)))
     try:
         with replacing(path) as file:
-            file.write(encode_header(rig, begun_now(_BEGIN_NS)))
-            for record in sorted(stated, key=lambda record: record.t_master_ns):
-                file.write(encode_record(record))
+            file.writelines(encode_log(rig, begun_now(_BEGIN_NS),
+                                       sorted(stated, key=lambda record: record.t_master_ns)))
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be written ({exc.strerror}). Choose another --out.") from exc
     return sum(len(table.times_s) for table in tables)

@@ -1,7 +1,7 @@
 """The raw log's bytes: every datagram and clock exchange as it came, with its time. docs/log.md, byte by byte.
 
-Reading and writing of files; no sockets, no threads. A reader goes on behind damage: with the next record whose
-checksum is right.
+Reading and writing of files; no sockets, no threads. A reader goes on behind damage, and behind blocks that the disk
+does not give: with the next record whose checksum is right.
 """
 
 from __future__ import annotations
@@ -9,14 +9,16 @@ from __future__ import annotations
 import argparse
 import contextlib
 import enum
+import io
 import json
+import os
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any, BinaryIO, Final, Protocol
+from typing import Any, BinaryIO, Final, Protocol, cast
 
 import msgspec
 import numpy as np
@@ -31,6 +33,7 @@ HEADER_MAX: Final = 16 << 20
 PAYLOAD_MAX: Final = 65535  # the longest UDP datagram
 
 _BLOCK = 4096  # of a disk: what one bad block destroys; each copy of the header fills whole ones
+_BUFFER = 1 << 16
 _SCAN_MAX = 1 << 20  # bytes searched at a time for the next sound record
 
 _PREFIX = struct.Struct("<8sHHI")
@@ -52,9 +55,11 @@ class RecordKind(enum.IntEnum):
     LANDMARKS = 9  # reserved
     SLICES = 10  # sent to a node, as sent
     REFUSED = 11  # JSON: datagrams of a node that were refused and are not recorded, by reason
+    END = 12  # the recording was ended in order
 
 
-_KINDS = frozenset(int(kind) for kind in RecordKind) - {RecordKind.LANDMARKS}
+_KINDS = frozenset(int(kind) for kind in RecordKind) - {RecordKind.LANDMARKS, RecordKind.END}
+_MARKS_END = "end_mark"  # in the header: whoever writes this log ends it with a record END
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,20 +87,31 @@ class Losses:
     places: int = 0
     skipped_bytes: int = 0
     header_bytes: int = 0  # of the copy of the header that is damaged
+    unreadable_bytes: int = 0  # of blocks that the disk does not give
     torn_bytes: int = 0  # at the end, of the record that was being written when the program died
+    end_missing: bool = False  # no end mark, although the log should have one
     unknown_records: int = 0  # sound, of a kind that a later version writes
 
     @property
     def damage(self) -> str:
         """What was skipped, as a clause; empty when nothing was."""
-        header = (f"one of the two copies of its header is damaged ({self.header_bytes} bytes)" if self.header_bytes
-                  else "")
-        if not self.places:
-            return header
-        places = "1 damaged place was" if self.places == 1 else f"{self.places} damaged places were"
-        records = "1 record" if self.places == 1 else f"{self.places} records"
-        skipped = f"{places} skipped ({self.skipped_bytes} bytes, at least {records})"
-        return f"{header}; {skipped}" if header else skipped
+        said = []
+        if self.unreadable_bytes:
+            said.append(f"the disk does not give {self.unreadable_bytes} bytes of it")
+        if self.header_bytes:
+            said.append(f"one of the two copies of its header is damaged ({self.header_bytes} bytes)")
+        if self.places:
+            places = "1 damaged place was" if self.places == 1 else f"{self.places} damaged places were"
+            records = "1 record" if self.places == 1 else f"{self.places} records"
+            said.append(f"{places} skipped ({self.skipped_bytes} bytes, at least {records})")
+        return "; ".join(said)
+
+    @property
+    def end(self) -> str:
+        """What of its end is missing, as a clause; empty when nothing is."""
+        if self.torn_bytes:
+            return f"its last {self.torn_bytes} bytes are torn: it was cut off while it was written or copied"
+        return "its end is missing: it is still being written, or was cut off" if self.end_missing else ""
 
 
 def begun_now(t_master_ns: int) -> dict[str, Any]:
@@ -116,12 +132,14 @@ def wall_clock_offset_ns(about: dict[str, Any], first_t_master_ns: int) -> int |
     return since_ns - at_ns if type(at_ns) is int and 0 <= at_ns <= since_ns < 2**62 else None
 
 
-def encode_header(rig: Rig, about: dict[str, Any]) -> bytes:
+def encode_header(rig: Rig, about: dict[str, Any], *, marks_end: bool = False) -> bytes:
     """The bytes that begin a log: twice the magic, the version and a JSON document with the rig and facts `about` it.
+    `marks_end`: it will end with `END`, so a reader can tell when it was cut off.
 
     Raises RecordingError when the document is too large for a reader.
     """
-    document = json.dumps({**about, "rig": json.loads(msgspec.json.encode(rig))}).encode()
+    facts = {**about, **({_MARKS_END: True} if marks_end else {}), "rig": json.loads(msgspec.json.encode(rig))}
+    document = json.dumps(facts).encode()
     document += b" " * (-(_PREFIX.size + len(document) + _CRC.size) % _BLOCK)
     if len(document) > HEADER_MAX:
         raise RecordingError(f"the rig {rig.name!r} is too large for a log: {len(document)} bytes of {HEADER_MAX}.")
@@ -141,6 +159,74 @@ def _encode(kind: int, node_id: int, t_master_ns: int, data: bytes) -> bytes:
     return body + _CRC.pack(zlib.crc32(body))
 
 
+END: Final = _encode(RecordKind.END, 0, 0, b"")
+"""The bytes that end a log."""
+
+
+def encode_log(rig: Rig, about: dict[str, Any], records: Iterable[Record]) -> Iterator[bytes]:
+    """The bytes of a whole log, a part at a time. Raises RecordingError."""
+    yield encode_header(rig, about, marks_end=True)
+    for record in records:
+        yield encode_record(record)
+    yield END
+
+
+class LogFile(io.RawIOBase):
+    """A file of which every block can be read: one that the disk does not give is zeros, and counted."""
+
+    def __init__(self, path: Path) -> None:
+        """Open it. Raises OSError, also when it is no regular file."""
+        self._file = cast(io.FileIO, open_input(path, buffering=0))
+        self._lost: dict[int, int] = {}  # bytes that a block should have, by its number
+
+    @property
+    def unreadable_bytes(self) -> int:
+        """How much the disk did not give until now."""
+        return sum(self._lost.values())
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def seekable(self) -> bool:
+        """It is."""
+        return True
+
+    def fileno(self) -> int:
+        """The file's."""
+        return self._file.fileno()
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
+        """As of any file."""
+        return self._file.seek(offset, whence)
+
+    def readinto(self, buffer: Any, /) -> int | None:
+        """As of any file. What cannot be read together is read block by block. Raises OSError where nothing tells the
+        file's length."""
+        at = self._file.tell()
+        with contextlib.suppress(OSError):
+            return self._file.readinto(buffer)
+        size = os.fstat(self.fileno()).st_size
+        block = memoryview(buffer)[:_BLOCK - at % _BLOCK]
+        try:
+            self._file.seek(at)
+            return self._file.readinto(block)
+        except OSError:
+            if not size:
+                raise
+            lost = max(0, min(len(block), size - at))
+            block[:lost] = bytes(lost)
+            number = at // _BLOCK
+            self._lost[number] = max(0, min(_BLOCK, size - number * _BLOCK))
+            self._file.seek(at + lost)
+            return lost
+
+    def close(self) -> None:
+        """Close the file. May be called twice."""
+        self._file.close()
+        super().close()
+
+
 class LogReader:
     """A log opened for reading. Iterating gives its records from the first one on, and `losses` what was left out."""
 
@@ -152,15 +238,19 @@ class LogReader:
         self.path = path
         self.losses = Losses()
         try:
-            self._file: BinaryIO = open_input(path)
+            with contextlib.ExitStack() as stack:
+                self._raw = stack.enter_context(contextlib.closing(LogFile(path)))
+                self._file = io.BufferedReader(self._raw, _BUFFER)
+                header = _read_header(self._file)
+                if header is None and rig is None:
+                    raise RecordingError(_why_no_header(self._file, path, self._raw.unreadable_bytes))
+                stack.pop_all()
         except OSError as exc:
             raise RecordingError(f"{path}: cannot be read ({exc.strerror}); name a raw log that you may read.") from exc
         try:
-            header = _read_header(self._file)
-            if header is None and rig is None:
-                raise RecordingError(_why_no_header(self._file, path))
             self._records_at, self._header_losses = (0, 0) if header is None else (header.end, header.damaged_bytes)
             self.about = {} if header is None else header.about
+            self._marks_end = self.about.pop(_MARKS_END, False) is True
             document = self.about.pop("rig", None)
             self.rig = rig if header is None and rig is not None else parse_rig(
                 json.dumps(document).encode(), f"{path}: the rig in its header")
@@ -181,24 +271,40 @@ class LogReader:
         for kind, node_id, t_master_ns, data in self._sound():
             if kind in _KINDS:
                 yield Record(RecordKind(kind), node_id, t_master_ns, data)
-            else:
+            elif kind != RecordKind.END:
                 self.losses.unknown_records += 1
 
     def sound_records(self) -> Iterator[bytes]:
-        """The bytes of every sound record, of whatever kind. Raises RecordingError as iterating does."""
+        """The bytes of every sound record, of whatever kind but `END`. Raises RecordingError as iterating does."""
         for kind, node_id, t_master_ns, data in self._sound():
-            yield _encode(kind, node_id, t_master_ns, data)
+            if kind != RecordKind.END:
+                yield _encode(kind, node_id, t_master_ns, data)
 
     def _sound(self) -> Iterator[tuple[int, int, int, bytes]]:
         """Kind, node, time and data of every sound record; `losses` counts what lies between them."""
-        file, at, sound = self._file, self._records_at, 0
         self.losses = losses = Losses(header_bytes=self._header_losses)
+        sound, losses.end_missing = 0, self._marks_end
+        try:
+            for found in self._scan(losses):
+                sound += 1
+                losses.end_missing &= found[0] != RecordKind.END
+                yield found
+        except OSError as exc:
+            raise RecordingError(f"{self.path}: cannot be read on ({exc.strerror}). Is its disk still there?") from exc
+        losses.unreadable_bytes = self._raw.unreadable_bytes
+        if losses.places and not sound:
+            raise RecordingError(f"{self.path}: no record in it can be read; {losses.damage}.")
+        if losses.damage:
+            note_loss(str(self.path), f"{self.path}: {losses.damage}.")
+
+    def _scan(self, losses: Losses) -> Iterator[tuple[int, int, int, bytes]]:
+        """The sound records in their order; `losses` counts what lies between them. Raises OSError."""
+        file, at = self._file, self._records_at
         file.seek(at)
         while head := file.read(_RECORD.size):
             found = _read_record(file, head)
             if found is not None:
                 at += _RECORD.size + len(found[3]) + _CRC.size
-                sound += 1
                 yield found
                 continue
             size = file.seek(0, 2) - at
@@ -211,10 +317,6 @@ class LogReader:
             if following is None:
                 break
             at = file.seek(following)
-        if losses.places and not sound:
-            raise RecordingError(f"{self.path}: no record in it can be read; {losses.damage}.")
-        if losses.damage:
-            note_loss(str(self.path), f"{self.path}: {losses.damage}.")
 
     def close(self) -> None:
         """Close the file. May be called twice."""
@@ -321,7 +423,10 @@ def _parse_header(file: BinaryIO, at: int) -> tuple[int, int, dict[str, Any]] | 
     return (version, len(head) + length + _CRC.size, about) if isinstance(about, dict) else None
 
 
-def _why_no_header(file: BinaryIO, path: Path) -> str:
+def _why_no_header(file: BinaryIO, path: Path, unreadable_bytes: int) -> str:
+    if unreadable_bytes:
+        return (f"{path}: the disk does not give {unreadable_bytes} bytes of its header. `rhot recover LOG --rig FILE "
+                "--out CLEAN` reads the rest with the rig that it was recorded with.")
     file.seek(0)
     head = file.read(_PREFIX.size)
     if not head:
@@ -351,7 +456,7 @@ def run(args: argparse.Namespace) -> int:
     """Write every sound record, also those of kinds that this version does not know. Raises RecordingError."""
     from rhot_app.errors import RecordingError
     from rhot_app.project import load_rig
-    from rhot_app.recording.raw_log import LogReader, encode_header
+    from rhot_app.recording.raw_log import END, LogReader, encode_header
     from rhot_node.files import replacing
 
     if args.out.exists():
@@ -360,15 +465,16 @@ def run(args: argparse.Namespace) -> int:
     with contextlib.closing(LogReader(args.path, rig)) as reader:
         try:
             with replacing(args.out) as file:
-                file.write(encode_header(reader.rig, reader.about))
+                file.write(encode_header(reader.rig, reader.about, marks_end=True))
                 count = 0
                 for data in reader.sound_records():
                     file.write(data)
                     count += 1
+                file.write(END)
         except OSError as exc:
             raise RecordingError(f"{args.out}: cannot be written ({exc.strerror}). Nothing was left of it; choose "
                                  "another --out.") from exc
     losses = reader.losses
-    torn = f" A torn record of {losses.torn_bytes} bytes at the end was left out." if losses.torn_bytes else ""
-    print(f"{args.out}: {count} record{'' if count == 1 else 's'}.{torn}")
+    end = f" Of {args.path} {losses.end}." if losses.end else ""
+    print(f"{args.out}: {count} record{'' if count == 1 else 's'}.{end}")
     return 0

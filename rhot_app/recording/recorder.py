@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import math
 import os
 import struct
-import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from io import FileIO
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
-from rhot_app.recording.raw_log import PAYLOAD_MAX, Record, RecordKind, encode_header, encode_record
+from rhot_app.recording.raw_log import END, PAYLOAD_MAX, Record, RecordKind, encode_header, encode_record
+from rhot_node.files import sync_folder
+from rhot_node.threads import Worker
 
 # -- remaining disk time -----------------------------------------------------------------------------------------------
 
@@ -66,25 +69,27 @@ SYNC_S = 1.0
 """The log is flushed to the disk this often: what a power cut may cost."""
 
 _FLUSH_S = 0.2
+_BATCH_S = 0.02  # one write for many records, and the lock of the interpreter left alone
 
 
 class Recorder:
-    """One log being written. `put` never blocks and never raises; `failure` says why recording ended early."""
+    """One log being written. `put` never blocks and never raises; `failure` says why recording ended early, `notice`
+    what the operator should know while it goes on."""
 
     def __init__(self, path: Path, rig: Rig, about: dict[str, Any] | None = None) -> None:
         """Create the file. Raises RecordingError when it exists already or cannot be written; no file is left then."""
         self.path = path
         self.bytes_written = 0
-        self.failure = ""
+        self.failure = self.notice = ""
         self.disk = DiskWatch(path.parent)
         self._began_s = time.monotonic()
         self._queue: SimpleQueue[Record] = SimpleQueue()
         self._missed = 0
         self._synced_bytes = 0
-        self._ending = threading.Event()
-        header = encode_header(rig, about or {})
+        self._synced_s = time.monotonic()
+        header = encode_header(rig, about or {}, marks_end=True)
         try:
-            self._file = path.open("xb", buffering=0)
+            self._file = FileIO(path, "xb")
         except FileExistsError as exc:
             raise RecordingError(f"{path}: exists already; a log is never written over. Choose another name.") from exc
         except OSError as exc:
@@ -95,17 +100,19 @@ class Recorder:
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # nobody appends to it meanwhile
             self._write(header)
         except OSError as exc:
-            self._file.close()
-            path.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                self._file.close()
+            with contextlib.suppress(OSError):
+                path.unlink()
             raise RecordingError(f"{path}: cannot be written ({exc.strerror}); make room, or choose another "
                                  "place.") from exc
-        self._thread = threading.Thread(target=self._run, name="record", daemon=True)
-        self._thread.start()
+        self._worker = Worker("writes the log", self._turn, begin=lambda: sync_folder(path), end=self._finish)
+        self._worker.start()
 
     @property
     def recording(self) -> bool:
         """Whether records are still taken."""
-        return not self.failure and not self._ending.is_set()
+        return not self.failure and not self._worker.ending.is_set()
 
     @property
     def seconds(self) -> float:
@@ -139,19 +146,42 @@ class Recorder:
             self._fail(exc)
 
     def close(self) -> None:
-        """Write what waits, flush it to the disk and close the file. May be called twice."""
-        self._ending.set()
-        self._thread.join()
-        self._file.close()
+        """Write what waits and the end mark, flush it to the disk and close the file. May be called twice."""
+        self._worker.close()
+        try:
+            self._file.close()
+        except OSError as exc:  # some network file systems write only now
+            self._fail(exc)
 
     def discard(self) -> None:
         """Close the file and remove it: the recording was refused."""
         self.close()
-        self.path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            self.path.unlink()
 
-    def _fail(self, exc: OSError) -> None:
-        self.failure = (f"Recording to {self.path} has stopped: {exc.strerror}. Tracking goes on. "
-                        "Make room or choose another disk, then start a new recording.")
+    def _fail(self, exc: Exception) -> None:
+        if not self.failure:
+            why = (exc.strerror if isinstance(exc, OSError) else "") or repr(exc)
+            self.failure = (f"Recording to {self.path} has stopped: {why}. Tracking goes on. "
+                            "Make room or choose another disk, then start a new recording.")
+
+    def _look_after(self) -> None:
+        """Notice when somebody removes or moves the file, which a program that writes it does not feel."""
+        try:
+            now = os.fstat(self._file.fileno())
+            self.notice = "" if self._is_at_path(now) else (
+                f"The recording is no longer at {self.path}: its folder or the file was moved. It goes on, in the file "
+                "where it is now.")
+            if not now.st_nlink:
+                raise FileNotFoundError(errno.ENOENT, "the file or its folder was removed, and the recording with it")
+        except OSError as exc:
+            self._fail(exc)
+
+    def _is_at_path(self, status: os.stat_result) -> bool:
+        try:
+            return os.path.samestat(self.path.stat(), status)
+        except OSError:
+            return False
 
     def _sync(self) -> None:
         """Have the disk take what was written; only this thread waits for it."""
@@ -161,8 +191,7 @@ class Recorder:
         try:
             os.fsync(self._file.fileno())
         except OSError as exc:
-            if not self.failure:
-                self._fail(exc)
+            self._fail(exc)
 
     def _write(self, data: bytes) -> None:
         """Write all bytes; a raw file may take only a part of them at a time."""
@@ -172,15 +201,28 @@ class Recorder:
             self.bytes_written += written
             view = view[written:]
 
-    def _run(self) -> None:
-        due_s = time.monotonic() + SYNC_S
-        while not self._ending.is_set() and not self.failure:
+    def _turn(self) -> None:
+        if self.failure:
+            self._worker.ending.wait()
+            return
+        try:
             self.step(_FLUSH_S)
-            if time.monotonic() >= due_s:
-                self._sync()
-                self.disk.look(self.bytes_written, time.monotonic())
-                due_s = time.monotonic() + SYNC_S
-            time.sleep(0.02)  # gather a batch: one write for many records, and the lock of the interpreter left alone
+        except Exception as exc:  # what waited is lost: nobody must believe that it is written
+            self._fail(exc)
+            raise
+        self._look_after()
+        if time.monotonic() >= self._synced_s + SYNC_S:
+            self._sync()
+            self.disk.look(self.bytes_written, time.monotonic())
+            self._synced_s = time.monotonic()
+        self._worker.ending.wait(_BATCH_S)
+
+    def _finish(self) -> None:
         while not self.failure and self._queue.qsize():
             self.step(0.0)
+        if not self.failure:
+            try:
+                self._write(END)
+            except OSError as exc:
+                self._fail(exc)
         self._sync()

@@ -20,10 +20,12 @@ from rhot_app.sources.key_exchange import KeyExchange
 from rhot_app.sources.lost_nodes import LostNodes
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.poses.followed import FollowedObjects
+from rhot_app.sources.poses.line_inputs import why
 from rhot_app.sources.receiver import DatagramSink, Deliver, NodeReceiver, open_data_socket
 from rhot_node.clock import ANCILLARY_SIZE, KernelTime, ask_for_times
-from rhot_node.errors import WireError
+from rhot_node.errors import WireError, printable
 from rhot_node.keys import KeyPair
+from rhot_node.threads import Worker
 from rhot_node.wire.codec import encode, node_of
 from rhot_node.wire.messages import ClockReply, Message, Start, StartEntry, Stop
 
@@ -62,17 +64,18 @@ class NodeLinks:
                          for link, port in zip(links, data_ports, strict=True) if not link.node.text_datagrams}
         self._broadcast = (rig.broadcast.address, rig.broadcast.port)
         self._addresses: dict[int, str | None] = {}
+        self._named: list[NodeLink] = []  # those whose address is a name
         self._lost = LostNodes(list(self._links.values()), rig.broadcast.port, time.monotonic_ns())
         self._due_ns = dict.fromkeys(self._links, 0)
         self._sequence = 0
         self._lock = threading.Lock()
-        self._ending = threading.Event()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         self._socket.bind(("", 0))
         ask_for_times(self._socket)
         self._kernel_time = KernelTime()
-        self._thread = threading.Thread(target=self._run, name="links", daemon=True)
+        self._worker = Worker("commands the nodes", lambda: self.step(0.02))
+        self._resolver = Worker("looks up the nodes' addresses", self._resolve, hang_s=None)
 
     def start(self, session: int) -> None:
         """Tell every node to stream `session`."""
@@ -138,26 +141,21 @@ class NodeLinks:
 
     def start_thread(self) -> None:
         """Find the addresses of named nodes and run `step` until `close`."""
-        self._thread.start()
+        self._worker.start()
         for link in self._links.values():
             with contextlib.suppress(ValueError):
                 self._addresses[link.node.node_id] = str(ipaddress.ip_address(link.node.address))
-        named = [link for link in self._links.values() if link.node.node_id not in self._addresses]
-        if named:
-            threading.Thread(target=self._resolve, args=(named,), name="resolve", daemon=True).start()
+        self._named = [link for link in self._links.values() if link.node.node_id not in self._addresses]
+        if self._named:
+            self._resolver.start()
 
     def close(self) -> None:
         """End the threads and close the socket. May be called twice."""
-        self._ending.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        self._resolver.close(0.0)  # the system may take its time over a name
+        self._worker.close()
         self._lost.close()
         self._keys.close()
         self._socket.close()
-
-    def _run(self) -> None:
-        while not self._ending.is_set():
-            self.step(0.02)
 
     def _receive(self, flags: int) -> None:
         data, ancillary, _, sender = self._socket.recvmsg(_DATAGRAM_MAX, ANCILLARY_SIZE, flags)
@@ -253,14 +251,17 @@ class NodeLinks:
         if self._tap is not None:
             self._tap.put(kind, node_id, t_master_ns, data)
 
-    def _resolve(self, links: list[NodeLink]) -> None:
+    def _resolve(self) -> None:
         """Look up named nodes, again and again: a node that appears later or moves is found."""
-        while not self._ending.is_set():
-            for link in links:
-                with contextlib.suppress(OSError):
-                    self._addresses[link.node.node_id] = socket.gethostbyname(link.node.address)
-            found = all(self._addresses.get(link.node.node_id) for link in links)
-            self._ending.wait(_RESOLVE_S if not found else 10 * _RESOLVE_S)
+        for link in self._named:
+            try:
+                self._addresses[link.node.node_id] = socket.gethostbyname(link.node.address)
+                link.address_problem = ""
+            except (OSError, ValueError) as exc:  # ValueError: a name that none can have
+                link.address_problem = (f"Its address {printable(link.node.address, 100)} is not found ({why(exc)}). "
+                                        "Correct it in the rig, or switch the node on.")
+        found = all(self._addresses.get(link.node.node_id) for link in self._named)
+        self._resolver.ending.wait(_RESOLVE_S if not found else 10 * _RESOLVE_S)
 
 
 # -- live nodes --------------------------------------------------------------------------------------------------------

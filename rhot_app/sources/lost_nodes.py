@@ -7,6 +7,7 @@ datagrams.
 
 from __future__ import annotations
 
+import functools
 import logging
 import threading
 from collections import deque
@@ -18,6 +19,7 @@ from rhot_app.project import RigNode
 from rhot_app.sources.discovery import Browse, FindSocket, Found, Sighting, ZeroconfBrowser
 from rhot_app.sources.node_link import NodeLink
 from rhot_node.network.presence import is_loopback
+from rhot_node.threads import Task
 
 LOST_NS = 2_000_000_000
 """A node that has answered nothing for so long is looked for."""
@@ -143,7 +145,7 @@ class _Browser:
 
     def __init__(self, browse: Browse, found: Found) -> None:
         self._ending = threading.Event()
-        threading.Thread(target=self._run, args=(browse, found), name="browse", daemon=True).start()
+        self._task = Task("looks for nodes by zeroconf", functools.partial(self._run, browse, found))
 
     def close(self) -> None:
         """End it, soon."""

@@ -40,6 +40,7 @@ class NodeLink:
         self.wanted = 0  # the session we told it to stream; 0: none
         self.clock_changes = 0  # boots and steps: what the tracker knows of this node's times is void
         self.refused_replies = 0  # on the command port: forged, repeated or to no question of ours
+        self.address_problem = ""  # why nobody can tell where the node is
         self.turned_away = False  # the node lets no encrypted connection of ours in: it does not know us
         self.key_name = ""  # of the link whose key we have
         self.last_reply_ns: int | None = None

@@ -20,6 +20,7 @@ from rhot_app.sources.node_link import CLOCK_REPLY, NodeLink
 from rhot_app.sources.validation import DatagramValidator, Verified
 from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.clock import ANCILLARY_SIZE, KernelTime, ask_for_times
+from rhot_node.threads import Worker
 
 # -- thread priority ---------------------------------------------------------------------------------------------------
 
@@ -158,8 +159,7 @@ class NodeReceiver:
         self.skipped = 0  # verified and counted, but not tracked because newer ones had come already
         self._socket = sock
         self._kernel_time = KernelTime()
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=f"receive {name}", daemon=True)
+        self._worker = Worker(f"receives from {name}", self._turn, begin=hurry_this_thread)
 
     @property
     def overflowed(self) -> int:
@@ -195,19 +195,16 @@ class NodeReceiver:
 
     def start(self) -> None:
         """Receive in a thread of its own."""
-        self._thread.start()
+        self._worker.start()
 
     def close(self) -> None:
         """End the thread and close the port. May be called twice."""
-        self._ending.set()
+        self._worker.ending.set()
         with contextlib.suppress(OSError):  # "not connected", which it never is; Linux ends a blocked read all the same
             self._socket.shutdown(socket.SHUT_RD)
-        if self._thread.is_alive():
-            self._thread.join()
+        self._worker.close()
         self._socket.close()
 
-    def _run(self) -> None:
-        hurry_this_thread()
-        while not self._ending.is_set():
-            self.step()
-            share_interpreter()
+    def _turn(self) -> None:
+        self.step()
+        share_interpreter()

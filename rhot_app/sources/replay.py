@@ -21,6 +21,7 @@ from rhot_app.sources.receiver import Deliver, NodeReceiver, to_nobody
 from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.errors import WireError
 from rhot_node.files import decode_message
+from rhot_node.threads import FOREIGN, Task
 from rhot_node.wire.codec import decode_verified
 from rhot_node.wire.messages import ClockReply, ClockRequest, Slices, Start
 
@@ -120,7 +121,7 @@ class LogReplay:
         self.links = self._door.links
         self._notice = ""
         self._ending = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._task: Task | None = None
 
     @property
     def changes(self) -> int:
@@ -148,14 +149,13 @@ class LogReplay:
         self.over = False
         self._ending.clear()
         self._door.rewind()
-        self._thread = threading.Thread(target=self._run, name="replay", daemon=True)
-        self._thread.start()
+        self._task = Task("replays the log", self._run)
 
     def stop(self) -> None:
         """End the replay."""
         self._ending.set()
-        if self._thread is not None:
-            self._thread.join()
+        if self._task is not None:
+            self._task.join()
 
     def search(self, request: SliceRequest) -> None:
         """Nobody is asked."""
@@ -174,13 +174,16 @@ class LogReplay:
             with contextlib.closing(LogReader(self._path)) as reader:
                 if not self._play(reader):
                     return
-            torn, damage = reader.losses.torn_bytes, reader.losses.damage
-            self._notice = "The log is over; Start replays it again." if not torn else (
-                f"The log is over; its last {torn} bytes are torn (the program died while writing).")
+            end, damage = reader.losses.end, reader.losses.damage
+            self._notice = f"The log is over; {end or 'Start replays it again'}."
             self._notice += f" It is damaged: {damage}." if damage else ""
         except RecordingError as exc:
             self._notice = self.failure = str(exc)
-        self.over = True
+        except FOREIGN as exc:
+            self._notice = self.failure = f"The replay failed ({type(exc).__name__}: {exc}). Report this with the log."
+            raise
+        finally:
+            self.over = not self._ending.is_set()
 
     def _play(self, records: Iterable[Record]) -> bool:
         """Deliver all frames in their time; False when told to end before."""

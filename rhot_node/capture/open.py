@@ -18,6 +18,7 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.errors import CameraError, NodeError, PluginError
 from rhot_node.plugins import PREFIX, about_plugin, load_plugin
+from rhot_node.threads import FOREIGN
 
 VIDEO4LINUX_MAJOR = 81  # Linux, Documentation/admin-guide/devices.txt
 
@@ -121,7 +122,7 @@ class PluginCamera:
             raise
         except PluginError as exc:
             raise CameraError(f"camera {PREFIX}{name}: {exc}") from exc
-        except Exception as exc:
+        except FOREIGN as exc:
             raise self._failed("could not open its camera", exc) from exc
 
     @property
@@ -135,7 +136,7 @@ class PluginCamera:
             frame = self._camera.read(timeout_s)
         except (CameraError, EndOfRecording):
             raise
-        except Exception as exc:
+        except FOREIGN as exc:
             raise self._failed("failed over a frame", exc) from exc
         if frame is not None and (not isinstance(frame, Frame) or frame.image.size != self._size):
             raise CameraError(f"camera {PREFIX}{self._name}: {about_plugin(GROUP, self._name)} gave something else "
@@ -145,16 +146,16 @@ class PluginCamera:
     def report(self) -> dict[str, Any]:
         """What the camera says of itself, when it does."""
         if isinstance(self._camera, Reporting):
-            with contextlib.suppress(Exception):
+            with contextlib.suppress(*FOREIGN):
                 return dict(self._camera.report())
         return {}
 
     def close(self) -> None:
         """Release the camera."""
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(*FOREIGN):
             self._camera.close()
 
-    def _failed(self, what: str, exc: Exception) -> CameraError:
+    def _failed(self, what: str, exc: BaseException) -> CameraError:
         if isinstance(exc, NodeError):
             return CameraError(f"camera {PREFIX}{self._name}: {exc}")
         return CameraError(f"camera {PREFIX}{self._name}: {about_plugin(GROUP, self._name)} {what} "

@@ -19,6 +19,7 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, from_bgr
 from rhot_node.errors import CameraError
+from rhot_node.threads import Task
 
 log = logging.getLogger(__name__)
 
@@ -161,8 +162,7 @@ class LatestGrabber:
         self._newest: Grabbed | None = None
         self._failed = False
         self._ending = False
-        self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
-        self._thread.start()
+        self._task = Task("reads the camera", self._run)
 
     @property
     def failed(self) -> bool:
@@ -179,19 +179,19 @@ class LatestGrabber:
     def close(self) -> None:
         """End the thread; when the device does not return from its read, leave it to end by itself."""
         self._ending = True
-        self._thread.join(timeout=2.0)
+        self._task.join(2.0)
 
     def _run(self) -> None:
         number = 0
-        while not self._ending:
-            image = self._grab()
-            t_return_node_ns = self._clock.now_ns()
-            with self._changed:
-                if image is None:
-                    self._failed = True
+        try:
+            while not self._ending and (image := self._grab()) is not None:
+                grabbed = Grabbed(image, number, self._clock.now_ns())
+                with self._changed:
+                    self._newest = grabbed
                     self._changed.notify_all()
-                    break
-                self._newest = Grabbed(image, number, t_return_node_ns)
+                number += 1
+        finally:
+            with self._changed:
+                self._failed = not self._ending
                 self._changed.notify_all()
-            number += 1
-        self._release()
+            self._release()

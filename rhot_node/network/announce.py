@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import logging
 import socket
-import threading
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
@@ -20,6 +19,7 @@ from rhot_node.network.presence import (
     own_interfaces,
     properties_of,
 )
+from rhot_node.threads import FOREIGN, Worker
 
 LOOK_S = 5.0
 """How soon a change is announced: of the trust, of the name, or of the machine's addresses."""
@@ -54,8 +54,7 @@ class Announcer:
         self._announced: Announced | None = None
         self._said: tuple[Presence, tuple[str, ...]] | None = None
         self._trouble = ""
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="announce", daemon=True)
+        self._worker = Worker("announces the node", self._turn, end=self._withdraw, hang_s=None)
 
     def step(self) -> None:
         """Announce the node if it, or where it is, has changed. Never raises."""
@@ -67,7 +66,7 @@ class Announcer:
             if now[1]:
                 self._announced = self._announce(*now)
             self._said, self._trouble = now, ""
-        except Exception as exc:  # the library's, the network's: whatever it is, the node has other things to do
+        except FOREIGN as exc:  # the library's, the network's: whatever it is, the node has other things to do
             if str(exc) != self._trouble:
                 self._trouble = str(exc)
                 log.warning("the node is not announced by zeroconf (%s: %s); it is found by broadcast and by its "
@@ -75,22 +74,15 @@ class Announcer:
 
     def start(self) -> None:
         """Announce in a thread of its own."""
-        self._thread.start()
+        self._worker.start()
 
     def close(self) -> None:
         """Say goodbye. May be called twice, and before `start`."""
-        self._ending.set()
-        if self._thread.is_alive():
-            self._thread.join(_END_S)
+        self._worker.close(_END_S)
 
-    def _run(self) -> None:
-        while not self._ending.is_set():
-            self.step()
-            self._ending.wait(LOOK_S)
-        try:
-            self._withdraw()
-        except Exception as exc:
-            log.debug("goodbye: %s", exc)
+    def _turn(self) -> None:
+        self.step()
+        self._worker.ending.wait(LOOK_S)
 
     def _withdraw(self) -> None:
         announced, self._announced, self._said = self._announced, None, None

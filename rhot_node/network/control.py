@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import threading
 import time
 
 import msgspec
@@ -24,6 +23,7 @@ from rhot_node.network.pairing import REQUEST_MAX as STRANGERS_REQUEST_MAX
 from rhot_node.network.pairing import Reception
 from rhot_node.network.pictures import PictureBox, encode_preview
 from rhot_node.network.requests import Responder
+from rhot_node.threads import Worker
 
 log = logging.getLogger(__name__)
 
@@ -31,6 +31,7 @@ REQUEST_MAX = 1 << 20  # bytes; the longest honest request is a marker set
 PREVIEWS_QUEUED = 2  # a slow viewer misses pictures instead of piling them up
 NOT_PAIRED = b'{"ok": false, "error": "this master is not paired with the node any more."}'
 _REBIND_S = 0.02
+_HANG_S = 5.0  # a request for a still waits two seconds for a frame
 
 
 class ControlServer:
@@ -44,8 +45,7 @@ class ControlServer:
         self._address = settings.bind_address
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
-        self._ending = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._worker: Worker | None = None
         self._subscribed = 0
         self._closed = False
         self.pictures = PictureBox(settings.preview_hz, self.wake)
@@ -69,15 +69,16 @@ class ControlServer:
 
     def start(self, responder: Responder, reception: Reception) -> None:
         """Serve both in a thread of its own until `close`."""
-        self._thread = threading.Thread(target=self._run, args=(responder, reception), name="control", daemon=True)
-        self._thread.start()
+        self._worker = Worker("answers masters' requests", lambda: self.step(responder, reception, 1.0),
+                              hang_s=_HANG_S)
+        self._worker.start()
 
     def close(self) -> None:
         """End the thread and close the ports. May be called twice."""
-        self._ending.set()
-        self.wake()
-        if self._thread is not None:
-            self._thread.join()
+        if self._worker is not None:
+            self._worker.ending.set()
+            self.wake()
+            self._worker.close()
         if not self._closed:
             self._closed = True
             self._context.destroy(linger=0)
@@ -121,10 +122,6 @@ class ControlServer:
                       "preview_height": preview.height}
             self._previews.send_multipart([msgspec.json.encode(header), preview.data])
 
-    def _run(self, responder: Responder, reception: Reception) -> None:
-        while not self._ending.is_set():
-            self.step(responder, reception, 1.0)
-
     def _reopen(self, responder: Responder, trust: NodeTrust) -> None:
         """The keys have changed: end every connection that the old ones let in, and begin anew on the same ports."""
         log.warning("the keys have changed: all connections are closed, %d masters are paired", len(trust.masters))
@@ -133,13 +130,13 @@ class ControlServer:
         self._previews.close()
         self._subscribed = 0
         self.pictures.wanted = False
-        while not self._ending.is_set():
+        while self._worker is None or not self._worker.ending.is_set():
             try:
                 self._open_guarded(self.control_port, self.preview_port)
                 return
             except LinkError as exc:  # libzmq frees a closed port a moment later
                 log.debug("%s", exc)
-                self._ending.wait(_REBIND_S)
+                time.sleep(_REBIND_S)
 
     def _take_subscription(self, message: bytes) -> None:
         if message[:1] == b"\x01":

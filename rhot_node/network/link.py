@@ -8,7 +8,6 @@ import ipaddress
 import logging
 import select
 import socket
-import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable
@@ -18,6 +17,7 @@ from rhot_node.config import NodeSettings
 from rhot_node.errors import LinkError, WireError
 from rhot_node.network.presence import Presence
 from rhot_node.network.session import LinkKeys, Sessions, Stream
+from rhot_node.threads import Worker
 from rhot_node.wire.codec import Seal, asks_who_is_there, decode, encode
 from rhot_node.wire.messages import (
     ClockReply,
@@ -61,8 +61,7 @@ class UdpLink:
         self._boot_id = boot_id
         self._state = state
         self._keys = keys
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="link", daemon=True)
+        self._worker = Worker("answers masters' datagrams", lambda: self.step(0.1))
         self._socket = _open(settings.bind_address, settings.udp_port, "udp_port", shared=False)
         self._sockets = {self._socket.fileno(): (self._socket, KernelTime())}
         if settings.broadcast_port is not None:
@@ -108,19 +107,13 @@ class UdpLink:
 
     def start(self) -> None:
         """Answer in a thread of its own until `close`."""
-        self._thread.start()
+        self._worker.start()
 
     def close(self) -> None:
         """End the thread and close the ports. May be called twice."""
-        self._ending.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        self._worker.close()
         for sock, _ in self._sockets.values():
             sock.close()
-
-    def _run(self) -> None:
-        while not self._ending.is_set():
-            self.step(0.1)
 
     def take(self, data: bytes, sender: tuple[str, int], t_receive_host_ns: int) -> None:
         """Act upon one datagram that the kernel received from `sender` at `t_receive_host_ns`; whatever it is, nothing

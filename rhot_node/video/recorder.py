@@ -7,6 +7,7 @@ waits is dropped and counted: the frame loop never waits for a video.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import logging
 import os
@@ -24,6 +25,7 @@ from rhot_node.capture.camera import Frame
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import NodeError, VideoError
 from rhot_node.files import open_input, read_document, write_document
+from rhot_node.threads import Task
 from rhot_node.video.avi import BYTES_MAX, Stamp, append_picture, begin_video, encode_picture, finish_video
 
 log = logging.getLogger(__name__)
@@ -89,8 +91,7 @@ class VideoRecorder:
         self._current: _Take | None = None
         self._takes: dict[str, _Take] = {}  # of this run of the node
         self._mending = {path.stem for path in folder.glob("*.avi") if not path.with_suffix(".json").exists()}
-        self._mender = threading.Thread(target=self._mend, args=(sorted(self._mending),), name="mend", daemon=True)
-        self._mender.start()
+        self._mender = Task("mends videos", functools.partial(self._mend, sorted(self._mending)))
 
     def offer(self, frame: Frame) -> None:
         """Copy the frame for the video, if there is one; else cost nothing."""
@@ -203,8 +204,7 @@ class _Take:
         self._message = ""
         self._heard_s = time.monotonic()
         self._look_s = 0.0
-        self._thread = threading.Thread(target=self._run, name="video", daemon=True)
-        self._thread.start()
+        self._task = Task("writes the video", self._run)
 
     @property
     def info(self) -> VideoInfo:
@@ -239,7 +239,7 @@ class _Take:
 
     def join(self) -> None:
         """Wait until the video is whole."""
-        self._thread.join()
+        self._task.join()
 
     def _run(self) -> None:
         _step_back()

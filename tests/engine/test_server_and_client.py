@@ -11,7 +11,7 @@ from fake_tracker import FakeTracker
 from patience import PATIENCE_MS, PATIENCE_S, eventually, settled
 
 from rhot_app.engine import client as engine_client
-from rhot_app.engine import node_control
+from rhot_app.engine import core, node_control
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.core import Engine
 from rhot_app.engine.directory import open_directory
@@ -25,6 +25,7 @@ from rhot_app.recording.video import video_name
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.links import UdpNodes
 from rhot_app.state import HandState
+from rhot_node.threads import Task
 from rhot_node.wire.messages import NodeState
 
 
@@ -187,6 +188,47 @@ def test_rig_travels_and_is_validated(client: EngineClient, tmp_path: Path, benc
     assert bench.engine.rig.name == "another"
     assert client.command("save_rig", path=str(tmp_path / "rig.json"))["path"] == str(tmp_path / "rig.json")
     assert load_rig(tmp_path / "rig.json") == bench.engine.rig
+
+
+class SlowTracker(FakeTracker):
+    """Takes as long to make as the code takes to compile."""
+
+    compiled = threading.Event()
+
+    def __init__(self, rig: Rig) -> None:
+        super().__init__(rig)
+        if rig.name == "slow":
+            assert self.compiled.wait(PATIENCE_S)
+
+
+def test_status_and_commands_go_on_while_a_rigs_tracker_is_compiled(
+        rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(core, "PREPARING_S", 0.05)
+    SlowTracker.compiled.clear()
+    bench = Bench(rig, tmp_path / "slow", SlowTracker)
+    try:
+        with EngineClient(tmp_path / "slow") as client, EngineClient(tmp_path / "slow") as changer:
+            slow = msgspec.to_builtins(msgspec.structs.replace(rig, name="slow"))
+            change = threading.Thread(target=lambda: changer.command("set_rig", timeout_s=PATIENCE_S, document=slow))
+            change.start()
+            eventually(lambda: any("prepared" in one.text for one in client.status.advice) if client.poll(0.05)
+                       and client.status else False)
+            client.command("start")
+            assert status_when(client, lambda status: status.running).rig_name == rig.name
+            assert settled(lambda: change.is_alive() and (client.poll(0.0) or client.connected))
+            SlowTracker.compiled.set()
+            change.join(PATIENCE_S)
+            assert status_when(client, lambda status: status.rig_name == "slow").running
+    finally:
+        SlowTracker.compiled.set()
+        bench.close()
+
+
+def test_what_fails_in_a_thread_of_the_engine_is_told(bench: Bench, client: EngineClient) -> None:
+    task = Task("does nothing well", lambda: 1 // 0)
+    status = status_when(client, lambda status: any("does nothing well" in one.text for one in status.advice))
+    assert any("ZeroDivisionError" in one.text and one.level == "error" for one in status.advice)
+    task.join()
 
 
 def test_recording_by_command(client: EngineClient, tmp_path: Path) -> None:

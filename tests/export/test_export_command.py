@@ -134,7 +134,7 @@ def test_a_torn_log_is_exported_as_far_as_it_can_be_read(log: Path, tmp_path: Pa
     (tmp_path / "torn.rhotlog").write_bytes(whole[:len(whole) * 2 // 3])
     assert main(["export", str(tmp_path / "torn.rhotlog"), "--format", "csv"]) == 3
     said = capsys.readouterr()
-    assert "torn; what could be read was exported" in said.err
+    assert "torn" in said.err
     assert 30 < len(pandas.read_csv(tmp_path / "torn.csv")) < 60
 
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
 from node_process import Node, write_settings
+from patience import eventually
 from shipped_markers import LANDMARKS21, RHOT6
 
+from rhot_node import plugins
 from rhot_node.capture.camera import Frame
 from rhot_node.capture.open import PluginCamera, open_camera
 from rhot_node.clock import NodeClock
@@ -22,7 +26,7 @@ from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet
 from rhot_node.plugins import DetectorChoice, PluginDetector, plugin_names
 from rhot_node.warm_up import warm_up_image
-from rhot_node.wire.messages import MarkerFlag
+from rhot_node.wire.messages import MarkerFlag, NodeState
 
 PAGE = (Path(__file__).parents[2] / "docs" / "plugins.md").read_text()
 SETTINGS = CameraSettings(fps=200.0)
@@ -163,6 +167,92 @@ def test_a_detector_that_fails_states_all_as_lost(broken: None, name: str, sente
     found = detector.detect(warm_up_image(settings("fast").markers, (64, 48)))
     assert len(found) == 6 and all(one.flags == MarkerFlag.LOST for one in found)
     assert sentence in choice.troubles()[0].text
+
+
+HANGING = """
+import time
+
+class Hangs:
+    def __init__(self, markers):
+        self.count = len(markers.markers)
+    def detect(self, image):
+        time.sleep(3600)
+    def reset(self):
+        pass
+
+class Exits(Hangs):
+    def detect(self, image):
+        raise SystemExit(0)
+
+class Camera:
+    def __init__(self, spec, settings, clock):
+        self.size, self.spec = (settings.width, settings.height), spec
+    def read(self, timeout_s):
+        if self.spec == "hangs":
+            time.sleep(3600)
+        raise SystemExit(0)
+    def close(self):
+        pass
+"""
+
+
+@pytest.fixture
+def hanging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package whose plug-ins never come back, or end the program."""
+    folder = tmp_path / "hanging"
+    install(folder, "rhot_hanging", HANGING, "[rhot.detectors]\nhangs = rhot_hanging:Hangs\n"
+            "exits = rhot_hanging:Exits\n[rhot.cameras]\nstubborn = rhot_hanging:Camera\n")
+    monkeypatch.syspath_prepend(str(folder))
+    return folder
+
+
+def test_a_detector_that_hangs_is_given_up_and_another_one_takes_its_place(
+        hanging: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plugins, "DETECT_S", 0.05)
+    choice = DetectorChoice(lambda settings: Fallback())
+    detector = choice.make(settings("plug:hangs"))
+    image = warm_up_image(settings("fast").markers, (64, 48))
+    assert all(one.flags == MarkerFlag.LOST for one in detector.detect(image))
+    assert detector.detect(image) == ()
+    detector.reset()
+    (check,) = choice.troubles()
+    assert "'hangs'" in check.text and "hangs (no answer within" in check.text and "fast detector works" in check.text
+
+
+def test_a_plug_in_that_exits_ends_nothing(hanging: Path) -> None:
+    choice = DetectorChoice(lambda settings: Fallback())
+    found = choice.make(settings("plug:exits")).detect(warm_up_image(settings("fast").markers, (64, 48)))
+    assert len(found) == 6 and "SystemExit" in choice.troubles()[0].text
+    with pytest.raises(CameraError, match="SystemExit"):
+        open_camera("plug:stubborn:exits", SETTINGS, NodeClock()).read(0.1)
+
+
+@pytest.mark.parametrize(("detector", "camera", "words"), [
+    ("plug:hangs", "plug:grey:60", ("hangs", "fast detector works")),
+    ("plug:exits", "plug:grey:60", ("SystemExit",)),
+    ("fast", "plug:stubborn:hangs", ("reads the camera has not come round",)),
+    ("fast", "plug:stubborn:exits", ("SystemExit",))])
+def test_a_node_names_what_hangs_and_answers_on(example: Path, hanging: Path, tmp_path: Path, detector: str,
+                                                camera: str, words: tuple[str, ...]) -> None:
+    path = write_settings(tmp_path, detector=detector)
+    environment = f"{example}{os.pathsep}{hanging}"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", environment)
+        node = Node(path, camera)
+    try:
+        node.start(7)
+
+        def state() -> dict[str, Any]:
+            return json.loads(node.ask(request="state")[0])
+
+        eventually(lambda: all(word in json.dumps(state()) for word in words), told=state)
+        if camera == "plug:grey:60":
+            assert node.observations(3), "it goes on"
+        else:
+            node.wait_for(NodeState.FAULT, 7)
+    finally:
+        node.process.kill()
+        node.end()
 
 
 @pytest.mark.parametrize("detector", ["slow", "plug:", "plug:a b", ""])

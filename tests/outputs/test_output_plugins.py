@@ -59,6 +59,7 @@ def test_the_example_is_installed_and_gets_every_state(tmp_path: Path, rig: Rig)
 def broken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A package of broken outputs on the path."""
     (tmp_path / "rhot_broken_outputs.py").write_text('''
+import time
 from rhot_app.errors import OutputError
 
 def raises(settings):
@@ -69,6 +70,22 @@ def refuses(settings):
 
 def poor(settings):
     return object()
+
+def exits(settings):
+    raise SystemExit(0)
+
+def hangs(settings):
+    time.sleep(3600)
+
+class leaves:
+    def __init__(self, settings):
+        pass
+    def open(self):
+        pass
+    def write(self, sample):
+        raise SystemExit(3)
+    def close(self):
+        raise SystemExit(4)
 
 class late:
     def __init__(self, settings):
@@ -84,7 +101,8 @@ class late:
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: rhot-broken-outputs\nVersion: 2.0\n")
     (info / "entry_points.txt").write_text("[rhot.outputs]\n" + "".join(
-        f"{name} = rhot_broken_outputs:{name}\n" for name in ("raises", "refuses", "poor", "late"))
+        f"{name} = rhot_broken_outputs:{name}\n" for name in ("raises", "refuses", "poor", "late", "exits", "hangs",
+                                                           "leaves"))
         + "missing = rhot_nowhere:thing\n")
     monkeypatch.syspath_prepend(str(tmp_path))
 
@@ -92,7 +110,8 @@ class late:
 @pytest.mark.parametrize(("name", "sentence"), [
     ("raises", "the plug-in 'raises' of rhot-broken-outputs 2.0 failed to begin (ZeroDivisionError: nothing there)"),
     ("poor", "has no open and no write and no close()"), ("missing", "cannot be loaded (ModuleNotFoundError"),
-    ("refuses", "give me a colour."), ("late", "it failed (KeyError: 'thumb')")])
+    ("refuses", "give me a colour."), ("late", "it failed (KeyError: 'thumb')"), ("exits", "SystemExit"),
+    ("leaves", "it failed (SystemExit: 3)"), ("hangs", "it has not opened for")])
 def test_a_broken_output_is_a_sentence_and_others_go_on(broken: None, stream: Callable[..., Stream], name: str,
                                                         sentence: str, tmp_path: Path) -> None:
     running = stream(name, "osc:127.0.0.1:9")
@@ -101,5 +120,5 @@ def test_a_broken_output_is_a_sentence_and_others_go_on(broken: None, stream: Ca
 
 
 def test_an_unknown_name_lists_the_plug_ins(broken: None) -> None:
-    with pytest.raises(OutputError, match="and the plug-ins late, missing, poor, raises, refuses"):
+    with pytest.raises(OutputError, match="plug-ins exits, hangs, late, leaves, missing, poor, raises, refuses"):
         make_sink(parse_output("nothing"))

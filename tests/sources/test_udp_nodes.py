@@ -66,6 +66,30 @@ def test_frames_of_both_cameras_in_master_time(rig: Rig, source: UdpNodes, nodes
     eventually(lambda: all(node.state is NodeState.READY for node in nodes))
 
 
+@pytest.mark.parametrize("address", ["a" * 70, "nobody.invalid", "a..b"])
+def test_an_address_that_is_not_found_is_named_and_found_as_soon_as_it_can_be(
+        rig: Rig, nodes: list[SyntheticNode], address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rhot_app.sources.links._RESOLVE_S", 0.02)
+    known: dict[str, str] = {}
+    real = socket.gethostbyname
+    monkeypatch.setattr(socket, "gethostbyname", lambda name: known.get(name) or real(name))
+    left = msgspec.structs.replace(rig.nodes[0], address=address)
+    source = UdpNodes(msgspec.structs.replace(rig, nodes=(left, rig.nodes[1])))
+    try:
+        eventually(lambda: source.links[0].address_problem and ready_one(source, 1))
+        assert address in source.links[0].address_problem and not source.links[1].address_problem
+        known[address] = "127.0.0.1"
+        eventually(lambda: ready_one(source, 0))
+        assert not source.links[0].address_problem
+    finally:
+        source.close()
+
+
+def ready_one(source: UdpNodes, camera: int) -> bool:
+    link = source.links[camera]
+    return link.state is not None and link.clock.offset_s is not None
+
+
 def test_restarted_node_streams_again_within_two_seconds(rig: Rig, source: UdpNodes,
                                                          nodes: list[SyntheticNode]) -> None:
     eventually(lambda: ready(source))

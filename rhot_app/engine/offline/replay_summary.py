@@ -94,6 +94,7 @@ def summarise(reader: LogReader, rig: Rig, tracker: Tracker | SmoothedTracker) -
     duration_s = 1e-9 * (states[-1].t_master_ns - states[0].t_master_ns) if len(states) > 1 else 0.0
     return {
         "log": str(reader.path), "duration_s": times.duration_s, "torn_bytes": reader.torn_bytes,
+        "end_missing": reader.losses.end_missing,
         "damaged_places": reader.losses.places, "skipped_bytes": reader.losses.skipped_bytes,
         "damaged_header_bytes": reader.losses.header_bytes,
         "missed_records": door.gaps, "unknown_node_records": door.unknown_nodes,

@@ -27,7 +27,7 @@ from rhot_app.engine.client import EngineClient
 from rhot_app.engine.directory import EngineDirectory, default_directory
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig
-from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
+from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_log
 from rhot_node.files import open_input
 from rhot_node.logs import before
 from rhot_node.network.pairing import ALPHABET
@@ -96,8 +96,7 @@ class Report:
             records = last_part(reader, LAST_S)
             rig = without_keys(reader.rig)
             about = {**reader.about, "losses": msgspec.to_builtins(reader.losses)}
-        self._files["last_minute.log"] = encode_header(rig, json.loads(_scrubbed(json.dumps(about)))) + b"".join(
-            encode_record(record) for record in records)
+        self._files["last_minute.log"] = b"".join(encode_log(rig, json.loads(_scrubbed(json.dumps(about))), records))
         if "rig.json" not in self._files:
             self.add_rig(reader.rig)
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from rhot_app.project import Rig
-from rhot_app.recording.raw_log import Record, RecordKind, begun_now, encode_header, encode_record
+from rhot_app.recording.raw_log import Record, RecordKind, begun_now, encode_log
 from rhot_app.simulator.scene.scene import Scene
 from rhot_node.capture.camera import available_delay_ns
 from rhot_node.clock import NodeClock
@@ -102,5 +102,4 @@ def write_node_log(path: Path, rig: Rig, about: dict[str, Any], said: Iterable[R
                    encode(Start(SESSION, 0, entries)))
     records = sorted([*said, start], key=lambda record: record.t_master_ns)
     with path.open("wb") as file:
-        file.write(encode_header(rig, begun_now(T0_MASTER_NS) | about))
-        file.writelines(encode_record(record) for record in records)
+        file.writelines(encode_log(rig, begun_now(T0_MASTER_NS) | about, records))

@@ -13,7 +13,6 @@ import json
 import os
 import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -35,6 +34,7 @@ from rhot_app.simulator.scene.scene_description import Show
 from rhot_node.config import load_settings
 from rhot_node.errors import NodeError, SettingsError
 from rhot_node.logs import cut_log, log_to_stderr
+from rhot_node.threads import Worker
 
 # -- control socket ----------------------------------------------------------------------------------------------------
 
@@ -61,12 +61,11 @@ class TwinServer:
         except (zmq.ZMQError, OSError) as exc:
             self._context.destroy(0)
             raise SimulatorError(f"{self._path}: the twin's door cannot be opened there ({exc}).") from exc
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="twin door", daemon=True)
+        self._worker = Worker("answers the twin's clients", lambda: self.step(_POLL_MS), hang_s=None)
 
     def start(self) -> None:
         """Serve from now on."""
-        self._thread.start()
+        self._worker.start()
 
     def step(self, timeout_ms: int) -> bool:
         """Answer one request; False when none came in time."""
@@ -77,16 +76,10 @@ class TwinServer:
 
     def close(self) -> None:
         """Close and remove the door. May be called twice."""
-        self._ending.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        self._worker.close()
         self._context.destroy(0)
         with contextlib.suppress(OSError):
             self._path.unlink()
-
-    def _run(self) -> None:
-        while not self._ending.is_set():
-            self.step(_POLL_MS)
 
     def _answer(self, data: bytes) -> dict[str, Any]:
         try:

@@ -12,7 +12,6 @@ import heapq
 import itertools
 import selectors
 import socket
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -21,6 +20,7 @@ import numpy as np
 
 from rhot_app.errors import SimulatorError
 from rhot_node.errors import WireError
+from rhot_node.threads import Worker
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import Start, StartEntry
 
@@ -148,8 +148,7 @@ class UdpProxy:
         for way, change in ((self._to_node, self._from_master), (self._to_master, self._unchanged),
                             (self._observations, self._unchanged)):
             self._selector.register(way.source, selectors.EVENT_READ, (way, change))
-        self._thread: threading.Thread | None = None
-        self._ended = threading.Event()
+        self._worker = Worker(f"delays node {self._node_id}", self.step)
 
     @staticmethod
     def _bound() -> socket.socket:
@@ -197,18 +196,11 @@ class UdpProxy:
 
     def start(self) -> None:
         """Run in a thread until `close`."""
-        self._thread = threading.Thread(target=self._run, name=f"proxy-{self._node_id}", daemon=True)
-        self._thread.start()
-
-    def _run(self) -> None:
-        while not self._ended.is_set():
-            self.step()
+        self._worker.start()
 
     def close(self) -> None:
         """End the thread and free the ports. May be called twice."""
-        self._ended.set()
-        if self._thread is not None:
-            self._thread.join()
+        self._worker.close()
         self._selector.close()
         for bound in self._sockets:
             bound.close()

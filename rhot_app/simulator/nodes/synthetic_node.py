@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import socket
-import threading
 import time
 from dataclasses import replace
 
@@ -24,6 +23,7 @@ from rhot_node.clock import ANCILLARY_SIZE, KernelTime, NodeClock, ask_for_times
 from rhot_node.errors import WireError
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
+from rhot_node.threads import Worker
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import (
     ClockReply,
@@ -111,8 +111,7 @@ class SyntheticNode:
         self._socket.bind(("127.0.0.1", self._node.udp_port))
         ask_for_times(self._socket)
         self._kernel_time = KernelTime()
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=f"synthetic {self._node.name}", daemon=True)
+        self._worker = Worker(f"plays the node {self._node.name}", self.step)
 
     def step(self, timeout_s: float = 0.1) -> None:
         """Wait for a message until the next frame is due (at most `timeout_s`), answer it, send the frame."""
@@ -144,18 +143,12 @@ class SyntheticNode:
 
     def start(self) -> None:
         """Run in a thread of its own."""
-        self._thread.start()
+        self._worker.start()
 
     def close(self) -> None:
         """Fall silent and close the port. May be called twice."""
-        self._ending.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        self._worker.close()
         self._socket.close()
-
-    def _run(self) -> None:
-        while not self._ending.is_set():
-            self.step()
 
     def _take(self, data: bytes, sender: tuple[str, int], t_receive_ns: int) -> None:
         try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import threading
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,6 +21,9 @@ from rhot_app.recording.raw_log import RecordKind, RecordSink
 from rhot_app.sources.poses.open_source import open_source
 from rhot_app.sources.poses.source import ForeignPose, PoseSource
 from rhot_app.sources.receiver import Deliver, to_nobody
+from rhot_node.threads import FOREIGN, Worker
+
+log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
 OpenSource = Callable[[str, str], PoseSource]
@@ -55,14 +58,12 @@ class FollowedObjects:
         self.tap: RecordSink | None = None
         self._followed = [_Followed(one.model.name, one.poses, open_named) for one in rig.objects
                           if one.model is not None and one.poses is not None]
-        self._ending = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._worker = Worker("listens to other trackers", self._turn, end=self._close_all)
 
     def start(self) -> None:
         """Begin to poll, if the rig has such objects."""
-        if self._followed and self._thread is None:
-            self._thread = threading.Thread(target=self._run, name="poses", daemon=True)
-            self._thread.start()
+        if self._followed:
+            self._worker.start()
 
     def notices(self) -> list[str]:
         """What is wrong with the sources now, a sentence each."""
@@ -70,21 +71,19 @@ class FollowedObjects:
 
     def close(self) -> None:
         """End the thread and close the sources. May be called twice."""
-        self._ending.set()
-        if self._thread is not None:
-            self._thread.join()
+        self._worker.close()
 
-    def _run(self) -> None:
-        try:
-            while not self._ending.wait(POLL_S):
-                for one in self._followed:
-                    for pose in one.poll():
-                        if self.tap is not None:
-                            self.tap.put(RecordKind.OBJECT_POSE, 0, pose.t_ns, encode_pose(pose))
-                        self.deliver([pose])
-        finally:
-            for one in self._followed:
-                one.close()
+    def _turn(self) -> None:
+        for one in self._followed:
+            for pose in one.poll():
+                if self.tap is not None:
+                    self.tap.put(RecordKind.OBJECT_POSE, 0, pose.t_ns, encode_pose(pose))
+                self.deliver([pose])
+        self._worker.ending.wait(POLL_S)
+
+    def _close_all(self) -> None:
+        for one in self._followed:
+            one.close()
 
 
 class _Followed:
@@ -104,6 +103,15 @@ class _Followed:
             return []
         if self._source is None and not self._opened():
             return []
+        try:
+            return self._poll()
+        except FOREIGN as exc:
+            log.exception("the source of %s failed", self._name)
+            self.notice = self._said(f"its source failed ({type(exc).__name__}: {exc}) and is opened again.")
+            self.close()
+            return []
+
+    def _poll(self) -> list[MeasuredPose]:
         assert self._source is not None and self._alignment is not None
         found = [in_rig(pose, self._name, self._poses, self._alignment) for pose in self._source.poll()
                  if pose.validity is Validity.TRACKED]
@@ -115,7 +123,7 @@ class _Followed:
     def close(self) -> None:
         """Close the source; the next poll but some opens it again."""
         if self._source is not None:
-            with contextlib.suppress(RhotError, OSError):
+            with contextlib.suppress(*FOREIGN):
                 self._source.close()
         self._source, self._waits = None, round(AGAIN_S / POLL_S)
 
@@ -123,8 +131,9 @@ class _Followed:
         try:
             self._alignment = load_alignment(Path(self._poses.alignment))
             self._source = self._open(self._poses.source, self._poses.tracker)
-        except RhotError as exc:
-            self.notice, self._waits = self._said(str(exc)), round(AGAIN_S / POLL_S)
+        except FOREIGN as exc:
+            sentence = str(exc) if isinstance(exc, RhotError) else f"its source cannot be opened ({exc!r})."
+            self.notice, self._waits = self._said(sentence), round(AGAIN_S / POLL_S)
             return False
         self.notice = ""
         return True

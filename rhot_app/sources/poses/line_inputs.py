@@ -24,6 +24,11 @@ _END_S = 2.0
 _CONNECT_S = 3.0
 
 
+def why(exc: OSError | ValueError) -> str:
+    """Why an address cannot be used, as a clause."""
+    return getattr(exc, "strerror", None) or str(exc)
+
+
 class ProgramLines:
     """The standard output of a program that is started, and ended by `close`."""
 
@@ -99,8 +104,8 @@ class TcpLines:
         self.name, self.end = f"tcp:{host}:{port}", ""
         try:
             self._socket = socket.create_connection((host, port), _CONNECT_S)
-        except OSError as exc:
-            raise SourceError(f"{self.name}: nobody answers ({exc.strerror or exc}). Start the program that serves "
+        except (OSError, ValueError) as exc:  # ValueError: a name that no host can have
+            raise SourceError(f"{printable(self.name)}: nobody answers ({why(exc)}). Start the program that serves "
                               "poses there.") from exc
         self._socket.setblocking(False)
 
@@ -134,10 +139,10 @@ class UdpLines:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((host, port))
-        except OSError as exc:
+        except (OSError, ValueError) as exc:
             self._socket.close()
-            raise SourceError(f"udp:{host}:{port}: cannot be listened on ({exc.strerror or exc}). Choose another port, "
-                              "or end the program that has it.") from exc
+            raise SourceError(f"udp:{printable(host)}:{port}: cannot be listened on ({why(exc)}). Choose another "
+                              "port, or end the program that has it.") from exc
         self.port = int(self._socket.getsockname()[1])
         self.name = f"udp:{host}:{self.port}"
         self._socket.setblocking(False)

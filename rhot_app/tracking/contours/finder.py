@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import logging
-import threading
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,10 +25,9 @@ from rhot_app.hand.motion.hand_process import FASTEST, POSE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.tracking.contours.evidence import joints_of
 from rhot_app.tracking.contours.requests import CameraFrames
+from rhot_node.threads import Task
 
 Array = NDArray[np.float64]
-
-log = logging.getLogger(__name__)
 
 MOVED_M, TURNED = 0.05, 0.4
 """m and rad: standard deviations of the motion of a hand during a search: it is held nearly still."""
@@ -82,7 +80,7 @@ class Finder:
         """`alone`: there is no second hand, with which a search of the whole image might confuse this one."""
         self._hand, self._alone = hand, alone
         self._rng = np.random.default_rng(0)
-        self._thread: threading.Thread | None = None
+        self._task: Task | None = None
         self._newest: Maps | None = None
         self._found: tuple[int, HandPose, int] | None = None  # of which run
         self._change: tuple[int, Relocalisation] | None = None
@@ -152,17 +150,16 @@ class Finder:
 
     def wait(self) -> None:
         """Wait for the running search."""
-        if self._thread is not None:
-            self._thread.join()
+        if self._task is not None:
+            self._task.join()
 
     @property
     def _busy(self) -> bool:
-        return self._thread is not None and self._thread.is_alive()
+        return self._task is not None and self._task.running
 
     def _begin(self, search_for: Callable[..., None], *arguments: Any) -> None:
         if not self._busy:
-            self._thread = threading.Thread(target=_logged, args=(search_for, *arguments), name="find", daemon=True)
-            self._thread.start()
+            self._task = Task("searches for a hand", functools.partial(search_for, *arguments))
 
     def _search(self, maps: Maps, run: int) -> None:
         pose = self._hand.relocaliser.search_globally(maps.probabilities, self._rng)
@@ -201,11 +198,3 @@ def _inflated(covariance: Array, change: Array) -> Array:
         place = range(POSE * order, POSE * (order + 1))
         out[place, place] += scale * np.square(change[:POSE])
     return out
-
-
-def _logged(search_for: Callable[..., None], *arguments: Any) -> None:
-    """Log a search that fails; the next maps are searched again."""
-    try:
-        search_for(*arguments)
-    except Exception:
-        log.exception("the search for a hand failed")

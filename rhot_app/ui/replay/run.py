@@ -173,9 +173,8 @@ class ReadableLog:
             return f"{self._reader.path} is still being recorded: what was written until now is shown."
         if losses.damage:
             said.append(f"In {self._reader.path} {losses.damage}.")
-        if losses.torn_bytes:
-            said.append(f"The last {losses.torn_bytes} bytes of {self._reader.path} are torn: the program died while "
-                        "writing.")
+        if losses.end:
+            said.append(f"Of {self._reader.path} {losses.end}.")
         return " ".join([*said, "Everything else is shown."] if said else said)
 
 

@@ -23,6 +23,7 @@ from rhot_app.project import ObjectPoses, Rig, RigObject, load_rig, save_rig
 from rhot_app.recording.object_poses import decode_pose, encode_pose
 from rhot_app.recording.raw_log import Record, RecordKind
 from rhot_app.sources.poses.followed import FollowedObjects, in_rig
+from rhot_app.sources.poses.open_source import open_source
 from rhot_app.sources.poses.source import ForeignPose
 from rhot_app.sources.replay import LogValidator
 from rhot_app.sources.source import same_network
@@ -155,6 +156,40 @@ def test_a_source_that_fails_is_told_and_opened_again(rig: Rig, monkeypatch: pyt
     eventually(lambda: len(tries) > 3)
     followed.close()
     assert tries[0] == ("openvr", "T20")
+
+
+class FailingSource(FakeSource):
+    """Raises whatever it likes, once."""
+
+    def __init__(self, raised: BaseException) -> None:
+        super().__init__()
+        self.raised: BaseException | None = raised
+
+    def poll(self) -> list[ForeignPose]:
+        raised, self.raised = self.raised, None
+        if raised is not None:
+            raise raised
+        return [measured(10**9)]
+
+
+@pytest.mark.parametrize("raised", [ValueError("a strange line"), SystemExit(0), UnicodeError("label too long")])
+def test_a_source_that_fails_is_named_and_opened_again(rig: Rig, raised: BaseException,
+                                                       monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rhot_app.sources.poses.followed.AGAIN_S", 0.1)
+    source, delivered = FailingSource(raised), list[MeasuredPose]()
+    followed = FollowedObjects(rig, lambda name, tracker: source)
+    followed.deliver = delivered.extend  # type: ignore[assignment]
+    followed.start()
+    eventually(lambda: any(type(raised).__name__ in one and "cup" in one for one in followed.notices()))
+    eventually(lambda: delivered and not followed.notices())
+    followed.close()
+
+
+def test_a_name_that_no_host_can_have_is_a_sentence() -> None:
+    with pytest.raises(SourceError, match="nobody answers"):
+        open_source(f"tcp:{'a' * 70}:5000", "")
+    with pytest.raises(SourceError, match="cannot be listened on"):
+        open_source(f"udp:{'a' * 70}:5000", "")
 
 
 def test_lines_by_udp_reach_the_tracker(rig: Rig) -> None:
