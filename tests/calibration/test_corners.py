@@ -118,6 +118,32 @@ def test_why_a_charuco_board_was_not_found() -> None:
     assert "wrong dictionary" in why_missing(image, replace(board, dictionary="DICT_6X6_100"))
 
 
+def test_a_charuco_board_in_negative_is_found_at_the_same_corners() -> None:
+    board = CharucoBoard(8, 6, 0.03, 0.022)
+    image, truth = photo(board, 34)
+    view = detect(255 - image, board, thorough=False)
+    assert view is not None and len(view.ids) == board.count and off(view, truth).max() < 0.1
+    assert "squares counted" in why_missing(255 - image, replace(board, squares_x=12, squares_y=8))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_far_charuco_board_is_read_or_called_too_small() -> None:
+    board = CharucoBoard(10, 7, 0.025, 0.01875)
+    image, truth = photo(board, 17.0)
+    view = detect(image, board)
+    assert view is not None and len(view.ids) > 20 and off(view, truth).max() < 0.3
+    far, _ = photo(board, 8.0)
+    assert detect(far, board) is None and "too small" in why_missing(far, board)
+
+
+def test_a_charuco_board_of_which_little_is_seen_is_called_hidden() -> None:
+    board = CharucoBoard(10, 7, 0.03, 0.022)
+    image, _ = photo(board, 34, turn=(0.0, 0.0, 0.0))
+    image[:, 290:] = 128
+    image[180:] = 128
+    assert "hidden" in why_missing(image, board)
+
+
 @pytest.mark.parametrize("shape", [(1, 1), (10, 400), (480, 640), (480, 640, 3)])
 def test_pictures_without_a_board_are_no_trouble(shape: tuple[int, ...]) -> None:
     for image in (np.zeros(shape, np.uint8), np.full(shape, 255, np.uint8)):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 
 import cv2
@@ -74,7 +73,7 @@ def detect(image: NDArray[np.uint8], board: Board, *, thorough: bool = True, sou
     if isinstance(board, Chessboard):
         rough = find_chessboard(gray, board, thorough=thorough)
     else:
-        rough = find_charuco(gray, board)
+        rough = find_charuco(gray, board, thorough=thorough)
     if rough is None:
         return None
     grid, blur = refine(gray, rough, free=board.free_space)
@@ -215,7 +214,8 @@ def refine(gray: NDArray[np.uint8], grid: Array, *, free: float = 1.0) -> tuple[
     astray = _apart(fitted, expected) > np.maximum(_ASTRAY * clearance_px(grid), _ASTRAY_PX)
     again = np.logical_and(astray | np.isnan(fitted[..., 0]), np.isfinite(grid[..., 0])).reshape(*astray.shape, 1)
     fitted = np.where(again, _fit(gray, np.where(again, expected, np.nan), grid, free), fitted)
-    for _ in range(max(grid.shape) if np.isnan(grid).any() else 0):
+    known = np.isfinite(fitted[..., 0])
+    for _ in range(max(grid.shape) if known.any() and not known.all() else 0):
         more = _beside(gray, fitted, free)
         if not np.isfinite(more[..., 0]).any():
             break
@@ -247,8 +247,9 @@ def _beside(gray: NDArray[np.uint8], fitted: Array, free: float) -> Array:
     found = _fit(gray, expected, filled, free)
     row, col = np.indices(known.shape[:2])
     sign = (-1.0) ** (row + col)
-    contrast = found[..., 4] * sign / np.nanmedian(fitted[..., 4] * sign)
-    good = (contrast > _FAINTER) & (contrast < 1.0 / _FAINTER) & (found[..., 5] < _WORSE * np.nanmedian(fitted[..., 5]))
+    usual, misfit = np.median((fitted[..., 4] * sign)[known[..., 0]]), np.median(fitted[..., 5][known[..., 0]])
+    contrast = found[..., 4] * sign / usual
+    good = (contrast > _FAINTER) & (contrast < 1.0 / _FAINTER) & (found[..., 5] < _WORSE * misfit)
     good &= _apart(found, expected) < np.maximum(_BESIDE * clearance_px(filled), _ASTRAY_PX)
     return np.where(good[..., None], found, np.nan)
 
@@ -268,9 +269,10 @@ def _expected(grid: Array) -> Array:
 
     guesses = [(at(0, -1) + at(0, 1)) / 2, (at(-1, 0) + at(1, 0)) / 2]
     guesses += [2 * at(row, col) - at(2 * row, 2 * col) for row, col in ((0, 1), (0, -1), (1, 0), (-1, 0))]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # a corner without neighbours: NaN is the answer
-        return np.asarray(np.nanmedian(np.stack(guesses), axis=0))
+    ordered = np.sort(np.stack(guesses), axis=0)  # NaN last
+    count = np.isfinite(ordered).sum(axis=0, keepdims=True)
+    middle = [np.take_along_axis(ordered, np.maximum(place, 0), axis=0) for place in ((count - 1) // 2, count // 2)]
+    return np.asarray(np.where(count > 0, (middle[0] + middle[1]) / 2.0, np.nan)[0])
 
 
 def side_px(grid: Array) -> Array:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -136,27 +137,60 @@ def fit_saddles(gray: Gray, corners: Array, directions: Array, radii: Array) -> 
 
 
 # -- ChArUco detection -------------------------------------------------------------------------------------------------
-# Parts of the board suffice.
+# Parts of the board suffice, and it may be printed in negative.
 
 _SMALL_PX = 1000  # longest side: pictures below are read at twice their size, where a marker's bits have 3 px, not 1.5
 _FEWEST = 4
+_CELL_PX, _CELL_MARGIN = 8, 0.25  # px to which each bit of a marker is enlarged, and the rim of it that is left out
 
 
-def find_charuco(gray: Gray, board: CharucoBoard) -> Array | None:
-    """(rows, cols, 2) px, NaN for corners that are not visible; None when fewer than four are."""
-    scale = 2.0 if max(gray.shape) < _SMALL_PX else 1.0
-    corners, ids, _, _ = _detector(board).detectBoard(_scaled(gray, scale))
-    if corners is None or ids is None or len(ids) < _FEWEST:
-        return None
-    grid = np.full((board.count, 2), np.nan)
-    grid[ids.reshape(-1)] = (corners.reshape(-1, 2) + 0.5) / scale - 0.5
-    return grid.reshape(board.rows, board.cols, 2)
+@dataclass(frozen=True, slots=True)
+class MarkersSeen:
+    """What one picture shows of a board: markers of its dictionary, `ids` (N,) with `corners` (N, 4, 2) px, and the
+    board's own corners, `grid` (rows, cols, 2) px, NaN for those that are not visible."""
+
+    ids: NDArray[np.int64]
+    corners: Array
+    grid: Array
+
+    @property
+    def placed(self) -> int:
+        """How many of the board's corners are visible."""
+        return int(np.count_nonzero(np.isfinite(self.grid[..., 0])))
 
 
-def markers_seen(gray: Gray, board: CharucoBoard) -> int:
-    """How many markers of the board's dictionary the picture shows, whatever their arrangement."""
-    _, _, _, ids = _detector(board).detectBoard(gray)
-    return 0 if ids is None else len(ids)
+def find_charuco(gray: Gray, board: CharucoBoard, *, thorough: bool = False) -> Array | None:
+    """(rows, cols, 2) px, NaN for corners that are not visible; None when fewer than four are.
+
+    `thorough` reads small markers in a picture of twice the size, too.
+    """
+    seen = read_markers(gray, board)
+    negative = not len(seen.ids)
+    if negative:
+        seen = read_markers(negated(gray), board)
+    if thorough and seen.placed < board.count // 2:
+        larger = read_markers(negated(gray) if negative and len(seen.ids) else gray, board, 2.0)
+        seen = max(seen, larger, key=lambda one: one.placed)
+    return seen.grid if seen.placed >= _FEWEST else None
+
+
+def read_markers(gray: Gray, board: CharucoBoard, enlarged: float = 1.0) -> MarkersSeen:
+    """All markers of the board's dictionary, whatever their arrangement; `enlarged`: how many times more than usual."""
+    scale = enlarged * (2.0 if max(gray.shape) < _SMALL_PX else 1.0)
+    places, numbers, corners, ids = _detector(board).detectBoard(_scaled(gray, scale))
+    flat = np.full((board.count, 2), np.nan)
+    if places is not None and numbers is not None:
+        flat[np.asarray(numbers).reshape(-1)] = (np.asarray(places).reshape(-1, 2) + 0.5) / scale - 0.5
+    grid: Array = flat.reshape(board.rows, board.cols, 2)
+    if ids is None or not len(ids):
+        return MarkersSeen(np.zeros(0, np.int64), np.zeros((0, 4, 2)), grid)
+    return MarkersSeen(np.asarray(ids, np.int64).reshape(-1),
+                       (np.asarray(corners, float).reshape(-1, 4, 2) + 0.5) / scale - 0.5, grid)
+
+
+def negated(gray: Gray) -> Gray:
+    """The picture with black for white."""
+    return np.asarray(cv2.bitwise_not(gray), np.uint8)
 
 
 def _scaled(gray: Gray, scale: float) -> Gray:
@@ -167,4 +201,7 @@ def _scaled(gray: Gray, scale: float) -> Gray:
 
 @functools.lru_cache(maxsize=8)
 def _detector(board: CharucoBoard) -> cv2.aruco.CharucoDetector:
-    return cv2.aruco.CharucoDetector(board.opencv())
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.perspectiveRemovePixelPerCell = _CELL_PX
+    parameters.perspectiveRemoveIgnoredMarginPerCell = _CELL_MARGIN
+    return cv2.aruco.CharucoDetector(board.opencv(), cv2.aruco.CharucoParameters(), parameters)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.board.saddle import find_charuco, markers_seen
+from rhot_app.calibration.board.saddle import MarkersSeen, find_charuco, negated, read_markers
 from rhot_app.calibration.verdict import Finding, Grade
 
 Array = NDArray[np.float64]
@@ -92,6 +92,10 @@ def _contrast(gray: Gray, squares: Array, pixel_from_board: Array) -> float:
 # Slow: only for pictures without a board of the stated size.
 
 _FEW_MARKERS = 3
+_CELL_LEAST_PX = 2  # of a marker's bit: two samples of each, the least that tells it from the next
+_ASTRAY = 0.3  # of a marker's side: corners farther off belong to another board
+_SMALL_PX = 1500  # longest side of a picture that is enlarged to look for small squares
+_ANY_LIGHT = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
 _ANY_SIZE = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_NORMALIZE_IMAGE
 
 
@@ -123,14 +127,58 @@ def _no_chessboard(gray: Gray, board: Board) -> str:
 
 
 def _no_charuco(gray: Gray, board: CharucoBoard) -> str:
-    seen = markers_seen(gray, board)
-    if markers_seen(np.ascontiguousarray(gray[:, ::-1]), board) > seen:  # a few are read by chance either way
+    plain, negative = read_markers(gray, board, 2.0), read_markers(negated(gray), board, 2.0)
+    seen = max(plain, negative, key=lambda one: len(one.ids))
+    flipped = np.ascontiguousarray((gray if seen is plain else negated(gray))[:, ::-1])
+    if len(read_markers(flipped, board, 2.0).ids) > len(seen.ids):  # a few are read by chance either way
         return "the picture is mirrored: its markers can be read only when it is flipped; switch the mirroring off"
+    count, least = len(seen.ids), _CELL_LEAST_PX * (board.marker_family().markerSize + 2)
     other_layout = replace(board, legacy=not board.legacy)
-    if seen >= _FEW_MARKERS and board.layouts_differ and find_charuco(gray, other_layout) is not None:
+    if count >= _FEW_MARKERS and board.layouts_differ and find_charuco(gray, other_layout) is not None:
         other = "the one of OpenCV before 4.6" if not board.legacy else "today's, not the one of OpenCV before 4.6"
         return f"the board's layout is {other}"
-    if seen >= _FEW_MARKERS:
-        return (f"{seen} markers of {board.dictionary}, but not as on a board of {board.size_text} squares "
+    if count >= _FEW_MARKERS and not _fit_the_board(seen, board):
+        return (f"{count} markers of {board.dictionary}, but not as on a board of {board.size_text} squares "
                 "(squares counted, not corners)")
-    return f"no markers of {board.dictionary}: wrong dictionary, too small (a marker needs 20 pixels), or blurred"
+    side_px = _marker_px(seen) if count >= _FEW_MARKERS else _expected_marker_px(gray, board)
+    if side_px is not None and side_px < least:
+        return (f"the board is too small in the picture: its markers have {side_px:.0f} px, and {least} are needed; "
+                "come nearer, or use larger squares")
+    if count >= _FEW_MARKERS:
+        held = board.squares_x * board.squares_y // 2
+        return f"only {count} of the board's {held} markers can be read: blurred, or hidden"
+    if side_px is not None:
+        return (f"a board of {board.size_text} squares without markers of {board.dictionary}: wrong dictionary, a "
+                "plain chessboard, or blurred")
+    return f"no markers of {board.dictionary}: not in view, wrong dictionary, or blurred"
+
+
+def _marker_px(seen: MarkersSeen) -> float:
+    """The shorter side of a usual marker."""
+    sides = np.linalg.norm(seen.corners - np.roll(seen.corners, 1, axis=1), axis=2)
+    return float(np.median(sides.min(axis=1)))
+
+
+def _fit_the_board(seen: MarkersSeen, board: CharucoBoard) -> bool:
+    """Whether most of the markers lie to each other as they do on the board."""
+    drawn = board.opencv()
+    numbers = np.asarray(drawn.getIds()).reshape(-1)
+    places = dict(zip(numbers.tolist(), np.asarray(drawn.getObjPoints(), float)[..., :2], strict=True))
+    own = [k for k, number in enumerate(seen.ids.tolist()) if number in places]
+    if len(own) < _FEW_MARKERS:
+        return False
+    on_board = np.concatenate([places[int(seen.ids[k])] for k in own])
+    _, inlier = cv2.findHomography(on_board, np.concatenate(seen.corners[own]), cv2.RANSAC, _ASTRAY * _marker_px(seen))
+    return inlier is not None and float(inlier.sum()) > 2.0 * len(seen.ids)
+
+
+def _expected_marker_px(gray: Gray, board: CharucoBoard) -> float | None:
+    """How large the board's markers are by its squares alone; None where no such squares are seen."""
+    small = max(gray.shape) < _SMALL_PX
+    large = cv2.resize(gray, None, fx=3.0, fy=3.0, interpolation=cv2.INTER_CUBIC) if small else gray
+    found, corners = cv2.findChessboardCorners(large, (board.cols, board.rows), flags=_ANY_LIGHT)
+    if not found:
+        return None
+    grid = np.asarray(corners, float).reshape(board.rows, board.cols, 2) / (3.0 if small else 1.0)
+    sides = [float(np.median(np.linalg.norm(np.diff(grid, axis=axis), axis=2))) for axis in (0, 1)]
+    return min(sides) * board.marker_m / board.square_m
