@@ -1,6 +1,6 @@
 """Refines the rig and adapts the hand beside a running pipeline, outside the frames' own thread.
 
-Costs 2 ms of processor time per second of 80 frames for what is kept of them, and 20 ms every ten seconds in a
+Costs 2 ms of processor time per second of 80 frames for what is kept of them, and 60 ms every ten seconds in a
 thread of its own (`benchmarks/self_calibration.py`).
 """
 

@@ -12,6 +12,7 @@ from rhot_node.detect.find import DOUBTFUL, SEARCH_STEP, Finder
 from rhot_node.detect.gate import Labels, guess_illuminant
 from rhot_node.detect.illuminant import DEAD_ZONE, MARKERS_LEAST, SWITCHED, Illuminant
 from rhot_node.detect.image import YuvImage
+from rhot_node.detect.occlusion import widen_touching
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
@@ -73,6 +74,9 @@ class FastDetector:
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """The best candidate of every marker, in the order of the marker set, lost markers reported as lost; then the
         other candidates, at most CANDIDATES_MAX of a marker in all."""
+        return widen_touching(image, self._find(image), self._finder.paint)
+
+    def _find(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         self._fit(image)
         if self._fresh:
             seen = self._find_at_first(image)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -13,11 +15,14 @@ from synthetic_rig import WIDE, Viewing, hand_trajectory, make_rig, observe
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import CameraCalibration, DepthSettings, Rig
+from rhot_app.recording.raw_log import LogReader
+from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.refinement.pair_observations import CAPACITY, PairStore, linearise
 from rhot_app.tracking.refinement.refined_rig import Refinement, Scale, refined_rig, stale_sentence, usable, verdict_of
 from rhot_app.tracking.refinement.rig_refinement import RigRefiner
 from rhot_app.tracking.tracker import CameraObservations
 
+CASE = Path(__file__).resolve().parents[3] / "shared" / "cases" / "camera_moved_alarm" / "grasp6min.rhotlog"
 SCENE = scene_of(1)
 RIG = rig_of(SCENE)
 SECONDS = 45.0
@@ -130,6 +135,39 @@ def test_biased_centroids_are_no_turned_camera(still: list[CameraObservations]) 
     assert refined(frames).holds
     found = refined(frames, with_pose(RIG, turn(-0.3, 0.0, 0.0)))
     assert np.degrees(found.cameras[0].turn) == pytest.approx([0.3, 0.0, 0.0], abs=0.03)
+
+
+def test_what_predicts_no_held_back_rays_better_is_not_offered(still: list[CameraObservations]) -> None:
+    found = refined(still, with_pose(RIG, turn(0.3, 0.0, 0.0)))
+    assert not found.holds and usable(found) and found.held_out > 1000.0 and found.before_px > 50.0 * found.after_px
+    for worse in (replace(found, held_out=10.0), replace(found, before_px=found.after_px)):
+        assert worse.holds and not usable(worse) and stale_sentence(RIG, worse) == ""
+        assert "held back" in verdict_of(worse, "left").findings[0].sentence
+    assert refined(still[:800], with_pose(RIG, turn(0.3, 0.0, 0.0))).holds, "ten seconds predict nothing else"
+
+
+@pytest.mark.skipif(not CASE.exists(), reason="../shared/cases/camera_moved_alarm is not there")
+def test_a_rendered_hand_before_the_exact_rig_raises_no_alarm() -> None:
+    with contextlib.closing(LogReader(CASE)) as reader:
+        validator, refiner = LogValidator(reader.rig), RigRefiner(reader.rig)
+        for record in reader:
+            frame = validator.feed(record)
+            if isinstance(frame, CameraObservations):
+                refiner.take(frame)
+            if refiner.gather().now_s > 75.0:
+                break
+    found = refiner.step()
+    assert found is not None and found.probability < 1e-6, "a turn explains the biased observations in it"
+    assert found.held_out < 5.0, "and predicts nothing"
+    assert found.holds and stale_sentence(reader.rig, found) == ""
+
+
+def test_a_camera_is_named_where_its_movement_stands_out(still: list[CameraObservations]) -> None:
+    found = refined(still, with_pose(RIG, turn(0.0, 0.0, 0.3)))
+    assert "right" in stale_sentence(RIG, found)
+    vague = replace(found, cameras=tuple(replace(one, covariance=1e4 * one.covariance) for one in found.cameras))
+    assert not found.holds and not any(name in stale_sentence(RIG, vague) for name in ("left", "right"))
+    assert "cameras" in stale_sentence(RIG, vague)
 
 
 def test_outliers_do_not_pull(still: list[CameraObservations]) -> None:

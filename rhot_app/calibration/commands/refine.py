@@ -123,7 +123,8 @@ def _scale(rig: Rig, frames: list[CameraObservations]) -> Scale:
 def _fields(found: Refinement, scale: Scale) -> dict[str, Any]:
     return {
         "holds": found.holds, "probability": found.probability, "chi_squared": found.chi_squared,
-        "degrees_of_freedom": found.freedom, "before_px": found.before_px, "after_px": found.after_px,
+        "degrees_of_freedom": found.freedom, "held_out": found.held_out, "before_px": found.before_px,
+        "after_px": found.after_px,
         "places_move_mm": 1e3 * found.moved_m, "places_sd_mm": 1e3 * found.places_sd_m,
         "knocked_s_before_end": found.knocked_s if found.knocked_s is not None and math.isfinite(found.knocked_s)
         else None, "dispersion": found.dispersion, "observations": found.observations, "voxels": found.voxels,

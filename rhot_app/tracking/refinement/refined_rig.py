@@ -87,9 +87,11 @@ class Refinement:
 
     `poses` (C, 4, 4) world_from_camera, refined; `chi_squared`, `freedom` and `probability` test that the stored
     calibration still holds. `knocked_s`: s before the newest observation at which a camera was knocked most probably,
-    None for no knock, infinite for one before the first observation. `before_px`, `after_px`: rms over cameras of the
-    epipolar error, median, of the observations since then, px. `moved_m`: by how much the hand's places change, rms;
-    `places_sd_m`: standard deviation of a place by the refined poses alone, rms, the scale taken as known.
+    None for no knock, infinite for one before the first observation. `held_out`: how much better, in log likelihood,
+    poses that are refined without some observations since then predict these. `before_px`, `after_px`: rms over cameras
+    of the epipolar error, median, of the observations that were held back, px; of all where none could be.
+    `moved_m`: by how much the hand's places change, rms; `places_sd_m`: standard deviation of a place by the refined
+    poses alone, rms, the scale taken as known.
     `distance_m`: of these places from the cameras' middle, rms.
     `dispersion`: how many times as large as stated the variance of errors is that a marker keeps for seconds.
     `voxels`: places of 5 cm that the markers were in.
@@ -101,6 +103,7 @@ class Refinement:
     freedom: int
     probability: float
     knocked_s: float | None
+    held_out: float
     before_px: float
     after_px: float
     moved_m: float
@@ -113,8 +116,10 @@ class Refinement:
 
     @property
     def holds(self) -> bool:
-        """Whether the stored calibration still holds, as far as is known."""
-        return self.probability > SIGNIFICANCE
+        """Whether the stored calibration still holds, as far as is known: another one must be significant, and predict
+        what it was not made from."""
+        return (self.probability > SIGNIFICANCE or self.held_out < -math.log(SIGNIFICANCE)
+                or self.after_px >= self.before_px)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +136,7 @@ class Scale:
         return math.isfinite(self.factor) and math.isfinite(self.sd)
 
 
-def correction_sentence(camera: CameraCorrection, reference: str) -> str:
+def _correction_sentence(camera: CameraCorrection, reference: str) -> str:
     """How a camera stands otherwise than the rig says: "The right camera is turned by 0.30 ± 0.02 degrees against the
     left one, compared with the rig"; without a full stop. The rig may never have been calibrated."""
     angle, angle_sd = camera.angle
@@ -141,8 +146,6 @@ def correction_sentence(camera: CameraCorrection, reference: str) -> str:
         parts.append(f"turned by {_with_sd(math.degrees(angle), math.degrees(angle_sd))} degrees")
     if offset > NOTABLE * offset_sd:
         parts.append(f"moved by {_with_sd(1e3 * offset, 1e3 * offset_sd)} mm")
-    if not parts:
-        parts.append("turned or moved (which of both is not known)")
     return f"The {camera.name} camera is {' and '.join(parts)} against the {reference} one, compared with the rig"
 
 
@@ -156,7 +159,7 @@ def stale_sentence(rig: Rig, found: Refinement) -> str:
     """The advice when the stored calibration no longer holds; empty while it does."""
     if found.holds:
         return ""
-    what = "; ".join(correction_sentence(camera, rig.nodes[0].name) for camera in _notable(found))
+    what = "; ".join(moved_sentences(found, rig.nodes[0].name))
     if usable(found):
         return f"{what}: use the refined calibration, or calibrate again."
     return f"{what}. The movement does not yet determine all of it. {MOVE_MORE}"
@@ -173,11 +176,12 @@ def verdict_of(found: Refinement, reference: str, scale: Scale = Scale()) -> Ver
                f"(median of {found.observations} observations in {found.voxels} places).")
     findings: list[Finding] = []
     if found.holds:
-        findings.append(Finding("holds", Grade.GOOD, "The stored calibration still holds (chi-squared "
-                                f"{found.chi_squared:.1f} with {found.freedom} degrees of freedom)."))
+        why = (f"chi-squared {found.chi_squared:.1f} with {found.freedom} degrees of freedom"
+               if found.probability > SIGNIFICANCE else
+               "no other one predicts better what was held back from it")
+        findings.append(Finding("holds", Grade.GOOD, f"The stored calibration still holds ({why})."))
     else:
-        findings += [Finding("moved", Grade.GOOD, f"{correction_sentence(camera, reference)}.")
-                     for camera in _notable(found)]
+        findings += [Finding("moved", Grade.GOOD, f"{sentence}.") for sentence in moved_sentences(found, reference)]
         findings += [finding for camera in found.cameras for finding in _undetermined(camera)]
         if found.after_px > FAIR_ERROR_PX:
             findings.append(Finding(
@@ -234,11 +238,13 @@ def figure_rows(found: Refinement, scale: Scale = Scale()) -> list[tuple[str, st
     return rows
 
 
-def _notable(found: Refinement) -> list[CameraCorrection]:
-    """The cameras that have moved; all, when no single one stands out."""
+def moved_sentences(found: Refinement, reference: str) -> list[str]:
+    """How the cameras stand now against the rig, `reference` is the first one's name; without full stops. A camera is
+    named only where its own movement stands out."""
     moved = [camera for camera in found.cameras if camera.angle[0] > NOTABLE * camera.angle[1]
              or camera.offset[0] > NOTABLE * camera.offset[1]]
-    return moved or list(found.cameras)
+    return [_correction_sentence(camera, reference) for camera in moved] or [
+        "The cameras do not stand to each other as the rig says; which one has moved, and how, is not known"]
 
 
 def _undetermined(camera: CameraCorrection) -> list[Finding]:

@@ -2,9 +2,9 @@
 
 Pairs of cameras that see a marker at one instant give one epipolar error each. The errors of ten seconds are summed up
 as information on the cameras' poses; an information filter goes through these summaries with a slow random walk, and
-compares "nothing happened" with "a camera was knocked at this moment". Epipolar errors determine how a camera is
-turned against another one and the direction of the baseline, never the scale (Hartley and Zisserman 2004, 9.6): the
-length of the baselines is kept.
+compares "nothing happened" with "a camera was knocked at this moment". What comes of it must predict observations that
+were held back from it. Epipolar errors determine how a camera is turned against another one and the direction of the
+baseline, never the scale (Hartley and Zisserman 2004, 9.6): the length of the baselines is kept.
 
 A correction of camera k is `world_from_camera @ [exp(omega), tau]`: a turn about its own axes x (right), y (down) and z
 (ahead), rad, and a shift along them, m. The first camera is the reference.
@@ -223,7 +223,7 @@ class RigRefiner:
         return Gathered(self.store.recent(self._now_s), self._now_s)
 
     def refine(self, gathered: Gathered) -> Refinement | None:
-        """As `step`; may run in another thread than `take`. Some 20 ms."""
+        """As `step`; may run in another thread than `take`. Some 60 ms."""
         rows = gathered.rows
         if not self.active or len(rows.t_s) <= 2 * self._size:
             return None
@@ -233,7 +233,7 @@ class RigRefiner:
             step, state = found.state[:self._poses] - state, found.state[:self._poses]
             if np.square(step).max() < _SMALL_SQ:
                 break
-        return self._refinement(rows, found)
+        return self._refinement(gathered, found)
 
     def _calibrated_variances(self) -> Array:
         """(6 (C - 1),) of the stored calibration: the angle that makes its stated error of places, or CALIBRATED_PX."""
@@ -314,8 +314,31 @@ class RigRefiner:
         poses[:, :3, 3] = centres[0] + (centres - centres[0]) * (self._base_m / length)
         return poses
 
-    def _refinement(self, rows: PairObservations, found: _Solution) -> Refinement:
-        poses = self._moved(found.state)
+    def _held_out(self, gathered: Gathered, found: _Solution) -> tuple[float, float, float]:
+        """`held_out`, `before_px` and `after_px` of `Refinement`: every other segment is predicted from the rest, one
+        and the other half in turn. The likelihood is Student's t, the dispersion says how many of them count."""
+        rows = gathered.rows
+        half = np.floor(rows.t_s / SEGMENT_S).astype(np.int64)
+        total, before, after = 0.0, list[Array](), list[Array]()
+        for parity in (0, 1):
+            chosen = half % 2 == parity
+            held = np.flatnonzero(chosen & found.since)
+            if not len(held) or chosen.all():
+                continue
+            trained = self._solve(Gathered(rows.of(~chosen), gathered.now_s), found.state[:self._poses])
+            stored, refined = (linearise(rows.of(held), poses, self._focal)
+                               for poses in (self._stored, self._moved(trained.state)))
+            total += 0.5 * (STUDENT + 1.0) / found.dispersion * float(
+                np.sum(np.log1p(np.square(stored.error_px / stored.sd_px) / STUDENT)
+                       - np.log1p(np.square(refined.error_px / refined.sd_px) / STUDENT)))
+            before.append(stored.error_px)
+            after.append(refined.error_px)
+        if not before:
+            return 0.0, math.nan, math.nan
+        return total, _middle_px(np.concatenate(before)), _middle_px(np.concatenate(after))
+
+    def _refinement(self, gathered: Gathered, found: _Solution) -> Refinement:
+        rows, poses = gathered.rows, self._moved(found.state)
         covariance = found.covariance[:self._poses, :self._poses]
         cameras = []
         for camera in range(1, len(poses)):
@@ -326,11 +349,13 @@ class RigRefiner:
                                             covariance[part, part], along / np.linalg.norm(along)))
         chi_squared, freedom = self._test(found)
         since = rows.of(found.since)
-        before, after = (float(np.median(np.abs(linearise(since, where, self._focal).error_px))) / math.sqrt(2.0)
-                         for where in (self._stored, poses))
+        held_out, before, after = self._held_out(gathered, found)
+        if math.isnan(before):
+            before, after = (_middle_px(linearise(since, where, self._focal).error_px)
+                             for where in (self._stored, poses))
         return Refinement(
             tuple(cameras), poses, chi_squared, freedom, float(chi_squared_tail(chi_squared, max(freedom, 1))),
-            found.knocked_s, before, after, _rms(midpoints(since, self._stored) - midpoints(since, poses)),
+            found.knocked_s, held_out, before, after, _rms(midpoints(since, self._stored) - midpoints(since, poses)),
             self._places_sd_m(since, found), _rms(midpoints(since, poses) - poses[:, :3, 3].mean(axis=0)),
             found.dispersion, len(since.t_s), len(np.unique(since.voxel)), float(np.ptp(since.t_s)))
 
@@ -356,6 +381,11 @@ class RigRefiner:
         determined = values < 0.25  # at most half as uncertain as a knock makes them
         parts = vectors[:, determined].T @ (found.state[:self._poses] / scale)
         return float(np.sum(np.square(parts) / values[determined])), int(np.count_nonzero(determined))
+
+
+def _middle_px(errors: Array) -> float:
+    """The median epipolar error (N,), px, as rms over both cameras."""
+    return float(np.median(np.abs(errors))) / math.sqrt(2.0)
 
 
 def _rms(ways: Array) -> float:
