@@ -17,7 +17,7 @@ from rhot_app.errors import ObjectError, RigError
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import ANGLES
 from rhot_app.objects.object_file import Name, ObjectModel, load_object, require_distinct
-from rhot_node.files import decode_document, read_document, write_document
+from rhot_node.files import decode_document, read_document, read_json, write_document
 from rhot_node.markers import MarkerSet
 
 FORMAT: Final = "rhot-rig"
@@ -409,6 +409,15 @@ def load_rig(path: Path, folder: Path | None = None) -> Rig:
     """
     rig = read_document(path, Rig, format_name=FORMAT, version=VERSION, error=RigError)
     return _with_models(rig, path.parent if folder is None else folder, str(path))
+
+
+def is_rig_file(path: Path) -> bool:
+    """Whether the file says that it is a rig, sound or not."""
+    try:
+        document = read_json(path, RigError)
+    except RigError:
+        return False
+    return isinstance(document, dict) and document.get("format") == FORMAT
 
 
 def parse_rig(data: bytes, where: str) -> Rig:

@@ -203,6 +203,15 @@ def _link_advice(facts: NodeFacts, running: bool) -> list[Advice]:
     return found
 
 
+def listening_advice(rig: Rig) -> list[Advice]:
+    """What programs a rig lets in, or sends to: whoever opens a rig file of somebody else should know."""
+    found = [f"opens the output {output.spec}" for output in rig.outputs if output.enabled]
+    found += [f"takes poses of {one.model.name} from {one.poses.source}, which any program of this computer may send"
+              for one in rig.objects if one.model is not None and one.poses is not None
+              and one.poses.source.startswith("udp:")]
+    return [Advice("info", f"This rig {' and '.join(found)}.")] if found else []
+
+
 def calibration_advice(rig: Rig) -> list[Advice]:
     """One sentence while lenses or poses are not calibrated or no length was checked, as ``rhot check`` words it."""
     found = calibration_finding(rig)

@@ -79,7 +79,7 @@ def print_addresses(serve: Serving) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the engine until SIGTERM, SIGINT or the command ``quit``."""
-    from rhot_app.engine.advice import calibration_advice
+    from rhot_app.engine.advice import calibration_advice, listening_advice
     from rhot_app.engine.serve import serving
     from rhot_app.keys import load_master_keys
     from rhot_app.project import load_rig
@@ -107,8 +107,8 @@ def run(args: argparse.Namespace) -> int:
             told = "nodes are told to stream" if args.start else "nodes stream once a client says start"
             print(f"rhot: the engine of {rig.name} serves clients in {serve.directory.path}; {told}. Ctrl+C ends it.",
                   file=sys.stderr, flush=True)
-        for advice in calibration_advice(rig):
+        for advice in (*calibration_advice(rig), *listening_advice(rig)):
             print(f"rhot: {advice.text}", file=sys.stderr, flush=True)
-            print_addresses(serve)
+        print_addresses(serve)
         serve.server.run()
     return 0

@@ -24,7 +24,7 @@ from rhot_app.engine.output_process import OutputProcess
 from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work, warm_up
 from rhot_app.engine.status import Advice, EngineStatus
 from rhot_app.errors import EngineError
-from rhot_app.project import Rig
+from rhot_app.project import Rig, is_rig_file
 from rhot_app.recording.bookmarks import Bookmark, bookmark_record
 from rhot_app.recording.raw_log import begun_now
 from rhot_app.recording.recorder import Recorder
@@ -207,6 +207,8 @@ class Engine:
             target = path or self.rig_path
             if target is None:
                 raise EngineError("this rig came from no file; give a path to save it to.")
+            if target.exists() and not is_rig_file(target):
+                raise EngineError(f"{target}: is no rig file, so it is not replaced. Choose another name.")
             self._follow_nodes()
             accept(target, self.rig, "saving the engine's rig")
             self.rig_path = target

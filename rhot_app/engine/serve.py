@@ -28,6 +28,7 @@ from rhot_app.project import OutputSettings, Rig
 from rhot_app.sources.receiver import share_interpreter
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.compiled import announce_compilation
+from rhot_node.files import JSON_BYTES_MAX
 from rhot_node.keys import KeyPair
 from rhot_node.logs import cut_log
 from rhot_node.threads import Task
@@ -110,6 +111,7 @@ STATUS_NS = 100_000_000
 SLOW = frozenset({"set_rig"})
 """Commands that may compile for a minute."""
 
+_COMMAND_MAX = 2 * JSON_BYTES_MAX  # a longer one is cut off, with its client's connection
 _SEND_QUEUE = 1000  # messages kept for a slow client before it misses some
 _POLL_MS = 20
 
@@ -245,6 +247,7 @@ def _bind(context: zmq.Context[zmq.Socket[bytes]], kind: int, endpoint: str) -> 
     socket = context.socket(kind)
     socket.setsockopt(zmq.LINGER, 0)
     socket.setsockopt(zmq.SNDHWM, _SEND_QUEUE)
+    socket.setsockopt(zmq.MAXMSGSIZE, _COMMAND_MAX)
     try:
         socket.bind(endpoint)
         Path(endpoint.removeprefix("ipc://")).chmod(0o600)

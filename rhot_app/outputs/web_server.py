@@ -6,12 +6,15 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import ipaddress
 import logging
+import socket
 import ssl
 import threading
 from collections import deque
 from collections.abc import Callable
 from typing import Final
+from urllib.parse import SplitResult, urlsplit
 
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
@@ -121,10 +124,24 @@ class WebServer:
     def _process(self, _connection: ServerConnection, request: Request) -> Response | None:
         if getattr(request, "method", "GET") != "GET":  # older versions of the library refuse others themselves
             return text_answer(405, "Nothing can be written here.")
+        if not self._asked_by_its_name(request) or not _of_this_origin(request):
+            return text_answer(403, "This server is spoken to by its own address, and by its own pages only.")
         answer = self._answer(request)
         if answer is None and len(self._clients) >= CLIENTS_MAX:
             return text_answer(503, "There are too many clients.")
         return answer
+
+    def _asked_by_its_name(self, request: Request) -> bool:
+        """Whether Host is an address or a name of this computer: a name that somebody else may point here is not."""
+        hosts = request.headers.get_all("Host")
+        name = (_split(f"//{hosts[0]}").hostname or "") if len(hosts) == 1 else ""
+        here = socket.gethostname().lower()
+        if name in ("localhost", self._host.lower(), here, f"{here}.local"):
+            return True
+        with contextlib.suppress(ValueError):
+            ipaddress.ip_address(name)
+            return True
+        return False
 
     async def _handle(self, connection: ServerConnection) -> None:
         client = _Client()
@@ -151,6 +168,19 @@ class WebServer:
             return f"port {self._port} of {self._host} may not be opened by this user; choose one above 1023."
         return (f"port {self._port} of {self._host!r} cannot be opened ({exc.strerror or exc}); is that an address of "
                 "this computer?")
+
+
+def _of_this_origin(request: Request) -> bool:
+    """Whether no page of another server asks: a browser says in Origin which one does, a program says nothing."""
+    hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
+    return all(_split(origin).netloc.lower() == hosts[0].lower() for origin in origins)
+
+
+def _split(url: str) -> SplitResult:
+    try:
+        return urlsplit(url)
+    except ValueError:  # brackets that do not match
+        return SplitResult("", "", "", "", "")
 
 
 async def _send_all(connection: ServerConnection, client: _Client) -> None:

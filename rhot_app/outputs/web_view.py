@@ -114,6 +114,19 @@ def _names(host: str) -> tuple[str, ...]:
 DAYS: Final = 397  # browsers believe none that is longer (CA/Browser Forum, baseline requirements 6.3.2)
 _DAY_S: Final = 86400
 _TIMEOUT_S: Final = 20.0
+_WISHES: Final = """[req]
+prompt = no
+distinguished_name = name
+x509_extensions = server
+[name]
+CN = RHOT
+[server]
+basicConstraints = critical, CA:FALSE
+keyUsage = critical, digitalSignature
+extendedKeyUsage = serverAuth
+subjectAltName = {alternatives}
+"""
+"""Of openssl: a certificate of this server alone, with which nobody can vouch for another."""
 
 
 def server_context(names: tuple[str, ...]) -> ssl.SSLContext:
@@ -133,7 +146,7 @@ def server_context(names: tuple[str, ...]) -> ssl.SSLContext:
 
 def _path(names: tuple[str, ...]) -> Path:
     digest = hashlib.sha256("\n".join(sorted(names)).encode()).hexdigest()[:16]
-    return keys_path().parent / f"web-{digest}.pem"
+    return keys_path().parent / f"web-server-{digest}.pem"
 
 
 def _make(path: Path, names: tuple[str, ...]) -> None:
@@ -141,9 +154,10 @@ def _make(path: Path, names: tuple[str, ...]) -> None:
     alternatives = ",".join(f"{'IP' if _is_address(name) else 'DNS'}:{name}" for name in names)
     with tempfile.TemporaryDirectory(prefix="rhot-certificate-") as folder:  # of mode 0700
         key, certificate = Path(folder, "key.pem"), Path(folder, "certificate.pem")
+        wishes = Path(folder, "openssl.cnf")
+        wishes.write_text(_WISHES.format(alternatives=alternatives))
         made = _openssl("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
-                        "-keyout", str(key), "-out", str(certificate), "-days", str(DAYS), "-subj", "/CN=RHOT",
-                        "-addext", f"subjectAltName={alternatives}")
+                        "-keyout", str(key), "-out", str(certificate), "-days", str(DAYS), "-config", str(wishes))
         if made is None:
             raise OutputError(f"openssl could not make a certificate for {names[0]}; is that a name or an address?")
         try:

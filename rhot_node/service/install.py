@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rhot_node.config import NodeSettings, changed_settings, load_settings, save_settings
-from rhot_node.errors import NodeError
+from rhot_node.errors import NodeError, printable
 from rhot_node.files import resource_path, write_atomically
 from rhot_node.markers import load_markers
 
@@ -104,6 +104,9 @@ def _command(service: Service) -> str:
 
 def _quoted(word: str) -> str:
     """A word of a command line as systemd reads it: % and $ stand for themselves only when doubled."""
+    if not word.isprintable():
+        raise NodeError(f"{printable(word)!r} cannot stand in a service: it has a line break or another control "
+                        "character.")
     word = word.replace("%", "%%").replace("$", "$$")
     if word and all(character.isalnum() or character in "/._-:?=%$,+@" for character in word):
         return word

@@ -188,6 +188,10 @@ def test_rig_travels_and_is_validated(client: EngineClient, tmp_path: Path, benc
     assert bench.engine.rig.name == "another"
     assert client.command("save_rig", path=str(tmp_path / "rig.json"))["path"] == str(tmp_path / "rig.json")
     assert load_rig(tmp_path / "rig.json") == bench.engine.rig
+    (tmp_path / "letter.json").write_text('{"format": "a letter"}')
+    with pytest.raises(EngineError, match="no rig file"):
+        client.command("save_rig", path=str(tmp_path / "letter.json"))
+    assert (tmp_path / "letter.json").read_text() == '{"format": "a letter"}'
 
 
 class SlowTracker(FakeTracker):

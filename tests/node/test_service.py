@@ -106,6 +106,9 @@ def test_installing_again_keeps_user_and_settings(tmp_path: Path) -> None:
     before = pi.settings.read_bytes()
     pi.commands.clear()
     pi.install(camera="/dev/video2")
+    for strange in ("pi\nExecStartPre=/bin/true", "pi\r", "\x1b[2J"):
+        with pytest.raises(NodeError, match="control character"):
+            pi.install(camera=strange)
     assert pi.settings.read_bytes() == before and not any("useradd" in line for line in pi.commands)
     assert "--camera /dev/video2" in pi.unit.read_text()
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import http.client
 import os
 import shutil
+import socket
 import ssl
+import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -21,6 +23,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from rhot_app.outputs.spec import SECRET_VARIABLE, web_settings
+from rhot_app.outputs.web_view import server_context
 from rhot_app.project import Rig
 
 needs_openssl = pytest.mark.skipif(shutil.which("openssl") is None and not os.environ.get("CI"),
@@ -163,6 +166,35 @@ def test_other_computers_are_served_encrypted(stream: Callable[..., Stream], pag
     page.draw_seldom()
     page.open(here)
     page.until("window.rhot && rhot.received > 5 && isSecureContext")
+
+
+@pytest.mark.parametrize("headers", [
+    {"Origin": "http://evil.example"}, {"Origin": "null"}, {"Host": "evil.example"}, {"Host": "evil.example:80"},
+    {"Host": "[::1"}])
+def test_another_servers_page_and_a_name_that_others_point_here_are_refused(
+        stream: Callable[..., Stream], headers: dict[str, str]) -> None:
+    _, url = view_of(stream)
+    where = urlsplit(url)
+    lines = {"Host": where.netloc, "Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13",
+             "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==", **headers}
+    own = {**lines, "Host": where.netloc, "Origin": f"http://{where.netloc}"}
+    for wanted, sent in ((b" 403 ", lines), (b" 101 ", own)):
+        assert where.hostname is not None
+        with socket.create_connection((where.hostname, where.port or 80), PATIENCE_S) as raw:
+            said = "".join(f"{name}: {value}\r\n" for name, value in sent.items())
+            raw.sendall(f"GET {where.path}states HTTP/1.1\r\n{said}\r\n".encode())
+            assert wanted in raw.recv(200)
+
+
+@needs_openssl
+def test_the_certificate_vouches_for_this_server_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RHOT_KEYS", str(tmp_path / "keys.json"))
+    server_context(("192.0.2.7", "desk"))
+    (path,) = tmp_path.glob("web-server-*.pem")
+    text = subprocess.run(["openssl", "x509", "-in", str(path), "-noout", "-text"], check=True, capture_output=True,
+                          text=True).stdout
+    assert "CA:FALSE" in text and "CA:TRUE" not in text and "TLS Web Server Authentication" in text
+    assert "192.0.2.7" in text and "DNS:desk" in text
 
 
 @needs_openssl

@@ -26,7 +26,7 @@ from rhot_app.engine.process import (
     running_engine,
     started_processes,
 )
-from rhot_app.errors import EngineError, SimulatorError
+from rhot_app.errors import EngineError, RecordingError, SimulatorError
 from rhot_app.project import load_rig, parse_rig, save_rig, with_tracker
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
 from rhot_node.compiled import WINDOW
@@ -171,9 +171,20 @@ class Session:
         if self.found() and not self._engine_is_ours():
             raise EngineError(f"An engine that was started by hand runs in {self._place.path}. Stop it first, or start "
                               "the app with another --directory.")
+        self._require_not_recording()
         report("Ending what ran before …", 0.12)
         self._twin_started = False
         end_started(self._place)
+
+    def _require_not_recording(self) -> None:
+        """Raises EngineError when the engine that is to be replaced records."""
+        if not self.found():
+            return
+        with contextlib.suppress(EngineError), EngineClient(self._place.path, states=False, events=False) as client:
+            log_path = client.command("status", timeout_s=1.0)["status"]["log_path"]
+            if log_path:
+                raise RecordingError(f"The engine in {self._place.path} records to {log_path}. Stop that recording "
+                                     "first, or start with another --directory.")
 
     def _compile(self, part: str, report: Report) -> None:
         compile_part(part, report, lambda pid: remember_process(self._place, pid, COMPILER_ROLE))
