@@ -198,7 +198,7 @@ class SlowSearches(ShownNodes):
             return first if self.searches == 1 else find(maps, rng)
         relocaliser.search_globally = search
         self.tracker.wait = lambda: eventually(lambda: (self.searches == 2 and not self.ended.is_set()) or not any(
-            thread.name == "find" for thread in threading.enumerate()))
+            thread.name == "searches for a hand" for thread in threading.enumerate()))
 
 
 def test_a_wrong_start_is_corrected_before_a_slow_second_search_ends(film) -> None:

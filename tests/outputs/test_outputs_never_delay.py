@@ -129,7 +129,8 @@ def test_a_client_that_never_reads_is_let_go_and_others_go_on(stream: Callable[.
     with socket.socket() as deaf:
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
         deaf.connect(("127.0.0.1", port))
-        deaf.send(b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        deaf.send(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n".encode()
+                  + b"Upgrade: websocket\r\nConnection: Upgrade\r\n"
                   b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n")
         eventually(lambda: running.outputs.status()[0].clients == 1)
         with connect(f"ws://127.0.0.1:{port}") as client:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from patience import eventually
 
+from rhot_app.diagnostics import Diagnostics
 from rhot_app.errors import RecordingError, RigError, SourceError
 from rhot_app.geometry.transforms import exp_so3, log_so3, quaternion_from_rotation, rigid
 from rhot_app.objects.alignment.alignment_file import Alignment, RigidTransform, save_alignment
@@ -129,7 +130,7 @@ def test_poses_are_delivered_recorded_and_replayed_alike(rig: Rig) -> None:
     assert source.closed and [one.name for one in delivered] == ["cup"] * 5
     replayed = [LogValidator(rig).feed(record) for record in records]
     assert all(isinstance(one, MeasuredPose) for one in replayed)
-    objects = [RigObjects(rig), RigObjects(rig)]
+    objects = [RigObjects(rig, Diagnostics()), RigObjects(rig, Diagnostics())]
     for tracked, given in zip(objects, (delivered, replayed), strict=True):
         for one in given:
             tracked.ingest_objects(one)  # type: ignore[arg-type]
@@ -249,7 +250,7 @@ def replace_model(entry: RigObject) -> RigObject:
 
 
 def test_a_pose_of_an_unknown_object_changes_nothing(rig: Rig) -> None:
-    objects = RigObjects(rig)
+    objects = RigObjects(rig, Diagnostics())
     one = in_rig(measured(10**9), "spoon", poses("a"), alignment_of())
     objects.ingest_objects(replace(one))
     assert objects.states(10**9)[0].validity is ObjectValidity.SEARCHING
