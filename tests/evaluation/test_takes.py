@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -71,7 +72,7 @@ def test_one_order_is_filmed_once_and_the_same_anywhere(tmp_path: Path) -> None:
     logs = []
     for folder in (tmp_path / "a", tmp_path / "a", tmp_path / "b"):
         one = data_set(order, folder, told.append)
-        with LogReader(one.folder / LOG_NAME) as reader:
+        with contextlib.closing(LogReader(one.folder / LOG_NAME)) as reader:
             logs.append(list(reader))  # the header says when it was filmed
         assert not one.outdated
     assert told == ["pinch, 0.3 s, seed 3"] * 2
