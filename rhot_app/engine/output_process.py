@@ -245,14 +245,14 @@ def main() -> int:
             program.tell()
         except BrokenPipeError:  # the engine has ended
             ended.set()
-        teller.ending.wait(STATUS_S)
-    teller = Worker("tells the engine how the outputs go", tell)
-    teller.start()
+        reporter.ending.wait(STATUS_S)
+    reporter = Worker("tells the engine how the outputs go", tell)
+    reporter.start()
     try:
         while not ended.is_set() and rig_reader.running:
             program.step()
     finally:
-        teller.close()
+        reporter.close()
         program.close()
         context.destroy(0)
     return 0

@@ -81,8 +81,10 @@ def test_the_command_line_and_the_rig_both_stream(tmp_path: Path, streaming_rig:
                 eventually(lambda: client.poll(0.1) and client.status is not None and len(client.status.outputs) == 2)
         finally:
             process.send_signal(signal.SIGTERM)
-        process.communicate(timeout=PATIENCE_S)
+        said = process.communicate(timeout=PATIENCE_S)[1]
     assert process.returncode == 0
+    assert said.count(f"web view is at {web}") == 1, "whatever else is said of the rig"
+    assert f"opens the output ws:{ports[0]}" in said, "the rig's author may be somebody else"
     taken.close()
 
 

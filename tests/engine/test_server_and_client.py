@@ -25,6 +25,7 @@ from rhot_app.recording.video import video_name
 from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.links import UdpNodes
 from rhot_app.state import HandState
+from rhot_node.files import JSON_BYTES_MAX
 from rhot_node.threads import Task
 from rhot_node.wire.messages import NodeState
 
@@ -316,6 +317,17 @@ def test_broken_bytes_are_refused_and_the_engine_lives(refusing: EngineClient, d
         socket.send(data)
         assert socket.poll(PATIENCE_MS)
         assert msgspec.json.decode(socket.recv())["ok"] is False
+    assert refusing.command("hello")["pid"]
+
+
+def test_a_command_without_end_is_not_read(refusing: EngineClient) -> None:
+    with zmq.Context.instance().socket(zmq.REQ) as socket:
+        socket.linger = 0
+        events = socket.get_monitor_socket(zmq.EVENT_DISCONNECTED)
+        socket.connect(refusing.directory.commands)
+        socket.send(bytes(2 * JSON_BYTES_MAX + 1))
+        assert events.poll(PATIENCE_MS), "the engine ends the connection"
+        socket.disable_monitor()
     assert refusing.command("hello")["pid"]
 
 

@@ -12,8 +12,9 @@ import pytest
 from fake_engine import synthetic_rig
 from patience import PATIENCE_S, eventually
 
+from rhot_app.engine.client import EngineClient
 from rhot_app.engine.process import running_engine, start_ticks
-from rhot_app.errors import EngineError, RigError, SimulatorError
+from rhot_app.errors import EngineError, RecordingError, RigError, SimulatorError
 from rhot_app.project import save_rig, with_tracker
 from rhot_app.ui.backend import session as session_module
 from rhot_app.ui.backend.contract import TwinChoice, TwinPace
@@ -66,6 +67,19 @@ def test_an_engine_started_by_hand_is_left_running(session, rig_path):
     finally:
         process.terminate()
         process.wait(PATIENCE_S)
+
+
+def test_an_engine_that_records_is_not_replaced(session, rig_path, tmp_path):
+    session.open_rig(rig_path, quiet)
+    engine = running_engine(session.directory)
+    with EngineClient(session.directory) as client:
+        client.command("record", path=str(tmp_path / "r.rhotlog"))
+        with pytest.raises(RecordingError, match=r"r\.rhotlog"):
+            session.open_rig(rig_path, quiet)
+        assert running_engine(session.directory) == engine
+        client.command("record_stop")
+    session.open_rig(rig_path, quiet)
+    assert running_engine(session.directory) not in (None, engine)
 
 
 def test_a_missing_rig_starts_nothing(session, tmp_path):
