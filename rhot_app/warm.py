@@ -50,7 +50,7 @@ from rhot_node.foreground_store import ForegroundStore
 from rhot_node.markers import load_markers
 from rhot_node.slice_search import SliceSearch
 from rhot_node.tag_search import warm_up_picture
-from rhot_node.threads import Task
+from rhot_node.threads import OneShotThread
 from rhot_node.warm_up import warm_up as warm_up_detector
 from rhot_node.wire.messages import FAMILIES
 
@@ -181,7 +181,7 @@ def start_worker() -> None:
         parent.join()
         os._exit(1)
 
-    Task("ends with its parent", watch)
+    OneShotThread("ends with its parent", watch)
 
 
 def yield_processor() -> None:

@@ -28,7 +28,7 @@ from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import NodeError
 from rhot_node.files import open_input, write_atomically
 from rhot_node.network.pictures import PictureBox
-from rhot_node.threads import Task
+from rhot_node.threads import OneShotThread
 
 log = logging.getLogger(__name__)
 
@@ -65,7 +65,7 @@ class ForegroundStore:
         self.current = _FLAT
         self._failure = ""
         self._until_s = 0.0
-        self._task: Task | None = None
+        self._task: OneShotThread | None = None
         self._ending = threading.Event()  # of the thread
         self._changing = threading.Lock()
         if path is not None and path.exists():
@@ -105,8 +105,8 @@ class ForegroundStore:
         if self.learning:
             raise NodeError("the background is being learnt already; wait for its end.")
         self._failure, self._until_s, self._ending = "", time.monotonic() + seconds, threading.Event()
-        self._task = Task("learns the background", functools.partial(self._learn, pictures, save, self._until_s,
-                                                                     self._ending))
+        learn = functools.partial(self._learn, pictures, save, self._until_s, self._ending)
+        self._task = OneShotThread("learns the background", learn)
 
     def learn_skin(self, pictures: PictureBox, *, save: bool = True) -> bool:
         """Learn the skin's colours from the next picture. False when it shows no skin; generic colours are then used.

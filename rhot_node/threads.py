@@ -141,7 +141,7 @@ class Worker:
         return True
 
 
-class Task:
+class OneShotThread:
     """A thread for one piece of work. `failure` says why it failed."""
 
     def __init__(self, what: str, work: Callable[[], object], *, hang_s: float | None = None) -> None:

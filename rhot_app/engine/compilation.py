@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig
 from rhot_node.compiled import ALL, VARIABLE, WINDOW, is_complete
-from rhot_node.threads import Task
+from rhot_node.threads import OneShotThread
 
 Report = Callable[[str, float], None]
 
@@ -83,7 +83,7 @@ class BackgroundCompilation:
         """Start, unless it has started or everything is compiled."""
         if self._process is None and is_missing(ALL):
             self._process = _start([*self._command, ALL, "--background"])
-            self._task = Task("follows the compilation", functools.partial(self._watch, self._process))
+            self._task = OneShotThread("follows the compilation", functools.partial(self._watch, self._process))
 
     def close(self) -> None:
         """End it. The next start goes on where it ended."""

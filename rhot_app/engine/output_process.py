@@ -34,7 +34,7 @@ from rhot_app.outputs.spec import SECRET_VARIABLE, OutputStatus, as_run
 from rhot_app.project import OutputSettings, Rig, parse_rig
 from rhot_app.state import HandState
 from rhot_node.logs import log_to_stderr
-from rhot_node.threads import Task, Watch, Worker, complaints
+from rhot_node.threads import OneShotThread, Watch, Worker, complaints
 
 RESTART_S: Final = 1.0
 SETTLE_S: Final = 15.0  # a process that starts, on a busy computer
@@ -148,7 +148,7 @@ class OutputProcess:
         self._process = subprocess.Popen([sys.executable, "-m", "rhot_app.engine.output_process", self._endpoint],
                                          stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=self._environment)
         self._faults = ()
-        self._reader = Task("reads the outputs' status", functools.partial(self._read, self._process))
+        self._reader = OneShotThread("reads the outputs' status", functools.partial(self._read, self._process))
         self._tell()
 
     def _tell(self) -> None:
@@ -232,7 +232,7 @@ def main() -> int:
         for line in sys.stdin.buffer:
             rigs.append(line)
         ended.set()
-    rig_reader = Task("reads the engine's rigs", read)
+    rig_reader = OneShotThread("reads the engine's rigs", read)
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     states = context.socket(zmq.SUB)
     states.setsockopt(zmq.RCVHWM, _RECEIVE_QUEUE)

@@ -30,7 +30,7 @@ from rhot_app.tracking.refinement.refined_rig import (
 )
 from rhot_app.tracking.refinement.rig_refinement import Gathered, RigRefiner
 from rhot_app.tracking.tracker import CameraObservations, KeepsKeyFrames, Tracker
-from rhot_node.threads import Task
+from rhot_node.threads import OneShotThread
 
 log = logging.getLogger(__name__)
 
@@ -52,7 +52,7 @@ class RigWatch:
         self._newest: Refinement | None = None
         self._judged_ns = 0
         self._run = 0
-        self._task: Task | None = None
+        self._task: OneShotThread | None = None
 
     def restart(self) -> None:
         """A new run begins; what is being judged is of the last one."""
@@ -69,7 +69,8 @@ class RigWatch:
         """Judge anew every ten seconds; mostly what was said before."""
         if now_ns - self._judged_ns >= JUDGE_NS and (self._task is None or not self._task.running):
             self._judged_ns = now_ns
-            self._task = Task("refines the rig", functools.partial(self._judge, self._refiner.gather(), self._run))
+            judge = functools.partial(self._judge, self._refiner.gather(), self._run)
+            self._task = OneShotThread("refines the rig", judge)
         found = self._newest
         if found is None or found.holds:
             return []
@@ -108,7 +109,7 @@ class HandWatch:
         self._newest: Adapted | None = None
         self._judged_ns = self._solved_ns = -JUDGE_NS
         self._enough, self._run = False, 0
-        self._task: Task | None = None
+        self._task: OneShotThread | None = None
 
     def restart(self) -> None:
         """A new run begins."""
@@ -135,7 +136,7 @@ class HandWatch:
         kept = _kept(tracker)
         if kept and now_ns - self._solved_ns >= JUDGE_NS and (self._task is None or not self._task.running):
             self._solved_ns = now_ns
-            self._task = Task("adapts the hand", functools.partial(self._solve, kept, self._run))
+            self._task = OneShotThread("adapts the hand", functools.partial(self._solve, kept, self._run))
         found = self._newest
         if found is None:
             return {"known": False}

@@ -31,7 +31,7 @@ from rhot_node.compiled import announce_compilation
 from rhot_node.files import JSON_BYTES_MAX
 from rhot_node.keys import KeyPair
 from rhot_node.logs import cut_log
-from rhot_node.threads import Task
+from rhot_node.threads import OneShotThread
 
 _COLLECT_S = 5.0
 
@@ -236,7 +236,7 @@ class _Change:
         self.client = client
         self.answer: tuple[Answer, bytes | None] = refusal(EngineError("the engine could not do that.")), None
         self._carry_out = carry_out
-        self.task = Task("changes the rig", self._run)
+        self.task = OneShotThread("changes the rig", self._run)
 
     def _run(self) -> None:
         self.answer = self._carry_out()

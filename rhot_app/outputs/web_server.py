@@ -22,7 +22,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from rhot_app.errors import OutputError
-from rhot_node.threads import FOREIGN, Task
+from rhot_node.threads import FOREIGN, OneShotThread
 
 CLIENTS_MAX: Final = 32
 CLIENT_QUEUE: Final = 4  # messages that wait for one client
@@ -58,7 +58,7 @@ class WebServer:
         self._ending: asyncio.Event | None = None
         self._opened = threading.Event()
         self._failure: OutputError | None = None
-        self._task: Task | None = None
+        self._task: OneShotThread | None = None
 
     @property
     def clients(self) -> int:
@@ -69,7 +69,7 @@ class WebServer:
         """Listen; raises OutputError when the port cannot be had."""
         self._opened.clear()
         self._failure = None
-        self._task = Task(f"serves port {self._port}", self._run)
+        self._task = OneShotThread(f"serves port {self._port}", self._run)
         if not self._opened.wait(OPEN_S):
             raise OutputError(f"port {self._port} of {self._host} could not be opened within {OPEN_S:g} s.")
         if self._failure is not None:

@@ -19,7 +19,7 @@ from rhot_app.project import RigNode
 from rhot_app.sources.discovery import Browse, FindSocket, Found, Sighting, ZeroconfBrowser
 from rhot_app.sources.node_link import NodeLink
 from rhot_node.network.presence import is_loopback
-from rhot_node.threads import Task
+from rhot_node.threads import OneShotThread
 
 LOST_NS = 2_000_000_000
 """A node that has answered nothing for so long is looked for."""
@@ -145,7 +145,7 @@ class _Browser:
 
     def __init__(self, browse: Browse, found: Found) -> None:
         self._ending = threading.Event()
-        self._task = Task("looks for nodes by zeroconf", functools.partial(self._run, browse, found))
+        self._task = OneShotThread("looks for nodes by zeroconf", functools.partial(self._run, browse, found))
 
     def close(self) -> None:
         """End it, soon."""

@@ -21,7 +21,7 @@ from rhot_app.sources.receiver import Deliver, NodeReceiver, to_nobody
 from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.errors import WireError
 from rhot_node.files import decode_message
-from rhot_node.threads import FOREIGN, Task
+from rhot_node.threads import FOREIGN, OneShotThread
 from rhot_node.wire.codec import decode_verified
 from rhot_node.wire.messages import ClockReply, ClockRequest, Slices, Start
 
@@ -121,7 +121,7 @@ class LogReplay:
         self.links = self._door.links
         self._notice = ""
         self._ending = threading.Event()
-        self._task: Task | None = None
+        self._task: OneShotThread | None = None
 
     @property
     def changes(self) -> int:
@@ -149,7 +149,7 @@ class LogReplay:
         self.over = False
         self._ending.clear()
         self._door.rewind()
-        self._task = Task("replays the log", self._run)
+        self._task = OneShotThread("replays the log", self._run)
 
     def stop(self) -> None:
         """End the replay."""

@@ -19,7 +19,7 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, from_bgr
 from rhot_node.errors import CameraError
-from rhot_node.threads import Task
+from rhot_node.threads import OneShotThread
 
 log = logging.getLogger(__name__)
 
@@ -162,7 +162,7 @@ class LatestGrabber:
         self._newest: Grabbed | None = None
         self._failed = False
         self._ending = False
-        self._task = Task("reads the camera", self._run)
+        self._task = OneShotThread("reads the camera", self._run)
 
     @property
     def failed(self) -> bool:

@@ -25,7 +25,7 @@ from rhot_node.capture.camera import Frame
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import NodeError, VideoError
 from rhot_node.files import open_input, read_document, write_document
-from rhot_node.threads import Task
+from rhot_node.threads import OneShotThread
 from rhot_node.video.avi import BYTES_MAX, Stamp, append_picture, begin_video, encode_picture, finish_video
 
 log = logging.getLogger(__name__)
@@ -91,7 +91,7 @@ class VideoRecorder:
         self._current: _Take | None = None
         self._takes: dict[str, _Take] = {}  # of this run of the node
         self._mending = {path.stem for path in folder.glob("*.avi") if not path.with_suffix(".json").exists()}
-        self._mender = Task("mends videos", functools.partial(self._mend, sorted(self._mending)))
+        self._mender = OneShotThread("mends videos", functools.partial(self._mend, sorted(self._mending)))
 
     def offer(self, frame: Frame) -> None:
         """Copy the frame for the video, if there is one; else cost nothing."""
@@ -204,7 +204,7 @@ class _Take:
         self._message = ""
         self._heard_s = time.monotonic()
         self._look_s = 0.0
-        self._task = Task("writes the video", self._run)
+        self._task = OneShotThread("writes the video", self._run)
 
     @property
     def info(self) -> VideoInfo:

@@ -26,7 +26,7 @@ from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.links import UdpNodes
 from rhot_app.state import HandState
 from rhot_node.files import JSON_BYTES_MAX
-from rhot_node.threads import Task
+from rhot_node.threads import OneShotThread
 from rhot_node.wire.messages import NodeState
 
 
@@ -230,7 +230,7 @@ def test_status_and_commands_go_on_while_a_rigs_tracker_is_compiled(
 
 
 def test_what_fails_in_a_thread_of_the_engine_is_told(bench: Bench, client: EngineClient) -> None:
-    task = Task("does nothing well", lambda: 1 // 0)
+    task = OneShotThread("does nothing well", lambda: 1 // 0)
     status = status_when(client, lambda status: any("does nothing well" in one.text for one in status.advice))
     assert any("ZeroDivisionError" in one.text and one.level == "error" for one in status.advice)
     task.join()

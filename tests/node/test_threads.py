@@ -10,7 +10,7 @@ import pytest
 from patience import PATIENCE_S, eventually
 
 from rhot_node import threads
-from rhot_node.threads import Task, TimedCalls, Worker, complaints
+from rhot_node.threads import OneShotThread, TimedCalls, Worker, complaints
 
 ROOT = Path(__file__).parents[2]
 
@@ -82,7 +82,7 @@ def test_begin_and_end_are_the_threads_own_and_may_fail() -> None:
 
 
 def test_a_task_that_fails_says_why() -> None:
-    task = Task("does one thing", lambda: [][1])
+    task = OneShotThread("does one thing", lambda: [][1])
     task.join(PATIENCE_S)
     assert not task.running and task.failure == "IndexError: list index out of range"
     assert said("does one thing")

@@ -25,7 +25,7 @@ from rhot_app.hand.motion.hand_process import FASTEST, POSE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.tracking.contours.evidence import joints_of
 from rhot_app.tracking.contours.requests import CameraFrames
-from rhot_node.threads import Task
+from rhot_node.threads import OneShotThread
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ class Finder:
         """`alone`: there is no second hand, with which a search of the whole image might confuse this one."""
         self._hand, self._alone = hand, alone
         self._rng = np.random.default_rng(0)
-        self._task: Task | None = None
+        self._task: OneShotThread | None = None
         self._newest: Maps | None = None
         self._found: tuple[int, HandPose, int] | None = None  # of which run
         self._change: tuple[int, Relocalisation] | None = None
@@ -159,7 +159,7 @@ class Finder:
 
     def _begin(self, search_for: Callable[..., None], *arguments: Any) -> None:
         if not self._busy:
-            self._task = Task("searches for a hand", functools.partial(search_for, *arguments))
+            self._task = OneShotThread("searches for a hand", functools.partial(search_for, *arguments))
 
     def _search(self, maps: Maps, run: int) -> None:
         pose = self._hand.relocaliser.search_globally(maps.probabilities, self._rng)
