@@ -205,9 +205,6 @@ def _base_rig(args: argparse.Namespace) -> Rig:
 
 # -- printed report ----------------------------------------------------------------------------------------------------
 
-LENS_NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-
-
 def fields_of(report: StereoReport, frame: WorldFrame | None) -> dict[str, Any]:
     """The JSON's fields; those of the first pair stand at the top. None where nothing was solved."""
     from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M
@@ -276,12 +273,14 @@ def lines_of(report: StereoReport, frame: WorldFrame | None) -> list[str]:
 
 
 def _camera(report: StereoReport, index: int) -> dict[str, Any]:
+    from rhot_app.geometry.camera import PARAMETERS, own_parameters, rig_intrinsics
+
     assert report.figures is not None
     camera = report.figures.cameras[index]
-    values = [float(value) for value in camera.lens]
-    return {"name": camera.name, **dict(zip(LENS_NAMES[:4], values[:4], strict=True)), "distortion": values[4:],
-            "size": list(camera.size), "rms_px": camera.rms_px,
-            "std": dict(zip(LENS_NAMES, [float(std) for std in camera.lens_std], strict=True))}
+    lens, own = rig_intrinsics(camera.size, camera.lens), own_parameters(camera.lens)
+    std = {name: float(std) for name, std, has in zip(PARAMETERS, camera.lens_std, own, strict=True) if has}
+    return {"name": camera.name, "fx": lens.fx, "fy": lens.fy, "cx": lens.cx, "cy": lens.cy,
+            "distortion": list(lens.distortion), "size": list(camera.size), "rms_px": camera.rms_px, "std": std}
 
 
 def _pair(pair: PairFigures) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig, RigNode
 from rhot_app.ui.common.controller import Controller
@@ -195,7 +196,7 @@ def camera_rows(rig: Rig) -> Rows:
 
 def _camera_row(node: RigNode) -> list[str]:
     lens = node.intrinsics
-    wide = 2 * np.degrees(np.arctan(0.5 * lens.width / lens.fx))
+    wide = np.degrees(CameraModel.from_rig(lens, node.pose).field_of_view[0])
     return [node.name, f"{lens.width} × {lens.height}", f"{wide:.1f}°", f"{lens.fx:.1f}, {lens.fy:.1f}",
             f"{lens.cx:.1f}, {lens.cy:.1f}", f"{lens.distortion[0]:.3f}, {lens.distortion[1]:.3f}",
             f"{node.address}:{node.control_port}"]
