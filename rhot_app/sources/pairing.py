@@ -136,7 +136,7 @@ def _ask(questions: Sequence[tuple[NodeAddress, dict[str, Any]]], timeout_s: flo
                 socket.send(msgspec.json.encode(question), zmq.DONTWAIT)
             except zmq.Again:
                 continue  # what listens there has hung up already; waiting to send would be for ever
-            except zmq.ZMQError as exc:
+            except (zmq.ZMQError, UnicodeError) as exc:
                 answers[place] = f"{str(address)!r} is not an address that can be asked ({exc})."
                 continue
             sockets[socket] = place
