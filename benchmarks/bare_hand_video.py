@@ -30,7 +30,7 @@ from rhot_app.articulated.bodies import hand_bodies, root_of  # noqa: E402
 from rhot_app.articulated.tracker import LayeredTracker  # noqa: E402
 from rhot_app.barehand.overlay import overlay  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
-from rhot_app.geometry.camera import CameraModel  # noqa: E402
+from rhot_app.geometry.camera import CameraModel, intrinsics_row  # noqa: E402
 from rhot_app.geometry.transforms import inverse, rigid  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY  # noqa: E402
@@ -61,8 +61,8 @@ def camera_of(folder: Path, index: int, square_m: float) -> CameraModel:
     lens, place = numbers(folder / f"c{index}.dat"), numbers(folder / f"rot_trans_c{index}.dat")
     left, _, right = np.linalg.svd(np.array(place[:3]))
     local = rigid(left @ right, square_m * np.array(place[3:6]).ravel())
-    return CameraModel(720, 720, np.array([lens[0][0], lens[1][1], lens[0][2], lens[1][2], *lens[3]]), inverse(local),
-                       local)
+    row = intrinsics_row([lens[0][0], lens[1][1], lens[0][2], lens[1][2], *lens[3]])
+    return CameraModel(720, 720, row, inverse(local), local)
 
 
 def landmarks(path: Path) -> dict[int, np.ndarray]:

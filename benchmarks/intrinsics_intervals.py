@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "calibrat
 from intrinsics_twin import BOARD, twin_views
 from tables import arguments, publish, table
 
-from rhot_app.calibration.lens.fit import PARAMETERS
 from rhot_app.calibration.lens.intrinsics import solve
+from rhot_app.geometry.camera import PARAMETERS, PLAIN, full_lens
 
 Array = NDArray[np.float64]
 
@@ -31,13 +31,13 @@ WAYS = {"perfect board": (0.0, False), "board off by 0.1 mm": (1.0, False), "squ
 
 
 def some_lens(random: np.random.Generator, square: bool) -> Array:
-    """(9,) a lens as cheap cameras have them."""
+    """(12,) a lens as cheap cameras have them."""
     fx = random.uniform(480.0, 620.0)
     fy = fx if square else fx * random.normal(1.0, 0.003)
     centre = random.normal([319.5, 239.5], [12.0, 12.0])
     k1 = random.uniform(-0.32, 0.05)
     radial = [k1, -0.35 * k1 + random.normal(0.0, 0.03)]
-    return np.array([fx, fy, *centre, *radial, *random.normal(0.0, 8e-4, 2), random.normal(0.0, 0.03)])
+    return full_lens([fx, fy, *centre, *radial, *random.normal(0.0, 8e-4, 2), random.normal(0.0, 0.03)])
 
 
 def run(args: argparse.Namespace, off: float, square: bool) -> Tally:
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace, off: float, square: bool) -> Tally:
         errors = off * random.normal(0.0, BOARD_OFF_M, (BOARD.count, 3))
         views = twin_views(random, count=args.views, lens=lens, noise_px=args.noise, board_errors=errors)
         report = solve(views, BOARD, square_pixels=square)
-        for place, name in enumerate(PARAMETERS):
+        for place, name in enumerate(PARAMETERS[:PLAIN]):
             if not (square and name == "fy"):
                 tally.add(name, report.lens[place] - lens[place], report.std[place])
     return tally

@@ -25,15 +25,15 @@ from tables import arguments, publish, table
 
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.calibrate import calibrate
+from rhot_app.geometry.camera import LENS, PARAMETERS, PLAIN, full_lens
 from rhot_app.geometry.transforms import log_so3
 
 Array = NDArray[np.float64]
 
-LENS_STD = np.array([1.0, 1.0, 1.5, 1.5, 5e-3, 1e-2, 3e-4, 3e-4, 1e-2])
+LENS_STD = full_lens([1.0, 1.0, 1.5, 1.5, 5e-3, 1e-2, 3e-4, 3e-4, 1e-2])
 K3_SPREAD = 0.04
 NORMAL_95 = 1.959964
 BOARD_OFF_M = 1e-4
-NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 
 
 @dataclass
@@ -58,12 +58,12 @@ class Tally:
 
 def from_views(twin: Twin, rng: np.random.Generator) -> list[LensStart]:
     """Lenses somewhere near, to be found from the same views."""
-    return [LensStart(lens + rng.normal(size=9) * LENS_STD, SIZE, None, "views") for lens in twin.lenses]
+    return [LensStart(lens + rng.normal(size=LENS) * LENS_STD, SIZE, None, "views") for lens in twin.lenses]
 
 
 def given(twin: Twin, rng: np.random.Generator) -> list[LensStart]:
     """Lenses as another calibration would give them: off, and saying by how much."""
-    return [LensStart(lens + rng.normal(size=9) * LENS_STD, SIZE, LENS_STD) for lens in twin.lenses]
+    return [LensStart(lens + rng.normal(size=LENS) * LENS_STD, SIZE, LENS_STD) for lens in twin.lenses]
 
 
 def run(starts: Callable[[Twin, np.random.Generator], list[LensStart]], args: argparse.Namespace, *,
@@ -73,7 +73,7 @@ def run(starts: Callable[[Twin, np.random.Generator], list[LensStart]], args: ar
     for seed in range(args.seeds):
         rng = np.random.default_rng([seed, 1])
         twin = stereo_twin(seed, args.shots)
-        lenses = twin.lenses + np.outer(rng.normal(0.0, K3_SPREAD, len(twin.lenses)), np.eye(len(NAMES))[-1])
+        lenses = twin.lenses + np.outer(rng.normal(0.0, K3_SPREAD, len(twin.lenses)), np.eye(LENS)[PLAIN - 1])
         twin = replace(twin, lenses=lenses, board_errors_m=rng.normal(0.0, board_off_m, (twin.board.count, 3)))
         figures = calibrate(twin.views(rng, args.noise), starts(twin, rng), refine=refine).figures
         if figures is None:
@@ -86,7 +86,7 @@ def run(starts: Callable[[Twin, np.random.Generator], list[LensStart]], args: ar
             tally.add(f"R{axis}", turn[i], pair.rotation_std_rad[i])
         if lenses_too:
             for camera, lens in zip(figures.cameras, twin.lenses, strict=True):
-                for i, name in enumerate(NAMES):
+                for i, name in enumerate(PARAMETERS[:PLAIN]):
                     tally.add(name, camera.lens[i] - lens[i], camera.lens_std[i])
     return tally
 

@@ -27,12 +27,13 @@ from rhot_app.calibration.stereo.calibrate import calibrate
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import RhotError
+from rhot_app.geometry.camera import full_lens
 from rhot_app.ui.backend.feed import LiveFeed
 from rhot_app.ui.backend.session import Session, TwinChoice
 from rhot_app.ui.backend.solver import Solver
 
 NOISE_PX = 0.05
-LENS = np.array([530.0, 530.0, 319.5, 239.5, -0.1, 0.05, 0.0, 0.0, 0.0])
+LENS = full_lens([530.0, 530.0, 319.5, 239.5, -0.1, 0.05])
 BASELINE_M = 0.075
 
 

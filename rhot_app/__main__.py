@@ -12,7 +12,8 @@ from importlib.metadata import version
 from types import ModuleType
 
 from rhot_app.errors import RhotError, take_losses
-from rhot_node.errors import NodeError, nearest, printable_lines
+from rhot_node.errors import NodeError, nearest, system_sentence
+from rhot_node.terminal import printable_output
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,20 +60,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     not be done, as with a log that can be read in part only, 130 when interrupted."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     take_losses()
-    try:
-        code = _run(arguments)
-        losses = take_losses()
-        for sentence in losses:
-            print(f"rhot: {printable_lines(sentence)}", file=sys.stderr)
-        return 3 if losses and code == 0 else code
-    except (RhotError, NodeError) as exc:
-        print(f"rhot: {printable_lines(str(exc))}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
-    except BrokenPipeError:  # the reader of our output has had enough, as in `rhot replay ... --json | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+    with printable_output():
+        try:
+            code = _run(arguments)
+            losses = take_losses()
+            for sentence in losses:
+                print(f"rhot: {sentence}", file=sys.stderr)
+            return 3 if losses and code == 0 else code
+        except (RhotError, NodeError) as exc:
+            print(f"rhot: {exc}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            return 130
+        except BrokenPipeError:  # the reader of our output has had enough, as in `rhot replay ... --json | head`
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 1
+        except (OSError, MemoryError) as exc:
+            print(f"rhot: {system_sentence(exc)}", file=sys.stderr)
+            return 2
 
 
 def _run(arguments: list[str]) -> int:

@@ -64,14 +64,34 @@ def input_file(text: str) -> Path:
     return path
 
 
-def positive_number(text: str) -> float:
-    """Type of a command's argument that is a number above 0, for argparse."""
+def finite(text: str) -> float:
+    """Type of a command's argument that is a number, for argparse: not NaN, which passes many a limit, nor infinite."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+    return value
+
+
+def positive_number(text: str) -> float:
+    """Type of a command's argument that is a number above 0, for argparse."""
+    value = finite(text)
     if not 0.0 < value < 1e6:
         raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+    return value
+
+
+def whole(text: str) -> int:
+    """Type of a command's argument that is a whole number, for argparse: of at most 32 bits, so that it fits wherever
+    numbers are counted."""
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number") from None
+    if abs(value) >= 2**32:
+        raise argparse.ArgumentTypeError(f"{text} is too large")
     return value
 
 

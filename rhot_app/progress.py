@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable
 from typing import TextIO
 
+from rhot_node.errors import printable
+
 Progress = Callable[[str, float], None]
 """Called by long work with what it does and how much is done, 0..1. Whoever wants it to stop raises from here: the work
 passes every exception on and leaves nothing half-done."""
@@ -27,14 +29,14 @@ class ProgressLine:
     """Shows "what: 42 %, 12 s left" on `stream`; silent where it is not a terminal, except for the end."""
 
     def __init__(self, what: str, stream: TextIO | None = None) -> None:
-        self._what = what
-        self._stream = stream or sys.stderr
+        self._what = printable(what)
+        self._stream = getattr(stream or sys.stderr, "terminal", stream or sys.stderr)  # a line is rewritten by escapes
         self._began = time.monotonic()
         self._shown = 0.0
 
     def report(self, text: str, fraction: float) -> None:
         """Show a solver's progress; a `Progress`."""
-        self._what = text
+        self._what = printable(text)
         self(round(1000 * fraction), 1000)
 
     def __call__(self, done: int, total: int) -> None:

@@ -33,6 +33,7 @@ Pixels = Annotated[int, Meta(ge=16, le=16384)]
 Focal = Annotated[float, Meta(gt=0, le=1e6)]
 Pixel = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Coefficient = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Distortion = Annotated[tuple[Coefficient, ...], Meta(min_length=5, max_length=8)]
 Sd = Annotated[float, Meta(gt=0)]
 Metres = Annotated[float, Meta(ge=-1000, le=1000)]
 Address = Annotated[str, Meta(pattern=r"\A[A-Za-z0-9._:%-]{1,253}\Z")]
@@ -40,8 +41,16 @@ Address = Annotated[str, Meta(pattern=r"\A[A-Za-z0-9._:%-]{1,253}\Z")]
 PublicKey = Annotated[str, Meta(pattern=r"\A([0-9a-f]{64})?\Z")]
 
 
+def require_distortion(distortion: tuple[float, ...]) -> None:
+    """Raise ValueError unless there are as many coefficients as one of the two lens models has."""
+    if len(distortion) not in (5, 8):
+        raise ValueError(f"distortion has {len(distortion)} coefficients; it is k1, k2, p1, p2, k3, and of a wide lens "
+                         "also k4, k5, k6")
+
+
 class Intrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Pinhole with OpenCV's distortion (k1, k2, p1, p2, k3); pixels, (0, 0) at the centre of the top-left pixel."""
+    """Pinhole with OpenCV's distortion: k1, k2, p1, p2, k3, and of a wide lens also k4, k5, k6; pixels, (0, 0) at the
+    centre of the top-left pixel."""
 
     width: Pixels
     height: Pixels
@@ -49,7 +58,10 @@ class Intrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     fy: Focal
     cx: Pixel
     cy: Pixel
-    distortion: tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    distortion: Distortion = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require_distortion(self.distortion)
 
     @property
     def nominal(self) -> bool:

@@ -119,8 +119,7 @@ def warm_calibrations(rig: Rig) -> None:
     models = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
     footage = Footage(np.arange(3.0), np.full((3, len(models), 1, 2), 100.0),
                       np.array([model.intrinsics for model in models]),
-                      np.array([model.camera_from_world[:3] for model in models]),
-                      np.array([model.intrinsics[:2] for model in models]))
+                      np.array([model.camera_from_world[:3] for model in models]))
     simulate(footage, np.array([OFF]), np.array([OFF]))
 
 

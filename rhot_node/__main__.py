@@ -19,7 +19,8 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from rhot_node.commands import COMMANDS, HELP, run_command
-from rhot_node.errors import NodeError, printable_lines
+from rhot_node.errors import NodeError, system_sentence
+from rhot_node.terminal import printable_output
 
 if TYPE_CHECKING:
     from rhot_node.config import NodeSettings
@@ -72,15 +73,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv is None:
         _hide_scipy()
     arguments = list(sys.argv[1:] if argv is None else argv)
-    try:
-        if arguments and arguments[0] in COMMANDS:
-            return run_command(arguments[0], arguments[1:])
-        return _serve(_parse(arguments))
-    except NodeError as exc:
-        print(f"rhot-node: {printable_lines(str(exc))}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 0
+    with printable_output():
+        try:
+            if arguments and arguments[0] in COMMANDS:
+                return run_command(arguments[0], arguments[1:])
+            return _serve(_parse(arguments))
+        except NodeError as exc:
+            print(f"rhot-node: {exc}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            return 0
+        except (OSError, MemoryError) as exc:
+            print(f"rhot-node: {system_sentence(exc)}", file=sys.stderr)
+            return 2
 
 
 def _hide_scipy() -> None:

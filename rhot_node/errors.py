@@ -13,9 +13,12 @@ def printable(text: str, limit: int = 400) -> str:
     return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in cut)
 
 
-def printable_lines(text: str) -> str:
-    """A sentence of our own, safe for a terminal whatever file names and answers it repeats."""
-    return "\n".join(printable(line, 10_000) for line in text.split("\n"))
+def system_sentence(exc: OSError | MemoryError) -> str:
+    """What the system refused, where nobody knew it better: a file with its name and the system's words."""
+    if isinstance(exc, MemoryError):
+        return "there is not enough memory for this."
+    place = "" if exc.filename is None else f"{exc.filename}: "
+    return f"{place}the system refuses it ({exc.strerror or exc})."
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -13,6 +13,7 @@ import os
 import re
 import stat
 import tempfile
+import zipfile
 from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
@@ -23,6 +24,16 @@ import msgspec
 from rhot_node.errors import nearest, printable
 
 T = TypeVar("T")
+
+BYTES_MAX: Final = 256 << 20
+"""Of a file that is read as a whole: an uncompressed picture of a large camera, a network."""
+
+TABLE_BYTES_MAX: Final = 64 << 20
+TABLE_LINES_MAX: Final = 1_000_000
+"""Of a text table: an hour of landmarks at 100 Hz has a third of either."""
+
+ARRAYS_BYTES_MAX: Final = 512 << 20
+"""Of the arrays in an archive, unpacked."""
 
 JSON_BYTES_MAX: Final = 16 << 20
 JSON_DEPTH_MAX: Final = 64
@@ -217,13 +228,35 @@ def read_document_bytes(path: Path, error: type[Exception]) -> bytes:
         raise error(f"{path}: cannot be read ({why(exc)}).") from exc
 
 
-def read_input(path: Path, limit: int | None = None) -> bytes:
+def read_input(path: Path, limit: int = BYTES_MAX) -> bytes:
     """The bytes of a regular file. Raises OSError when it is none, or longer than `limit` bytes."""
     with open_input(path) as file:
-        data = file.read(-1 if limit is None else limit + 1)
-    if limit is not None and len(data) > limit:
-        raise OSError(errno.EFBIG, f"it has more than {limit >> 20} MiB; is it the right file", str(path))
+        data = file.read(limit + 1)
+    if len(data) > limit:
+        size = f"{limit >> 20} MiB" if limit >= 1 << 20 else f"{limit >> 10} KiB"
+        raise OSError(errno.EFBIG, f"it has more than {size}", str(path))
     return data
+
+
+def read_table(path: Path) -> bytes:
+    """The bytes of a text table. Raises OSError when it is no regular file, or has too many bytes or lines."""
+    data = read_input(path, TABLE_BYTES_MAX)
+    if max(data.count(b"\n"), data.count(b"\r")) > TABLE_LINES_MAX:
+        raise OSError(errno.EFBIG, f"it has more than {TABLE_LINES_MAX} lines", str(path))
+    return data
+
+
+@contextlib.contextmanager
+def open_archive(path: Path) -> Iterator[BinaryIO]:
+    """A zip archive of arrays, to be loaded from. Raises OSError when it is no regular file, or too large unpacked;
+    zipfile.BadZipFile when it is no archive."""
+    with open_input(path) as file:
+        with zipfile.ZipFile(file) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > ARRAYS_BYTES_MAX:
+            raise OSError(errno.EFBIG, f"it unpacks to more than {ARRAYS_BYTES_MAX >> 20} MiB", str(path))
+        file.seek(0)
+        yield file
 
 
 def open_input(path: Path, buffering: int = -1) -> BinaryIO:

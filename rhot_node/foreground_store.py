@@ -26,7 +26,7 @@ from rhot_node.detect.foreground import (
 )
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import NodeError
-from rhot_node.files import open_input, write_atomically
+from rhot_node.files import open_archive, write_atomically
 from rhot_node.network.pictures import PictureBox
 from rhot_node.threads import OneShotThread
 
@@ -223,7 +223,7 @@ class ForegroundStore:
 def load_foreground(path: Path) -> Foreground:
     """Read what was learnt. Raises NodeError naming the file."""
     try:
-        with open_input(path) as file, np.load(file, allow_pickle=False) as read:
+        with open_archive(path) as file, np.load(file, allow_pickle=False) as read:
             if str(read["format"]) != str(_FORMAT):
                 raise ValueError(f"its format is {str(read['format'])[:80]!r}")
             model = Foreground(*(np.ascontiguousarray(read[name], np.float32) for name in Foreground._fields))

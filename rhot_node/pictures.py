@@ -74,7 +74,11 @@ def open_video(path: Path) -> cv2.VideoCapture:
         raise PictureError(f"cannot be read ({why(exc)})", path) from exc
     if _kind(head):
         raise PictureError("is a picture, not a video", path)
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    try:
+        name = str(path).encode().decode()
+    except UnicodeEncodeError as exc:  # OpenCV would crash
+        raise PictureError("has a name that is not UTF-8; rename it", path) from exc
+    capture = cv2.VideoCapture(name, cv2.CAP_FFMPEG)
     capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
     try:
         _require_pixels(int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)), int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)))

@@ -26,6 +26,7 @@ from rhot_app.articulated.visibility import NONE, front_layer
 from rhot_app.barehand.contour_residual import DEGREES, SHAPE_SD_M
 from rhot_app.barehand.contours import STEP_M, camera_centre, project
 from rhot_app.estimation.residual import UNIT, Rows, compressed
+from rhot_app.geometry.camera import pixels_per_metre
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -56,7 +57,7 @@ RIDGE = 1e-6
 class LayeredFrame:
     """Implements `estimation.residual.Residual`: one camera's filtered image and the templates that it should show.
 
-    `order` (L,): the visibility order; empty: every layer is taken for visible. `pose` (3, 4), `intrinsics` (9,).
+    `order` (L,): the visibility order; empty: every layer is taken for visible. `pose` (3, 4), `intrinsics` (13,).
     `level`: of the templates' smoothings, that of `image` (H, W). `noise`: of a pixel, of 255. `outline`: None for
     regions only. `background` (H, W): the same filter of the scene without the object, None: nothing is known of it.
     `spread` (P, P): covariance of root and angles before the image was looked at, whose errors are no outliers.
@@ -217,7 +218,7 @@ def _region(bodies, placed, order, pose, intrinsics, image, layer, points, norma
             g[i] = value[1] * slope[0, i] + value[2] * slope[1, i]
         point_row(bodies, placed, layer, x, y, z, g, rows[k])
         error[k] = values[k] - value[0]
-        scale = intrinsics[0] / far  # px per m
+        scale = pixels_per_metre(slope)
         dense = max(1.0, (STEP_M / spacing_m) ** 2)
         variance[k] = noise + dense * (value[1] ** 2 + value[2] ** 2) * (SHAPE_SD_M * scale) ** 2
         wide[k] = variance[k] + _form(expected, rows[k])

@@ -36,7 +36,7 @@ class Outline(NamedTuple):
 
 def outline_of(bodies: Bodies, placed: Placed, order: Indices, pose: Array, intrinsics: Array,
                image_size: tuple[int, int], step_m: float = STEP_M) -> Outline:
-    """The visible outline before a camera of `pose` (3, 4) and `intrinsics` (9,); `image_size` width and height px;
+    """The visible outline before a camera of `pose` (3, 4) and `intrinsics` (13,); `image_size` width and height px;
     a point every `step_m`. Without an `order`, each layer is taken as if it were alone."""
     ints, floats = np.empty((_MOST, 2), np.int64), np.empty((_MOST, 7))
     count = _outline(bodies, placed, order, pose, intrinsics, image_size[0], image_size[1], step_m, ints, floats)

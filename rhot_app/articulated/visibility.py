@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rhot_app.articulated.bodies import CAPSULE, Bodies, Placed, hit_layer, joint_of
 from rhot_app.barehand.contours import NEAREST_M, camera_centre
-from rhot_app.geometry.camera import distort
+from rhot_app.geometry.camera import REACH, project_ray
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -241,7 +241,7 @@ def front_layer(bodies, placed, order, ox, oy, oz, ux, uy, uz):
 
 def segment(bodies: Bodies, placed: Placed, order: Indices, pose: Array, intrinsics: Array, rays: Array) -> Indices:
     """(H, W) the layer that each pixel shows, NONE for none: list-priority, the last layer in `order` painted first.
-    `rays` (H, W, 3): `camera_rays` of the camera with `intrinsics` (9,) and `pose` (3, 4)."""
+    `rays` (H, W, 3): `camera_rays` of the camera with `intrinsics` (13,) and `pose` (3, 4)."""
     labels = np.full(rays.shape[:2], NONE)
     _paint(bodies, placed, order, np.ascontiguousarray(pose), intrinsics, rays, labels)
     return labels
@@ -255,9 +255,9 @@ def pixel_box(box, intrinsics, width, height, out):
         for j in range(5):
             if 0 < i < 4 and 0 < j < 4:
                 continue
-            xd, yd, _, _, _, _ = distort(box[0] + 0.25 * i * (box[2] - box[0]), box[1] + 0.25 * j * (box[3] - box[1]),
-                                         intrinsics[4:9])
-            u, v = intrinsics[0] * xd + intrinsics[2], intrinsics[1] * yd + intrinsics[3]
+            x, y = box[0] + 0.25 * i * (box[2] - box[0]), box[1] + 0.25 * j * (box[3] - box[1])
+            inside = math.sqrt(min(1.0, 0.999 * intrinsics[REACH] / max(x * x + y * y, 1e-12)))
+            u, v, _, _, _, _ = project_ray(inside * x, inside * y, intrinsics)
             x0, y0, x1, y1 = min(x0, u), min(y0, v), max(x1, u), max(y1, v)
     out[0], out[1] = max(int(x0) - 2, 0), max(int(y0) - 2, 0)
     out[2], out[3] = min(int(x1) + 3, width), min(int(y1) + 3, height)

@@ -30,7 +30,7 @@ from rhot_app.barehand.surface import (
     place_capsules,
     ray_to_capsule,
 )
-from rhot_app.geometry.camera import distort
+from rhot_app.geometry.camera import REACH, project_ray
 from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ def contour_points(surface: Surface, state: Array, size: Array, pose: Array, int
                    image_size: tuple[int, int], step_m: float = STEP_M) -> ContourPoints:
     """The visible contour, a point every `step_m`, of a hand in `state` (`hand_process`) with shape `size` (SHAPE,).
 
-    `pose` (3, 4): camera_from_world; `intrinsics` (9,); `image_size`: width and height, px.
+    `pose` (3, 4): camera_from_world; `intrinsics` (13,); `image_size`: width and height, px.
     """
     ints, floats = np.empty((_MAX_POINTS, 3), np.int64), np.empty((_MAX_POINTS, 6))
     count = _contours(surface, state, size, pose, intrinsics, image_size[0], image_size[1], step_m, ints, floats)
@@ -88,20 +88,20 @@ def contour_points(surface: Surface, state: Array, size: Array, pose: Array, int
 
 @njit(cache=True)
 def project(x, y, z, pose, intrinsics, pixel, slope):
-    """Fill `pixel` (2,) of a world point and its Jacobian `slope` (2, 3) px/m; False behind the near plane."""
+    """Fill `pixel` (2,) of a world point and its Jacobian `slope` (2, 3) px/m; False where the camera cannot see it."""
     a = pose[0, 3] + pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z
     b = pose[1, 3] + pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z
     c = pose[2, 3] + pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z
     if not c > NEAREST_M:
         return False
     a, b = a / c, b / c
-    xd, yd, xx, xy, yx, yy = distort(a, b, intrinsics[4:9])
-    pixel[0] = intrinsics[0] * xd + intrinsics[2]
-    pixel[1] = intrinsics[1] * yd + intrinsics[3]
+    if not a * a + b * b <= intrinsics[REACH]:
+        return False
+    pixel[0], pixel[1], ux, uy, vx, vy = project_ray(a, b, intrinsics)
     for k in range(3):
         dx, dy = (pose[0, k] - a * pose[2, k]) / c, (pose[1, k] - b * pose[2, k]) / c
-        slope[0, k] = intrinsics[0] * (xx * dx + xy * dy)
-        slope[1, k] = intrinsics[1] * (yx * dx + yy * dy)
+        slope[0, k] = ux * dx + uy * dy
+        slope[1, k] = vx * dx + vy * dy
     return True
 
 

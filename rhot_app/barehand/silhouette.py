@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import project
 from rhot_app.barehand.surface import FOREARM, Surface, place_capsules
+from rhot_app.geometry.camera import pixels_per_metre
 from rhot_app.hand.kinematics import move
 
 Array = NDArray[np.float64]
@@ -55,7 +56,7 @@ _U0, _V0, _U1, _V1, _R0, _R1, _DU, _DV, _PER_SQUARE = range(9)
 
 class LogOddsMaps(NamedTuple):
     """Of every `step`-th pixel of C images: log likelihood ratios (C, h, w) of lying `inside` and `outside` a hand or a
-    bare forearm against lying anywhere; `poses` (C, 3, 4) and `intrinsics` (C, 9) of their cameras. Smaller images are
+    bare forearm against lying anywhere; `poses` (C, 3, 4) and `intrinsics` (C, 13) of their cameras. Smaller images are
     padded with 0."""
 
     inside: Array
@@ -87,13 +88,12 @@ def _project_capsule(c0, c1, r0, r1, pose, intrinsics, step, a, b, slope, circle
     not in front of the camera."""
     if not (project(c0[0], c0[1], c0[2], pose, intrinsics, a, slope)):
         return False
+    circles[_R0] = r0 * pixels_per_metre(slope) / step
     if not (project(c1[0], c1[1], c1[2], pose, intrinsics, b, slope)):
         return False
-    z0 = pose[2, 3] + pose[2, 0] * c0[0] + pose[2, 1] * c0[1] + pose[2, 2] * c0[2]
-    z1 = pose[2, 3] + pose[2, 0] * c1[0] + pose[2, 1] * c1[1] + pose[2, 2] * c1[2]
+    circles[_R1] = r1 * pixels_per_metre(slope) / step
     circles[_U0], circles[_V0] = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5
     circles[_U1], circles[_V1] = (b[0] + 0.5) / step - 0.5, (b[1] + 0.5) / step - 0.5
-    circles[_R0], circles[_R1] = intrinsics[0] * r0 / z0 / step, intrinsics[0] * r1 / z1 / step
     circles[_DU], circles[_DV] = circles[_U1] - circles[_U0], circles[_V1] - circles[_V0]
     circles[_PER_SQUARE] = 1.0 / max(circles[_DU] * circles[_DU] + circles[_DV] * circles[_DV], 1e-9)
     return True
@@ -146,17 +146,15 @@ def _arm(world, wrist, thick, bend, inside, step, pose, intrinsics, mask, a, b, 
     total, begun, count = 0.0, False, 16
     for k in range(count + 1):
         s = FOREARM_M * k / count
-        depth = pose[2, 3]
         for i in range(3):
             p[i] = wrist[i] + s * along[i]
-            depth += pose[2, i] * p[i]
         if not project(p[0], p[1], p[2], pose, intrinsics, a, slope):
             break
         u, v = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5
         if begun:
             du, dv = u - b[0], v - b[1]
             length = np.sqrt(du * du + dv * dv)
-            wide = intrinsics[0] * (thick + s * FOREARM_SPREAD) / depth / step
+            wide = pixels_per_metre(slope) * (thick + s * FOREARM_SPREAD) / step
             for j in range(-2, 3):
                 across = 0.4 * j * wide / max(length, 1e-9)
                 row, column = int(np.floor(v + across * du + 0.5)), int(np.floor(u - across * dv + 0.5))

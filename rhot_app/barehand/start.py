@@ -210,20 +210,17 @@ def _palm_centres(maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraM
     if len(maps) == 1:
         camera = cameras[0]
         for peak in peaks[0]:
-            x, y = camera.undistort(peak[None, :2])[0]
-            depth = camera.intrinsics[0] * breadth / peak[2]
-            place = camera.world_from_camera[:3, :3] @ (depth * np.array([x, y, 1.0])) + camera.centre
-            found.append((0.0, place))
+            ray = camera.world_from_camera[:3, :3] @ np.append(camera.undistort(peak[None, :2])[0], 1.0)
+            place = camera.centre + camera.pixels_per_metre(camera.centre + ray)[0] * breadth / peak[2] * ray
+            if np.isfinite(place).all():
+                found.append((0.0, place))
     found.sort(key=lambda one: one[0])
     return [place for _, place in found[:PALMS]]
 
 
 def _size_error(camera: CameraModel, place: Array, radius: float, breadth: float) -> float:
     """Absolute log ratio of a radius px to that of a palm at a position; inf beyond _PALM_RADIUS."""
-    depth = float((camera.camera_from_world[:3, :3] @ place + camera.camera_from_world[:3, 3])[2])
-    if not depth > 0.05:
-        return np.inf
-    ratio = radius * depth / (camera.intrinsics[0] * breadth)
+    ratio = radius / (camera.pixels_per_metre(place)[0] * breadth)
     return abs(float(np.log(ratio))) if _PALM_RADIUS[0] < ratio < _PALM_RADIUS[1] else np.inf
 
 

@@ -227,7 +227,7 @@ def _locate(one: Paired, rig: RigArrays, positions: Array) -> None:
     if len(rig.law):
         locate_by_disparity(one.pixels, one.covariances, used, rig.law, positions, covariances, errors)
     else:
-        locate_all(one.pixels, one.covariances, used, rig.intrinsics, rig.cameras, rig.focal, rig.shapes, positions,
+        locate_all(one.pixels, one.covariances, used, rig.intrinsics, rig.cameras, rig.shapes, positions,
                    covariances, errors)
 
 

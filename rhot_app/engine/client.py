@@ -28,6 +28,7 @@ from rhot_app.errors import EngineError
 from rhot_app.project import Rig, parse_rig
 from rhot_app.state import HandState
 from rhot_node.files import decode_message
+from rhot_node.network.context import Context
 
 VANISHED_S = 1.0
 """An engine publishes its status ten times a second; after this long without one it is gone."""
@@ -51,10 +52,9 @@ class EngineClient:
         self.state: HandState | None = None
         self.status: EngineStatus | None = None
         self._heard_at = -1e9
-        self._context = zmq.Context()
+        self._context = Context()
         self._stream = self._context.socket(zmq.SUB)
         self._stream.setsockopt(zmq.RCVHWM, _RECEIVE_QUEUE)
-        self._stream.setsockopt(zmq.LINGER, 0)
         self._stream.setsockopt(zmq.RECONNECT_IVL, 50)
         self._stream.setsockopt(zmq.RECONNECT_IVL_MAX, 200)
         if events:
@@ -99,7 +99,6 @@ class EngineClient:
         does not answer within `timeout_s`.
         """
         socket = self._context.socket(zmq.REQ)
-        socket.setsockopt(zmq.LINGER, 0)
         try:
             socket.connect(self.directory.commands)
             socket.send(msgspec.json.encode({"command": name, **arguments}))

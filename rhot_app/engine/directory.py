@@ -23,9 +23,18 @@ def default_directory() -> Path:
 
 @dataclass(frozen=True, slots=True)
 class EngineDirectory:
-    """Paths inside one engine's directory."""
+    """Paths inside one engine's directory. Raises EngineError for a path that no socket can have."""
 
     path: Path
+
+    def __post_init__(self) -> None:
+        try:
+            length = len(str(self.path.absolute()).encode())
+        except UnicodeEncodeError as exc:
+            raise EngineError(f"{self.path}: this path is not UTF-8, as a socket's must be; choose another "
+                              "--directory.") from exc
+        if length + _LONGEST_NAME > LONGEST_SOCKET_PATH:
+            raise EngineError(f"{self.path}: this path is too long for a socket; choose a shorter --directory.")
 
     @property
     def states(self) -> str:
@@ -69,8 +78,7 @@ def open_directory(path: Path | None = None) -> EngineDirectory:
     Raises EngineError when it belongs to somebody else, is open to others, is a link, or has too long a path.
     """
     place = (path or default_directory()).absolute()
-    if len(os.fsencode(place)) + _LONGEST_NAME > LONGEST_SOCKET_PATH:
-        raise EngineError(f"{place}: this path is too long for a socket; choose a shorter --directory.")
+    directory = EngineDirectory(place)
     try:
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
         info = place.lstat()
@@ -83,7 +91,7 @@ def open_directory(path: Path | None = None) -> EngineDirectory:
     if info.st_mode & 0o077:
         raise EngineError(f"{place}: is open to other users (mode {info.st_mode & 0o777:o}); "
                           f"run `chmod 700 {place}` or choose another --directory.")
-    return EngineDirectory(place)
+    return directory
 
 
 class EngineLock:

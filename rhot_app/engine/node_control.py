@@ -22,6 +22,7 @@ from rhot_app.project import Rig, RigNode
 from rhot_node.errors import printable
 from rhot_node.files import decode_message
 from rhot_node.keys import KeyPair, connect_with
+from rhot_node.network.context import Context
 
 TIMEOUT_S = 2.7
 """A still may take two seconds on a node whose camera has just stopped; a client waits for three."""
@@ -32,7 +33,6 @@ _LAST_WORDS_MS = 200
 
 log = logging.getLogger(__name__)
 
-_Context = zmq.Context[zmq.Socket[bytes]]
 _Reply = tuple[bytes, tuple[Answer, bytes | None]]
 
 
@@ -73,7 +73,7 @@ class NodeControl:
 
     commands = frozenset({"node", "still"})
 
-    def __init__(self, context: _Context, own: KeyPair | None = None) -> None:
+    def __init__(self, context: Context, own: KeyPair | None = None) -> None:
         """`own`: the master's keys; without them, as in a replay, paired nodes are not spoken to."""
         self._context = context
         self._own = own
@@ -244,7 +244,6 @@ class NodeControl:
     def _connect(self, kind: int, node: RigNode, endpoint: str) -> zmq.Socket[bytes]:
         """A socket towards one node, encrypted if it is paired."""
         socket = self._context.socket(kind)
-        socket.setsockopt(zmq.LINGER, 0)
         socket.setsockopt(zmq.RECONNECT_IVL, 100)
         socket.setsockopt(zmq.RECONNECT_IVL_MAX, 1000)
         socket.setsockopt(zmq.RCVHWM, 8)

@@ -34,6 +34,7 @@ from rhot_app.outputs.spec import SECRET_VARIABLE, OutputStatus, as_run
 from rhot_app.project import OutputSettings, Rig, parse_rig
 from rhot_app.state import HandState
 from rhot_node.logs import log_to_stderr
+from rhot_node.network.context import Context
 from rhot_node.threads import OneShotThread, Watch, Worker, complaints
 
 RESTART_S: Final = 1.0
@@ -233,7 +234,7 @@ def main() -> int:
             rigs.append(line)
         ended.set()
     rig_reader = OneShotThread("reads the engine's rigs", read)
-    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    context = Context()
     states = context.socket(zmq.SUB)
     states.setsockopt(zmq.RCVHWM, _RECEIVE_QUEUE)
     states.setsockopt(zmq.SUBSCRIBE, TOPIC_STATE)

@@ -31,6 +31,7 @@ from rhot_node.compiled import announce_compilation
 from rhot_node.files import JSON_BYTES_MAX
 from rhot_node.keys import KeyPair
 from rhot_node.logs import cut_log
+from rhot_node.network.context import Context
 from rhot_node.threads import OneShotThread
 
 _COLLECT_S = 5.0
@@ -60,7 +61,7 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource, directory:
     announce_compilation()
     place = open_directory(directory)
     lock = EngineLock(place)
-    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    context = Context()
     with contextlib.ExitStack() as stack:
         stack.callback(lock.release)
         stack.callback(context.destroy, 0)
@@ -119,7 +120,7 @@ _POLL_MS = 20
 class StatePublisher:
     """The socket of the hand states; used by the pipeline's thread only. Never blocks: a slow client misses states."""
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], directory: EngineDirectory) -> None:
+    def __init__(self, context: Context, directory: EngineDirectory) -> None:
         self.count = 0
         self._socket = _bind(context, zmq.PUB, directory.states)
 
@@ -136,7 +137,7 @@ class StatePublisher:
 class Server:
     """Answers commands, publishes status and previews. `step` belongs to one thread."""
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], directory: EngineDirectory, engine: Engine,
+    def __init__(self, context: Context, directory: EngineDirectory, engine: Engine,
                  nodes: NodeControl) -> None:
         self.ending = False
         self._engine = engine
@@ -242,10 +243,9 @@ class _Change:
         self.answer = self._carry_out()
 
 
-def _bind(context: zmq.Context[zmq.Socket[bytes]], kind: int, endpoint: str) -> zmq.Socket[bytes]:
+def _bind(context: Context, kind: int, endpoint: str) -> zmq.Socket[bytes]:
     """A socket bound to `endpoint`; a socket file left behind by a dead engine is replaced (the lock is ours)."""
     socket = context.socket(kind)
-    socket.setsockopt(zmq.LINGER, 0)
     socket.setsockopt(zmq.SNDHWM, _SEND_QUEUE)
     socket.setsockopt(zmq.MAXMSGSIZE, _COMMAND_MAX)
     try:

@@ -249,8 +249,7 @@ def _within(error: Array, covariances: Array) -> float:
 
 def _metres_per_px(frames: Sequence[BareHandFrame], camera: CameraModel) -> Array:
     """(F,) how long a pixel is at the hand."""
-    wrists = np.array([frame.truth.joints[0] for frame in frames]) @ camera.camera_from_world[2, :3]
-    return np.asarray((wrists + camera.camera_from_world[2, 3]) / camera.intrinsics[0])
+    return 1.0 / camera.pixels_per_metre(np.array([frame.truth.joints[0] for frame in frames]))
 
 
 def _first(times_s: Array, true: NDArray[np.bool_]) -> float:

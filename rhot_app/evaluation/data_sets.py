@@ -29,7 +29,7 @@ from rhot_app.simulator.film.truth import FrameTruth, Truth, load_truth, save_tr
 from rhot_app.simulator.scene.scene import Scene, node_settings
 from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
-from rhot_node.files import resource_path
+from rhot_node.files import read_input, resource_path
 from rhot_node.wire.messages import MarkerObservation
 
 LOG_NAME: Final = "take.rhotlog"
@@ -171,7 +171,7 @@ def _motion_digest(motion: str) -> str:
     """Of the file that the motion comes from; of its name where it is neither a file nor shipped."""
     for path in (resource_path("motions", f"{motion}.json"), Path(motion)):
         if path.is_file():
-            return hashlib.sha256(path.read_bytes()).hexdigest()
+            return hashlib.sha256(read_input(path)).hexdigest()
     return motion
 
 

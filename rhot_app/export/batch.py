@@ -21,6 +21,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, Literal
 
+import msgspec
 import numpy as np
 
 from rhot_app.errors import ExportError, RhotError
@@ -29,9 +30,10 @@ from rhot_app.export.plan import ExportOptions, require
 from rhot_app.export.recording import TrackedLog
 from rhot_app.state import Knowledge
 from rhot_node.errors import NodeError
-from rhot_node.files import write_atomically, write_document
+from rhot_node.files import read_document, read_input, write_atomically, write_document
 
 MANIFEST: Final = "batch.json"
+FORMAT: Final = "rhot-batch"
 
 CERTIFICATE: Final = "certificate"
 """The `format` of a job whose log is a folder of recordings (``protocol.json``), and whose file is a certificate."""
@@ -206,46 +208,63 @@ def run_batch(jobs: Sequence[BatchJob], folder: Path, *, workers: int = 1, sched
     return [found[job.log] for job in jobs]
 
 
+class _Done(msgspec.Struct, frozen=True):
+    """A job: its log with size and time, a digest of all that decides about the result, and what came of it."""
+
+    log: str
+    size: int
+    mtime_ns: int
+    order: str
+    states: int = 0
+    message: str = ""
+
+
+class _Manifest(msgspec.Struct, frozen=True):
+    """``batch.json``: jobs by the names of their files."""
+
+    done: dict[str, _Done]
+    format: Literal["rhot-batch"] = FORMAT
+    version: Literal[1] = 1
+
+
 class Manifest:
     """What was done in an output folder, and of what."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / MANIFEST
-        self._done: dict[str, Any] = {}
-        with contextlib.suppress(OSError, ValueError, AttributeError):  # a broken list: everything is done again
-            self._done = dict(json.loads(self._path.read_text()).get("done", {}))
+        self._done: dict[str, _Done] = {}
+        with contextlib.suppress(ExportError):  # no list, or a broken one: everything is done again
+            self._done = read_document(self._path, _Manifest, format_name=FORMAT, version=1, error=ExportError).done
 
-    def order(self, job: BatchJob) -> dict[str, Any] | None:
-        """What decides about a job's result; None when its log is not to be had."""
+    def order(self, job: BatchJob) -> _Done | None:
+        """What decides about a job's result, nothing done; None when its log or rig cannot be read."""
         try:
             files = sorted(job.log.iterdir()) if job.log.is_dir() else [job.log]
-            logs, rig = [file.stat() for file in files], b"" if job.rig is None else job.rig.read_bytes()
-        except OSError:
+            logs, rig = [file.stat() for file in files], b"" if job.rig is None else read_input(job.rig)
+        except (OSError, ValueError):
             return None
         how = json.dumps([version("rhot"), job.format, asdict(job.options)], sort_keys=True).encode() + rig
-        return {"log": str(job.log), "size": sum(log.st_size for log in logs),
-                "mtime_ns": max((log.st_mtime_ns for log in logs), default=0),
-                "order": hashlib.sha256(how).hexdigest()}
+        return _Done(str(job.log), sum(log.st_size for log in logs), max((log.st_mtime_ns for log in logs), default=0),
+                     hashlib.sha256(how).hexdigest())
 
     def unchanged(self, job: BatchJob) -> JobOutcome | None:
         """What came of the same job before, if its file is still there."""
         before = self._done.get(job.out.name)
         order = self.order(job)
-        if not isinstance(before, dict) or order is None or not job.out.is_file():
+        if before is None or order is None or not job.out.is_file():
             return None
-        if any(before.get(key) != value for key, value in order.items()):
+        if before != msgspec.structs.replace(order, states=before.states, message=before.message):
             return None
-        return JobOutcome(job.log, job.out, "losses" if before.get("message") else "done", int(before.get("states", 0)),
-                          0.0, str(before.get("message", "")), unchanged=True)
+        return JobOutcome(job.log, job.out, "losses" if before.message else "done", before.states, 0.0, before.message,
+                          unchanged=True)
 
-    def note(self, job: BatchJob, order: dict[str, Any] | None, outcome: JobOutcome) -> None:
+    def note(self, job: BatchJob, order: _Done | None, outcome: JobOutcome) -> None:
         """Remember a job that was done; `order` as it was before."""
         if outcome.status not in ("done", "losses") or order is None:
             return
-        self._done[job.out.name] = order | {"states": outcome.states, "message": outcome.message}
-        document = {"format": "rhot-batch", "version": 1, "done": self._done}
+        self._done[job.out.name] = msgspec.structs.replace(order, states=outcome.states, message=outcome.message)
         try:
-            write_atomically(self._path, json.dumps(document, indent=1).encode() + b"\n")
+            write_document(self._path, _Manifest(self._done))
         except OSError as exc:
             raise ExportError(f"{self._path}: cannot be written ({exc.strerror}).") from exc
 

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rhot_app.errors import whole
 from rhot_app.export.export_command import READ_WITH_LOSSES, add_export_arguments, options_of
 
 if TYPE_CHECKING:
@@ -22,7 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "each folder of recordings that rhot certify or the app made")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR",
                         help="folder of the results, named after their logs; batch.json in it lists what is done")
-    parser.add_argument("--workers", type=int, default=None, metavar="N", help="processes (default: one per processor)")
+    parser.add_argument("--workers", type=whole, default=None, metavar="N",
+                        help="processes (default: one per processor)")
     parser.add_argument("--scheduler", default=None, metavar="ADDRESS",
                         help="let the workers of this Dask scheduler do it, such as tcp://host:8786; they must see the "
                              "same files")

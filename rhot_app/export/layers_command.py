@@ -154,7 +154,7 @@ def _camera(bodies: Bodies, placed: Placed, azimuth_deg: float, elevation_deg: f
     import numpy as np
 
     from rhot_app.articulated.bodies import BOX
-    from rhot_app.geometry.camera import CameraModel
+    from rhot_app.geometry.camera import CameraModel, intrinsics_row
     from rhot_app.geometry.transforms import inverse, rigid
 
     corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, 8)
@@ -170,7 +170,7 @@ def _camera(bodies: Bodies, placed: Placed, azimuth_deg: float, elevation_deg: f
     world = rigid(np.column_stack([right, np.cross(-away, right), -away]), centre + distance * away)
     width, height = SIZE_PX
     focal = FILL * height * distance / extent
-    return CameraModel(width, height, np.array([focal, focal, 0.5 * width - 0.5, 0.5 * height - 0.5, 0, 0, 0, 0, 0.0]),
+    return CameraModel(width, height, intrinsics_row([focal, focal, 0.5 * width - 0.5, 0.5 * height - 0.5]),
                        world, inverse(world))
 
 

@@ -1,4 +1,4 @@
-"""The camera model: a pinhole with OpenCV's distortion (k1, k2, p1, p2, k3) at a known place in the world.
+"""The camera model: a pinhole with OpenCV's distortion at a known place in the world.
 
 Points are undistorted, never images. Normalised coordinates are x/z, y/z in the camera's frame.
 """
@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numpy.polynomial import Polynomial
+from numpy.typing import ArrayLike, NDArray
 
 from rhot_app.geometry.transforms import rigid, rotation_from_quaternion
 from rhot_app.project import CameraPose, Intrinsics
@@ -18,77 +19,174 @@ from rhot_app.project import CameraPose, Intrinsics
 Array = NDArray[np.float64]
 
 _ITERATIONS = 30
-_TOLERANCE = 1e-12  # normalised units: 1e-9 px at any focal length in use
+_TOLERANCE_PX, _CLOSE_PX = 1e-9, 1e-6
 
 
-@njit(cache=True)
-def distort(x: float, y: float, distortion: Array) -> tuple[float, float, float, float, float, float]:
-    """Distorted normalised coordinates and their derivatives: (xd, yd, dxd/dx, dxd/dy, dyd/dx, dyd/dy)."""
-    k1, k2, p1, p2, k3 = distortion[0], distortion[1], distortion[2], distortion[3], distortion[4]
+# -- lens --------------------------------------------------------------------------------------------------------------
+# A pinhole with OpenCV's rational distortion. With r2 = x^2 + y^2 in normalised coordinates,
+#
+#     xd = x (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3) + 2 p1 x y + p2 (r2 + 2 x^2),   yd alike.
+#
+# Lenses of the usual kind have k4 = k5 = k6 = 0; wide ones need them, because their pixels grow with the angle from the
+# axis while x and y grow with its tangent.
+
+PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+"""Names of a lens's parameters in their order; the distortion in OpenCV's."""
+LENS = len(PARAMETERS)
+"""How many parameters a lens has."""
+PLAIN = 9
+"""How many of them a lens of the usual kind has: those of a wide one follow."""
+TANGENTIAL = (6, 7)
+"""Where p1 and p2 stand."""
+REACH = LENS
+"""In a row of intrinsics, after the parameters: the squared radius x^2 + y^2 up to which the lens is invertible."""
+
+FARTHEST_DEG = 88.0
+"""From the axis: farther rays belong to no lens here, because x and y then grow without bound."""
+_FARTHEST = math.tan(math.radians(FARTHEST_DEG)) ** 2
+
+
+@njit(cache=True, inline="always")
+def is_wide(lens: Array) -> bool:
+    """Whether a lens (12,), or a row of intrinsics, has the coefficients of a wide one."""
+    return lens[9] != 0.0 or lens[10] != 0.0 or lens[11] != 0.0
+
+
+def own_parameters(lens: Array) -> NDArray[np.bool_]:
+    """(12,) which parameters a lens of this kind has."""
+    return np.arange(LENS) < (LENS if is_wide(lens) else PLAIN)
+
+
+def lens_parameters(intrinsics: Intrinsics) -> Array:
+    """(12,) the lens of a rig's camera, in the order of `PARAMETERS`."""
+    i = intrinsics
+    return full_lens([i.fx, i.fy, i.cx, i.cy, *i.distortion])
+
+
+def rig_intrinsics(size: tuple[int, int], lens: Array) -> Intrinsics:
+    """A lens (12,) for images of `size` (width, height) px as rigs hold it: five coefficients unless it is wide."""
+    fx, fy, cx, cy, *distortion = map(float, lens if is_wide(lens) else lens[:PLAIN])
+    return Intrinsics(*size, fx, fy, cx, cy, tuple(distortion))
+
+
+def full_lens(parameters: ArrayLike) -> Array:
+    """(12,) a lens from its first parameters, in the order of `PARAMETERS`; the rest is zero."""
+    given = np.asarray(parameters, float)
+    return np.concatenate([given, np.zeros(LENS - len(given))])
+
+
+def intrinsics_row(parameters: ArrayLike) -> Array:
+    """(13,) a lens (see `full_lens`) and where it ends, as everything that projects or undistorts takes it."""
+    lens = full_lens(parameters)
+    return np.append(lens, _reach(lens[4:]))
+
+
+def _reach(distortion: Array) -> float:
+    """Squared radius up to which the radial distortion r N(r2) / D(r2) rises and has no pole.
+
+    Its slope is (N D + 2 r2 (N' D - N D')) / D^2.
+    """
+    k1, k2, _, _, k3, k4, k5, k6 = distortion
+    if not np.isfinite(distortion).all():
+        return 0.0
+    above, below = Polynomial([1.0, k1, k2, k3]), Polynomial([1.0, k4, k5, k6])
+    slope = above * below + Polynomial([0.0, 2.0]) * (above.deriv() * below - above * below.deriv())
+    ends = np.concatenate([_roots(np.asarray(slope.coef, float)), _roots(np.asarray(below.coef, float))])
+    ahead = ends.real[(np.abs(ends.imag) <= 1e-9 * np.abs(ends)) & (ends.real > 0.0)]
+    return float(ahead.min(initial=_FARTHEST))
+
+
+def _roots(coefficients: Array) -> Array:
+    """Roots of a polynomial without the highest powers that matter nowhere up to the farthest ray."""
+    share = np.abs(coefficients) * _FARTHEST ** np.arange(len(coefficients))
+    matters = np.flatnonzero(share > 1e-12 * share.max())
+    return np.asarray(Polynomial(coefficients[:matters[-1] + 1]).roots())
+
+
+@njit(cache=True, inline="always")
+def project_ray(x: float, y: float, intrinsics: Array) -> tuple[float, float, float, float, float, float]:
+    """The pixel of a ray (x, y, 1) and its derivatives: (u, v, du/dx, du/dy, dv/dx, dv/dy).
+
+    `intrinsics` (13,). NaN beyond the lens's reach: what the formula gives there is the pixel of another ray.
+    """
+    if not x * x + y * y <= intrinsics[REACH]:
+        return math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
+    return _formula(x, y, intrinsics)
+
+
+@njit(cache=True, inline="always")
+def _formula(x: float, y: float, intrinsics: Array) -> tuple[float, float, float, float, float, float]:
+    k1, k2, p1, p2, k3 = intrinsics[4], intrinsics[5], intrinsics[6], intrinsics[7], intrinsics[8]
     r2 = x * x + y * y
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
     slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))  # d radial / dx = slope * x
-    xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-    yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+    if is_wide(intrinsics):
+        k4, k5, k6 = intrinsics[9], intrinsics[10], intrinsics[11]
+        below = 1.0 / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+        radial *= below
+        slope = below * (slope - 2.0 * radial * (k4 + r2 * (2.0 * k5 + r2 * 3.0 * k6)))
+    fx, fy = intrinsics[0], intrinsics[1]
+    u = fx * (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)) + intrinsics[2]
+    v = fy * (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y) + intrinsics[3]
     cross = slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y
     xx = radial + slope * x * x + 2.0 * p1 * y + 6.0 * p2 * x
     yy = radial + slope * y * y + 6.0 * p1 * y + 2.0 * p2 * x
-    return xd, yd, xx, cross, cross, yy
+    return u, v, fx * xx, fx * cross, fy * cross, fy * yy
 
 
 @njit(cache=True)
 def undistort_point(u: float, v: float, intrinsics: Array) -> tuple[float, float, float, float, float, float]:
     """One raw pixel to normalised coordinates: (x, y) and d(x, y)/d(u, v) row by row; NaN where there is no answer.
 
-    Newton's iteration with halved steps when a step does not help. Beyond the radius where the distortion polynomial
-    turns over no ray belongs to a pixel: the result is NaN, never a point on the far branch.
+    `intrinsics` (13,). Newton's iteration with halved steps when a step does not help. Beyond the lens's reach no ray
+    belongs to a pixel: the result is NaN, never a point on the far branch.
     """
-    fx, fy, cx, cy = intrinsics[0], intrinsics[1], intrinsics[2], intrinsics[3]
-    distortion = intrinsics[4:9]
-    xd, yd = (u - cx) / fx, (v - cy) / fy
-    x, y = xd, yd
-    px, py, xx, xy, yx, yy = distort(x, y, distortion)
-    error = math.hypot(px - xd, py - yd)
+    x, y = (u - intrinsics[2]) / intrinsics[0], (v - intrinsics[3]) / intrinsics[1]
+    r2 = x * x + y * y
+    if r2 > intrinsics[REACH]:
+        inside = 0.99 * math.sqrt(intrinsics[REACH] / r2)
+        x, y = inside * x, inside * y
+    px, py, xx, xy, yx, yy = project_ray(x, y, intrinsics)
+    error = math.hypot(px - u, py - v)
     for _ in range(_ITERATIONS):
-        if not error > _TOLERANCE:
+        if not error > _TOLERANCE_PX:
             break
         determinant = xx * yy - xy * yx
         if not determinant > 0.0:
             break
-        ex, ey = px - xd, py - yd
+        ex, ey = px - u, py - v
         sx, sy = (yy * ex - xy * ey) / determinant, (xx * ey - yx * ex) / determinant
         scale = 1.0
         for _ in range(6):
             nx, ny = x - scale * sx, y - scale * sy
-            px, py, xx, xy, yx, yy = distort(nx, ny, distortion)
-            if math.hypot(px - xd, py - yd) < error:
+            px, py, xx, xy, yx, yy = project_ray(nx, ny, intrinsics)
+            if math.hypot(px - u, py - v) < error:
                 break
             scale *= 0.5
         x, y = nx, ny
-        error = math.hypot(px - xd, py - yd)
+        error = math.hypot(px - u, py - v)
     determinant = xx * yy - xy * yx
-    if not error < 1e-9 or not determinant > 0.0 or not _before_turn(x, y, distortion):
+    if not error < _CLOSE_PX or not determinant > 0.0:
         return math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
-    return x, y, yy / determinant / fx, -xy / determinant / fy, -yx / determinant / fx, xx / determinant / fy
+    return x, y, yy / determinant, -xy / determinant, -yx / determinant, xx / determinant
 
 
 @njit(cache=True)
-def _before_turn(x: float, y: float, distortion: Array) -> bool:
-    """Whether the radial polynomial still rises everywhere between the optical axis and (x, y)."""
-    k1, k2, k3 = distortion[0], distortion[1], distortion[4]
-    limit = x * x + y * y
-    for step in range(1, 9):
-        r2 = limit * step / 8.0
-        if 1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3)) <= 0.0:
-            return False
-    return True
+def undistort_with_slope(pixels: Array, intrinsics: Array) -> tuple[Array, Array]:
+    """Raw pixels (N, 2) to normalised coordinates (N, 2), and their change with the pixel (N, 2, 2); NaN as below."""
+    rays, by_pixel = np.empty((len(pixels), 2)), np.empty((len(pixels), 2, 2))
+    for i in range(len(pixels)):
+        x, y, xu, xv, yu, yv = undistort_point(pixels[i, 0], pixels[i, 1], intrinsics)
+        rays[i, 0], rays[i, 1] = x, y
+        by_pixel[i, 0, 0], by_pixel[i, 0, 1], by_pixel[i, 1, 0], by_pixel[i, 1, 1] = xu, xv, yu, yv
+    return rays, by_pixel
 
 
 @njit(cache=True)
 def undistort_points(pixels: Array, intrinsics: Array) -> Array:
     """Raw pixels (N, 2) to normalised coordinates (N, 2); NaN in, or beyond the lens, gives NaN out.
 
-    `intrinsics` (9,): fx, fy, cx, cy, k1, k2, p1, p2, k3.
+    `intrinsics` (13,), see `intrinsics_row`.
     """
     result = np.empty((pixels.shape[0], 2))
     for i in range(pixels.shape[0]):
@@ -100,21 +198,79 @@ def undistort_points(pixels: Array, intrinsics: Array) -> Array:
 
 @njit(cache=True)
 def project_normalised(points: Array, intrinsics: Array) -> Array:
-    """Normalised coordinates (N, 2) to raw pixels (N, 2)."""
+    """Normalised coordinates (N, 2) to raw pixels (N, 2); NaN beyond the lens. `intrinsics` (13,)."""
     result = np.empty((points.shape[0], 2))
     for i in range(points.shape[0]):
-        xd, yd, _, _, _, _ = distort(points[i, 0], points[i, 1], intrinsics[4:9])
-        result[i, 0] = intrinsics[0] * xd + intrinsics[2]
-        result[i, 1] = intrinsics[1] * yd + intrinsics[3]
+        result[i, 0], result[i, 1], _, _, _, _ = project_ray(points[i, 0], points[i, 1], intrinsics)
     return result
+
+
+@njit(cache=True)
+def linearise_lenses(rays: Array, lenses: Array) -> tuple[Array, Array, Array]:
+    """Pixels (N, 2) of rays (N, 2), each by its own lens (N, 12), and their derivatives by the ray (N, 2, 2) and by the
+    lens (N, 2, 12): for an adjustment, so beyond a lens's reach, too."""
+    count = len(rays)
+    pixels, by_ray, by_lens = np.empty((count, 2)), np.empty((count, 2, 2)), np.zeros((count, 2, LENS))
+    for i in range(count):
+        x, y, lens = rays[i, 0], rays[i, 1], lenses[i]
+        pixels[i, 0], pixels[i, 1], by_ray[i, 0, 0], by_ray[i, 0, 1], by_ray[i, 1, 0], by_ray[i, 1, 1] = _formula(
+            x, y, lens)
+        fx, fy, r2 = lens[0], lens[1], x * x + y * y
+        above = 1.0 + r2 * (lens[4] + r2 * (lens[5] + r2 * lens[8]))
+        below = 1.0 / (1.0 + r2 * (lens[9] + r2 * (lens[10] + r2 * lens[11])))
+        by_lens[i, 0, 0], by_lens[i, 1, 1] = (pixels[i, 0] - lens[2]) / fx, (pixels[i, 1] - lens[3]) / fy
+        by_lens[i, 0, 2] = by_lens[i, 1, 3] = 1.0
+        by_lens[i, 0, 6], by_lens[i, 1, 6] = fx * 2.0 * x * y, fy * (r2 + 2.0 * y * y)
+        by_lens[i, 0, 7], by_lens[i, 1, 7] = fx * (r2 + 2.0 * x * x), fy * 2.0 * x * y
+        power = below
+        for above_at, below_at in ((4, 9), (5, 10), (8, 11)):
+            power *= r2
+            by_lens[i, 0, above_at], by_lens[i, 1, above_at] = fx * x * power, fy * y * power
+            by_lens[i, 0, below_at] = -fx * x * power * above * below
+            by_lens[i, 1, below_at] = -fy * y * power * above * below
+    return pixels, by_ray, by_lens
+
+
+@njit(cache=True)
+def pixels_per_metre(slope: Array) -> float:
+    """Side of a square at a point, in px per m, as a ball there covers it, by a projection's `slope` (2, 3) px/m."""
+    u, v = slope[0], slope[1]
+    x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    return math.sqrt(math.sqrt(x * x + y * y + z * z))
+
+
+@njit(cache=True)
+def project_with_slope(points: Array, camera_from_world: Array, intrinsics: Array) -> tuple[Array, Array]:
+    """Raw pixels (N, 2) of world points (N, 3) m and their slopes (N, 2, 3) px/m; NaN where the camera sees nothing."""
+    count = len(points)
+    pixels, slopes, local = np.empty((count, 2)), np.empty((count, 2, 3)), np.empty(3)
+    for n in range(count):
+        for k in range(3):
+            local[k] = (camera_from_world[k, 3] + camera_from_world[k, 0] * points[n, 0]
+                        + camera_from_world[k, 1] * points[n, 1] + camera_from_world[k, 2] * points[n, 2])
+        if not local[2] > 0.0:
+            pixels[n], slopes[n] = math.nan, math.nan
+            continue
+        x, y = local[0] / local[2], local[1] / local[2]
+        pixels[n, 0], pixels[n, 1], ux, uy, vx, vy = project_ray(x, y, intrinsics)
+        for k in range(3):
+            dx = (camera_from_world[0, k] - x * camera_from_world[2, k]) / local[2]
+            dy = (camera_from_world[1, k] - y * camera_from_world[2, k]) / local[2]
+            slopes[n, 0, k], slopes[n, 1, k] = ux * dx + uy * dy, vx * dx + vy * dy
+    return pixels, slopes
+
+
+def lens_rays(pixels: Array, lens: Array) -> Array:
+    """Normalised coordinates (N, 2) of raw pixels (N, 2) by a lens (12,); NaN beyond it."""
+    return np.asarray(undistort_points(np.ascontiguousarray(pixels), intrinsics_row(lens)))
 
 
 @dataclass(frozen=True, slots=True)
 class CameraModel:
     """One calibrated camera.
 
-    `width`, `height` px. `intrinsics` (9,): fx, fy, cx, cy, k1, k2, p1, p2, k3. `world_from_camera` and
-    `camera_from_world` (4, 4), m.
+    `width`, `height` px. `intrinsics` (13,), see `intrinsics_row`. `world_from_camera` and `camera_from_world` (4, 4),
+    m.
     """
 
     width: int
@@ -123,13 +279,16 @@ class CameraModel:
     world_from_camera: Array
     camera_from_world: Array
 
+    def __post_init__(self) -> None:
+        if self.intrinsics.shape != (LENS + 1,):
+            raise ValueError(f"intrinsics of shape {self.intrinsics.shape}, not {(LENS + 1,)}: see intrinsics_row")
+
     @classmethod
     def from_rig(cls, intrinsics: Intrinsics, pose: CameraPose) -> CameraModel:
         """The model of a rig's camera."""
-        i = intrinsics
         rotation = rotation_from_quaternion(pose.rotation_wxyz)
         translation = np.array(pose.translation_m)
-        return cls(i.width, i.height, np.array([i.fx, i.fy, i.cx, i.cy, *i.distortion]),
+        return cls(intrinsics.width, intrinsics.height, intrinsics_row(lens_parameters(intrinsics)),
                    rigid(rotation, translation), rigid(rotation.T, -rotation.T @ translation))
 
     @property
@@ -139,16 +298,33 @@ class CameraModel:
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
     @property
+    def field_of_view(self) -> tuple[float, float]:
+        """Angles across and down the image through the principal point, rad; as of a pinhole where it has no ray."""
+        fx, fy, cx, cy = self.intrinsics[:4]
+        left, right, top, low = -0.5, self.width - 0.5, -0.5, self.height - 0.5
+        ends = np.array([[left, cy], [right, cy], [cx, top], [cx, low]])
+        rays = self.undistort(ends)
+        slopes = np.where(np.isfinite(rays), rays, (ends - (cx, cy)) / (fx, fy))
+        angles = np.arctan([slopes[0, 0], slopes[1, 0], slopes[2, 1], slopes[3, 1]])
+        return float(angles[1] - angles[0]), float(angles[3] - angles[2])
+
+    @property
     def centre(self) -> Array:
         """(3,) the camera's centre in the world, m."""
         return self.world_from_camera[:3, 3]
 
     def project(self, points: Array) -> Array:
-        """World points (N, 3) m to raw pixels (N, 2); a point at or behind the camera's plane gives NaN."""
+        """World points (N, 3) m to raw pixels (N, 2); NaN behind the camera's plane, and beyond the lens."""
         local = np.atleast_2d(points) @ self.camera_from_world[:3, :3].T + self.camera_from_world[:3, 3]
         ahead = local[:, 2] > 0.0
         normalised = local[:, :2] / np.where(ahead, local[:, 2], np.nan)[:, None]
         return np.asarray(project_normalised(np.ascontiguousarray(normalised), self.intrinsics))
+
+    def pixels_per_metre(self, points: Array) -> Array:
+        """(N,) px per m across the line of sight at world points (N, 3) m; NaN where the camera sees nothing."""
+        _, slopes = project_with_slope(np.ascontiguousarray(np.atleast_2d(points)), self.camera_from_world,
+                                       self.intrinsics)
+        return np.array([pixels_per_metre(slope) for slope in slopes])
 
     def undistort(self, pixels: Array) -> Array:
         """Raw pixels (N, 2) to normalised coordinates (N, 2)."""

@@ -156,26 +156,29 @@ def _inverse_covariances(covariances: Array, used: NDArray[np.bool_]) -> Array:
 
 
 @njit(cache=True)
-def reprojection_rms(position: Array, rays: Array, cameras: Array, focal: Array, used: NDArray[np.bool_]) -> float:
-    """Root mean square over the used cameras of the distance between ray and reprojected point, undistorted px."""
+def reprojection_rms(position: Array, rays: Array, cameras: Array, by_pixel: Array, used: NDArray[np.bool_]) -> float:
+    """Root mean square over the used cameras of the distance between pixel and reprojected point, px."""
     total = 0.0
     count = 0
     for c in range(rays.shape[0]):
         if not used[c]:
             continue
         x, y, z = _local(cameras[c], position)
-        total += (focal[c, 0] * (x / z - rays[c, 0])) ** 2 + (focal[c, 1] * (y / z - rays[c, 1])) ** 2
+        x, y, d = x / z - rays[c, 0], y / z - rays[c, 1], by_pixel[c]
+        determinant = d[0, 0] * d[1, 1] - d[0, 1] * d[1, 0]
+        total += ((d[1, 1] * x - d[0, 1] * y) ** 2 + (d[0, 0] * y - d[1, 0] * x) ** 2) / determinant**2
         count += 1
     return math.sqrt(total / count) if count > 0 else math.nan
 
 
 @njit(cache=True)
-def triangulate(rays: Array, covariances: Array, cameras: Array, focal: Array, used: NDArray[np.bool_],
+def triangulate(rays: Array, covariances: Array, cameras: Array, by_pixel: Array, used: NDArray[np.bool_],
                 position: Array, covariance: Array) -> tuple[float, int]:
     """Triangulate one point; never raises and never returns a half-valid point.
 
     `rays` (C, 2) undistorted normalised coordinates with `covariances` (C, 2, 2) in the same units; `cameras`
-    (C, 3, 4) camera_from_world; `focal` (C, 2) px, for the error's unit only; `used` (C,) which cameras count.
+    (C, 3, 4) camera_from_world; `by_pixel` (C, 2, 2) the change of a ray with its pixel, for the error's unit only;
+    `used` (C,) which cameras count.
     Writes `position` (3,) m and `covariance` (3, 3) m^2, both NaN unless the outcome is OK. Returns the rms
     reprojection error in px (NaN unless OK) and the `Outcome` as an int.
     """
@@ -206,4 +209,4 @@ def triangulate(rays: Array, covariances: Array, cameras: Array, focal: Array, u
         return math.nan, 3
     position[:] = point
     covariance[:] = inverse
-    return reprojection_rms(point, rays, cameras, focal, good), 0
+    return reprojection_rms(point, rays, cameras, by_pixel, good), 0

@@ -98,7 +98,7 @@ class HandAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     wrist_breadth_mm: Millimetres = 58.0
     wrist_thickness_mm: Millimetres = 40.0
     palm_thickness_mm: Millimetres = 28.0
-    couplings: tuple[Coupling, ...] = THESIS_COUPLINGS
+    couplings: Annotated[tuple[Coupling, ...], Meta(max_length=64)] = THESIS_COUPLINGS
     name: Annotated[str, Meta(pattern=PRINTABLE)] = ""
     format: Literal["rhot-hand"] = FORMAT
     version: Literal[1] = VERSION

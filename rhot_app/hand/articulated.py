@@ -27,6 +27,9 @@ from rhot_node.files import read_document, write_atomically
 FORMAT: Final = "rhot-articulated"
 VERSION: Final = 1
 
+PARTS_MAX: Final = 1000
+"""Frames, angles, points, couplings each: a hand has 32 frames."""
+
 Length = Annotated[float, Meta(ge=-10_000, le=10_000)]  # mm
 Size = Annotated[float, Meta(gt=0, le=10_000)]  # mm
 Vector = tuple[Length, Length, Length]
@@ -112,10 +115,10 @@ class Articulated(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     mirror_axis: Literal["x", "y"] = "y"
     length_mm: Size | None = None
     root: Root
-    frames: tuple[ArticulatedFrame, ...]
-    angles: tuple[Angle, ...] = ()
-    points: tuple[Point, ...] = ()
-    couplings: tuple[Coupling, ...] = ()
+    frames: Annotated[tuple[ArticulatedFrame, ...], Meta(max_length=PARTS_MAX)]
+    angles: Annotated[tuple[Angle, ...], Meta(max_length=PARTS_MAX)] = ()
+    points: Annotated[tuple[Point, ...], Meta(max_length=PARTS_MAX)] = ()
+    couplings: Annotated[tuple[Coupling, ...], Meta(max_length=PARTS_MAX)] = ()
 
     def __post_init__(self) -> None:
         complaint = next(_complaints(self), None)

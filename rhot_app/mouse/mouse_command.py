@@ -15,7 +15,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import EngineError, OutputError, RecordingError, SimulatorError, input_file, positive_number
+from rhot_app.errors import (
+    EngineError,
+    OutputError,
+    RecordingError,
+    SimulatorError,
+    input_file,
+    positive_number,
+    whole,
+)
 
 if TYPE_CHECKING:
     from rhot_app.engine.client import EngineClient
@@ -66,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="track the --log with this rig instead of the one it was recorded with")
     parser.add_argument("--bare", action="store_true",
                         help="with --simulated or --measure: a hand without markers, tracked by its contours")
-    parser.add_argument("--cameras", type=int, choices=(1, 2), default=2, metavar="N",
+    parser.add_argument("--cameras", type=whole, choices=(1, 2), default=2, metavar="N",
                         help="with --simulated or --measure: 1 leaves one camera, and the palm on a known plane "
                              "(default 2)")
     parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="of the simulated rig (default 1)")

@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.residual import UNIT, Kernel, Rows, student
-from rhot_app.geometry.camera import CameraModel, distort
+from rhot_app.geometry.camera import CameraModel, project_ray
 from rhot_app.geometry.transforms import log_so3
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ NEAREST_M = 0.02
 
 @dataclass(frozen=True, slots=True)
 class CameraArrays:
-    """C cameras: `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 9) as `CameraModel`; `centres` (C, 3) m."""
+    """C cameras: `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 13) as `CameraModel`; `centres` (C, 3) m."""
 
     poses: Array
     intrinsics: Array
@@ -122,7 +122,7 @@ class PointResidual:
     """Image points of an object in one camera; implements `estimation.residual.Residual`.
 
     `points` (K, 3) m, object frame, with `pixels` (K, 2), `covariances` (K, 2, 2) px^2 and `late_s` (K,), each point's
-    time less the state's. `pose` (3, 4) camera_from_world, `intrinsics` (9,).
+    time less the state's. `pose` (3, 4) camera_from_world, `intrinsics` (13,).
     """
 
     def __init__(self, points: Array, pixels: Array, covariances: Array, late_s: Array, pose: Array, intrinsics: Array,
@@ -255,13 +255,11 @@ def _project(state: Array, points: Array, late_s: Array, pose: Array, intrinsics
             jacobian[n, :, :] = math.nan
             continue
         u, v = here[0] / here[2], here[1] / here[2]
-        xd, yd, xx, xy, yx, yy = distort(u, v, intrinsics[4:9])
-        pixels[n, 0] = intrinsics[0] * xd + intrinsics[2]
-        pixels[n, 1] = intrinsics[1] * yd + intrinsics[3]
+        pixels[n, 0], pixels[n, 1], ux, uy, vx, vy = project_ray(u, v, intrinsics)
         for k in range(3):
             du, dv = (pose[0, k] - u * pose[2, k]) / here[2], (pose[1, k] - v * pose[2, k]) / here[2]
-            by_world[0, k] = intrinsics[0] * (xx * du + xy * dv)
-            by_world[1, k] = intrinsics[1] * (yx * du + yy * dv)
+            by_world[0, k] = ux * du + uy * dv
+            by_world[1, k] = vx * du + vy * dv
         for k in range(3):  # the place's change: translation, -[arm]x turn, velocity, -[arm]x left late
             for i in range(3):
                 by_place[i, k] = 1.0 if i == k else 0.0

@@ -173,17 +173,17 @@ def _triangulated_starts(points: ObjectPoints, cameras: CameraArrays, views: Seq
     """The rigid fit to all points that two cameras see, if they determine one."""
     count, found = len(cameras.poses), {}
     for row in sorted({int(row) for view in views for row in view.rows}):
-        rays, covariances, used = np.full((count, 2), np.nan), np.tile(np.eye(2), (count, 1, 1)), np.zeros(count, bool)
+        rays, used = np.full((count, 2), np.nan), np.zeros(count, bool)
+        covariances, by_pixel = np.tile(np.eye(2), (2, count, 1, 1))
         for view in views:
             for place in np.flatnonzero(view.rows == row):
                 u, v = view.pixels[place]
                 x, y, a, b, c, d = undistort_point(u, v, cameras.intrinsics[view.camera])
-                slope = np.array([[a, b], [c, d]])
+                slope = by_pixel[view.camera] = np.array([[a, b], [c, d]])
                 rays[view.camera], used[view.camera] = (x, y), True
                 covariances[view.camera] = slope @ view.covariances[place] @ slope.T
         position, covariance = np.empty(3), np.empty((3, 3))
-        if triangulate(rays, covariances, cameras.poses, cameras.intrinsics[:, :2], used, position,
-                       covariance)[1] == Outcome.OK:
+        if triangulate(rays, covariances, cameras.poses, by_pixel, used, position, covariance)[1] == Outcome.OK:
             found[row] = position.copy()
     source = points.points[list(found)]
     if not spans_plane(1e3 * source):

@@ -6,6 +6,7 @@ Boxes, spheres and cylinders are analytic. Meshes (STL, OBJ, glTF) are exact: th
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import RigError
 from rhot_app.objects.object_file import BoxShape, CylinderShape, ObjectModel, SphereShape
 from rhot_node.errors import printable
-from rhot_node.files import require_file, why
+from rhot_node.files import read_input, why
 
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -29,6 +30,12 @@ SMALLEST_M, LARGEST_M = 5e-3, 1.0
 """m: largest side of an object that a hand holds, from a peg to a stick."""
 
 SUFFIXES = (".stl", ".obj", ".glb", ".gltf")
+
+FACES_MAX = 700_000
+"""Triangles of a mesh: 0.9 GB of memory while they are read and prepared."""
+
+MESH_BYTES_MAX = 100 << 20
+"""Of a file: as OBJ, the most triangles take about 30 to 80 MiB."""
 
 _AT_CENTRE_M = 1e-12
 """Nearer than this to a centre or an axis, every direction leads away from it: a smaller vector's length underflows."""
@@ -131,7 +138,8 @@ def _corner_distance(away: Array) -> tuple[Array, Array]:
 
 class _MeshArrays(NamedTuple):
     """Of F triangles: a corner (F, 3) and the two edges from it, m; centre (F, 3) and the radius (F,) about it; outward
-    pseudonormals (F, 7, 3) of the corners a, b, c, the edges ab, ac, bc and the face."""
+    pseudonormals (F, 7, 3) of the corners a, b, c, the edges ab, ac, bc and the face. Of G groups of neighbouring
+    triangles: `group_begin` (G + 1,), `group_centre` (G, 3) and `group_radius` (G,)."""
 
     corner: Array
     first: Array
@@ -139,17 +147,24 @@ class _MeshArrays(NamedTuple):
     centre: Array
     radius: Array
     normals: Array
+    group_begin: Faces
+    group_centre: Array
+    group_radius: Array
 
 
 class Mesh:
-    """A closed triangle mesh. Triangles that cannot be the nearest are skipped by their bounding spheres."""
+    """A closed triangle mesh. Groups of triangles, and triangles, that cannot be the nearest are skipped by their
+    bounding spheres: a query takes about the square root of their number."""
 
     def __init__(self, vertices: Array, faces: Faces, where: str = "the mesh") -> None:
         """`vertices` (V, 3) m, `faces` (F, 3) indices. `where` begins every message.
 
-        Raises RigError when the mesh is empty, not closed, or not of the size of a hand-held object.
+        Raises RigError when the mesh is empty, too fine, not closed, or not of the size of a hand-held object.
         """
         vertices, faces = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+        if len(faces) > FACES_MAX:
+            raise RigError(f"{where}: it has {len(faces)} faces; at most {FACES_MAX} are taken. Make it coarser (in "
+                           "Blender: the modifier Decimate).")
         if not len(faces) or not np.isfinite(vertices).all():
             raise RigError(f"{where}: it has no faces, or positions that are no numbers. Export it again.")
         require_size(np.ptp(vertices[np.unique(faces)], axis=0), where)
@@ -205,9 +220,13 @@ def load_mesh(path: Path, unit: str) -> Mesh:
     except ImportError as exc:
         raise RigError(f"{path}: shapes from files need the package trimesh, RHOT's extra mesh: "
                        "`.venv/bin/python -m pip install trimesh`. Boxes, spheres and cylinders do not.") from exc
+    suffix = path.suffix.lower()
+    others: dict[str, Any] = {}
+    if suffix == ".gltf":  # it may keep its arrays in other files
+        others["resolver"] = _Beside(path.parent)
     try:
-        require_file(path)
-        loaded: Any = trimesh.load(path, force="mesh")
+        data = io.BytesIO(read_input(path, MESH_BYTES_MAX))
+        loaded: Any = trimesh.load(data, file_type=suffix[1:], force="mesh", skip_materials=True, **others)
         vertices, faces = np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64)
     except (OSError, ValueError) as exc:
         raise RigError(f"{path}: cannot be read ({printable(why(exc))}). Is it the right file?") from exc
@@ -223,6 +242,19 @@ def load_mesh(path: Path, unit: str) -> Mesh:
     return Mesh(UNITS_M[unit] * vertices, faces, str(path))
 
 
+class _Beside:
+    """Gives trimesh files of one folder, by the names that another file there says. Raises OSError."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def get(self, name: str) -> bytes:
+        """The bytes of a file."""
+        if Path(name).name != name:
+            raise OSError(f"{printable(name)} is not a file beside it")
+        return read_input(self._folder / name, MESH_BYTES_MAX)
+
+
 def require_size(size_m: Array, where: str) -> None:
     """Raises RigError unless a bounding box (3,) m is that of a hand-held object."""
     largest = float(np.max(size_m))
@@ -233,9 +265,11 @@ def require_size(size_m: Array, where: str) -> None:
 
 def _merged(vertices: Array, faces: Faces) -> tuple[Array, Faces]:
     """Vertices at the same place as one, and no faces of fewer than three: files repeat them for every face."""
-    grid = np.rint(vertices / (_SAME * np.ptp(vertices, axis=0).max())).astype(np.int64)
-    _, first, number = np.unique(grid, axis=0, return_index=True, return_inverse=True)
-    faces = number.reshape(-1)[faces]
+    used = vertices[np.unique(faces)]
+    low, step = used.min(axis=0), _SAME * np.ptp(used, axis=0).max()
+    grid = np.clip(np.rint((vertices - low) / step), 0.0, 1.0 / _SAME).astype(np.int64)
+    _, first, number = np.unique(grid @ [1 << 40, 1 << 20, 1], return_index=True, return_inverse=True)
+    faces = number[faces]
     apart = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     return vertices[first], np.ascontiguousarray(faces[apart])
 
@@ -252,62 +286,88 @@ def _require_closed(faces: Faces, where: str) -> None:
 
 
 def _compiled(vertices: Array, faces: Faces) -> _MeshArrays:
+    faces = faces[_along_z_order(vertices[faces].mean(axis=1))]
+    edge = _edges_of(faces)
     corners = vertices[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     face = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
-    at_vertex = np.zeros_like(vertices)
+    at_vertex, at_edge = np.zeros_like(vertices), np.zeros((int(edge.max()) + 1, 3))
     for k in range(3):
         to, other = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
         angle = np.arctan2(np.linalg.norm(np.cross(to, other), axis=1), np.einsum("fi,fi->f", to, other))
         np.add.at(at_vertex, faces[:, k], angle[:, None] * face)
+        np.add.at(at_edge, edge[:, k], face)
     normals = np.empty((len(faces), 7, 3))
     normals[:, 6] = face
     for k in range(3):
-        normals[:, k] = at_vertex[faces[:, k]]
-    edges = np.sort(faces[:, [[0, 1], [0, 2], [1, 2]]], axis=2) @ [len(vertices), 1]
-    _, number = np.unique(edges.ravel(), return_inverse=True)
-    at_edge = np.zeros((int(number.max()) + 1, 3))
-    np.add.at(at_edge, number.reshape(-1), np.repeat(face, 3, axis=0))
-    normals[:, 3:6] = at_edge[number.reshape(-1, 3)]
+        normals[:, k], normals[:, 3 + k] = at_vertex[faces[:, k]], at_edge[edge[:, k]]
     centre = corners.mean(axis=1)
     radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-    normals /= np.maximum(np.linalg.norm(normals, axis=2), 1e-300)[:, :, None]
+    normals /= np.sqrt(np.maximum(np.einsum("fki,fki->fk", normals, normals), 1e-300))[:, :, None]
     first, second = (np.ascontiguousarray(corners[:, k] - corners[:, 0]) for k in (1, 2))
-    return _MeshArrays(np.ascontiguousarray(corners[:, 0]), first, second, centre, radius, normals)
+    begin = np.append(np.arange(0, len(faces), math.isqrt(len(faces)) + 1), len(faces))
+    middle = np.add.reduceat(centre, begin[:-1]) / np.diff(begin)[:, None]
+    away = np.linalg.norm(centre - np.repeat(middle, np.diff(begin), axis=0), axis=1) + radius
+    return _MeshArrays(np.ascontiguousarray(corners[:, 0]), first, second, centre, radius, normals, begin, middle,
+                       np.maximum.reduceat(away, begin[:-1]))
+
+
+def _edges_of(faces: Faces) -> Faces:
+    """(F, 3) numbers of the edges ab, ac, bc of each face; an edge of two faces has one."""
+    edges = np.sort(faces[:, [[0, 1], [0, 2], [1, 2]]], axis=2) @ [int(faces.max()) + 1, 1]
+    return np.unique(edges.ravel(), return_inverse=True)[1].reshape(-1, 3)
+
+
+def _along_z_order(points: Array) -> Faces:
+    """(N,) order of points (N, 3) along the curve that visits a cube's eighths one after the other (Morton 1966)."""
+    low, size = points.min(axis=0), max(float(np.ptp(points, axis=0).max()), 1e-300)
+    cells = np.minimum((points - low) / size * 1024.0, 1023.0).astype(np.int64)
+    key = np.zeros(len(points), np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            key |= (cells[:, axis] >> bit & 1) << (3 * bit + axis)
+    return np.argsort(key, kind="stable")
 
 
 @njit(cache=True)
 def _mesh_distance(mesh: _MeshArrays, points: Array, distance: Array, normal: Array) -> None:
     """Fill `distance` (N,) and `normal` (N, 3) of `points` (N, 3)."""
-    count = mesh.corner.shape[0]
-    to_centre, away, best_away = np.empty(count), np.empty(3), np.zeros(3)
+    groups = mesh.group_radius.shape[0]
+    to_group, away, best_away = np.empty(groups), np.empty(3), np.zeros(3)
     for n in range(points.shape[0]):
-        x, y, z = points[n]
-        if not math.isfinite(x + y + z):
+        if not math.isfinite(points[n, 0] + points[n, 1] + points[n, 2]):
             distance[n], normal[n] = math.nan, math.nan
             continue
         nearest, start = math.inf, 0
-        for f in range(count):
-            dx, dy, dz = x - mesh.centre[f, 0], y - mesh.centre[f, 1], z - mesh.centre[f, 2]
-            to_centre[f] = math.sqrt(dx * dx + dy * dy + dz * dz)
-            if to_centre[f] < nearest:
-                nearest, start = to_centre[f], f
-        best, best_face, best_part = math.inf, start, 6
-        for k in range(-1, count):  # the triangle of the nearest centre first: it excludes most others
-            f = start if k < 0 else k
-            if to_centre[f] - mesh.radius[f] > best:
+        for g in range(groups):
+            to_group[g] = _distance(points[n], mesh.group_centre[g])
+            if to_group[g] < nearest:
+                nearest, start = to_group[g], g
+        best, best_face, best_part = math.inf, 0, 6
+        for k in range(-1, groups):  # the group of the nearest centre first: it excludes most others
+            g = start if k < 0 else k
+            if to_group[g] - mesh.group_radius[g] > best:
                 continue
-            part = _nearest_part(points[n], mesh.corner[f], mesh.first[f], mesh.second[f], away)
-            length = math.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
-            if length < best:
-                best, best_face, best_part = length, f, part
-                best_away[:] = away
+            for f in range(mesh.group_begin[g], mesh.group_begin[g + 1]):
+                if _distance(points[n], mesh.centre[f]) - mesh.radius[f] > best:
+                    continue
+                part = _nearest_part(points[n], mesh.corner[f], mesh.first[f], mesh.second[f], away)
+                length = math.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
+                if length < best:
+                    best, best_face, best_part = length, f, part
+                    best_away[:] = away
         outward = mesh.normals[best_face, best_part]
         side = best_away[0] * outward[0] + best_away[1] * outward[1] + best_away[2] * outward[2]
         sign = 1.0 if side >= 0.0 else -1.0
         distance[n] = sign * best
         for i in range(3):
             normal[n, i] = sign * best_away[i] / best if best > 1e-9 else outward[i]
+
+
+@njit(cache=True)
+def _distance(point: Array, other: Array) -> float:
+    x, y, z = point[0] - other[0], point[1] - other[1], point[2] - other[2]
+    return math.sqrt(x * x + y * y + z * z)
 
 
 @njit(cache=True)

@@ -22,13 +22,11 @@ from rhot_app.objects.pose import Mode
 from rhot_app.objects.state import ObjectState
 from rhot_app.objects.track import GATE_6, Gated, ObjectTrack
 from rhot_node.errors import printable
-from rhot_node.files import read_input, why
+from rhot_node.files import read_table, why
 
 Array = NDArray[np.float64]
 
 HEADER = "t", "x", "y", "z", "qw", "qx", "qy", "qz"
-BYTES_MAX = 256 << 20
-"""Bytes of a file at most: some hours at 1 kHz."""
 
 FARTHEST_M = 1000.0
 """m: a position farther from the origin is a mistake (as in a rig file)."""
@@ -76,7 +74,7 @@ class PoseMeasurement:
 def read_pose_stream(path: Path) -> PoseStream:
     """Read and check a file. Raises ObjectError that names the file, the line, what is wrong and what to do."""
     try:
-        data = read_input(path, BYTES_MAX)
+        data = read_table(path)
     except FileNotFoundError as exc:
         raise ObjectError(f"{path}: no such file.") from exc
     except (OSError, ValueError) as exc:

@@ -101,8 +101,9 @@ class UdpSink:
                                                                           type=socket.SOCK_DGRAM)[0]
             self._socket = socket.socket(family, kind, protocol)
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        except OSError as exc:
-            raise OutputError(f"the host {self._host!r} cannot be found ({exc.strerror or exc}); check its name and "
+        except (OSError, UnicodeError) as exc:  # a name with a part of more than 63 letters
+            reason = (exc.strerror or exc) if isinstance(exc, OSError) else "it is no name of a host"
+            raise OutputError(f"the host {self._host[:80]!r} cannot be found ({reason}); check its name and "
                               "the network.") from exc
 
     def send(self, datagram: bytes) -> None:

@@ -95,8 +95,7 @@ def summarise(rig: Rig, path: Path) -> dict[str, Any]:
             for camera, pixels in zip(cameras, state.camera_pixels, strict=True):
                 expected = camera.project(state.joint_positions)
                 errors.append(np.linalg.norm(expected[order[order >= 0]] - pixels[order >= 0], axis=1))
-                depth = state.joint_positions[order[order >= 0]] @ camera.camera_from_world[2, :3]
-                errors_m.append(errors[-1] * (depth + camera.camera_from_world[2, 3]) / camera.intrinsics[0])
+                errors_m.append(errors[-1] / camera.pixels_per_metre(state.joint_positions[order[order >= 0]]))
     if not joints:
         return {"tracked": 0.0, "start_s": None, "reprojection_px": None, "reprojection_mm": None,
                 "reprojection_large": None, "joint_sd_mm": None}

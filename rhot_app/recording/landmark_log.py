@@ -6,8 +6,10 @@ A table is a CSV file with a header. docs/landmarks.md describes its columns.
 from __future__ import annotations
 
 import csv
+import io
 import math
-from collections.abc import Sequence
+from array import array
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -19,7 +21,7 @@ from rhot_app.errors import RecordingError
 from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.project import Rig, RigNode
 from rhot_app.recording.raw_log import Record, RecordKind, begun_now, encode_log
-from rhot_node.files import replacing
+from rhot_node.files import read_table, replacing
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import (
     ClockReply,
@@ -61,10 +63,8 @@ class LandmarkTable:
 def read_landmark_table(path: Path, fps: float | None) -> LandmarkTable:
     """Read a table; its frames are `fps` per second unless it has times. Raises RecordingError naming file and row."""
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = csv.DictReader(file)
-            names = rows.fieldnames or []
-            return _parse(path, list(names), list(rows), fps)
+        rows = csv.DictReader(io.StringIO(read_table(path).decode("utf-8-sig"), newline=""))
+        return _parse(path, list(rows.fieldnames or []), rows, fps)
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be read ({exc.strerror}).") from exc
     except (UnicodeDecodeError, csv.Error) as exc:
@@ -72,7 +72,7 @@ def read_landmark_table(path: Path, fps: float | None) -> LandmarkTable:
                              "of docs/landmarks.md.") from exc
 
 
-def _parse(path: Path, names: list[str], rows: list[dict[str, str]], fps: float | None) -> LandmarkTable:
+def _parse(path: Path, names: list[str], rows: Iterable[dict[str, str]], fps: float | None) -> LandmarkTable:
     places = [f"{axis}{k}" for k in range(LANDMARKS) for axis in "xy"]
     missing = [name for name in places if name not in names]
     timed = "time_s" in names
@@ -82,17 +82,18 @@ def _parse(path: Path, names: list[str], rows: list[dict[str, str]], fps: float 
                              f"x{LANDMARKS - 1}, y{LANDMARKS - 1}.")
     if not timed and fps is None:
         raise RecordingError(f"{path}: has frame numbers but no column time_s; give --fps, the frames per second.")
-    if not rows:
-        raise RecordingError(f"{path}: holds no frames.")
-    table = np.empty((len(rows), 3 + 2 * LANDMARKS))
+    numbers = array("d")  # a table's cells as text take ten times as much
     for number, row in enumerate(rows):
         try:
-            table[number] = [float(row["time_s"]) if timed else float(row["frame"]) / (fps or 1.0),
-                             float(row.get("score") or 1.0), float(row.get("sigma_px") or SIGMA_PX),
-                             *(float(row[name] or "nan") for name in places)]
+            numbers.extend([float(row["time_s"]) if timed else float(row["frame"]) / (fps or 1.0),
+                            float(row.get("score") or 1.0), float(row.get("sigma_px") or SIGMA_PX),
+                            *(float(row[name] or "nan") for name in places)])
         except (TypeError, ValueError) as exc:
             raise RecordingError(f"{path}: line {number + 2} holds something that is no number ({exc}). Mend or "
                                  "remove the line.") from exc
+    if not numbers:
+        raise RecordingError(f"{path}: holds no frames.")
+    table = np.array(numbers).reshape(-1, 3 + 2 * LANDMARKS)
     times, scores, sigma, pixels = table[:, 0], table[:, 1], table[:, 2], table[:, 3:].reshape(-1, LANDMARKS, 2)
     pixels[~np.isfinite(pixels).all(axis=2)] = np.nan
     for wrong, what in ((~np.isfinite(times) | (np.abs(times) > _LONGEST_S), "a time beyond a day"),

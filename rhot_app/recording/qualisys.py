@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import RecordingError
-from rhot_node.files import read_input
+from rhot_node.files import read_table
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ class PointTracks:
 def read_qualisys(path: Path) -> PointTracks:
     """Read a TSV export with 3-D data. Raises RecordingError naming the file and what is wrong with it."""
     try:
-        text = read_input(path).decode()
+        text = read_table(path).decode()
     except (OSError, UnicodeDecodeError) as exc:
         raise RecordingError(f"{path}: cannot be read as a recording ({exc}).") from exc
     try:
@@ -43,13 +44,17 @@ def _parse(text: str) -> PointTracks:
     names = [name for name in names if name.strip()]
     start = next(k for k, line in enumerate(lines) if line.startswith("Frame\t")) + 1
     width = 2 + 3 * len(names)
-    rows = [line.split("\t")[:width] for line in lines[start:] if line.strip()]
-    if not rows:
-        raise ValueError("it holds no frames")
-    for number, row in enumerate(rows, start + 1):
+    numbers = array("d")  # a table's cells as text take ten times as much
+    for number, line in enumerate(lines[start:], start + 1):
+        row = line.split("\t")[:width]
+        if not line.strip():
+            continue
         if len(row) < width:
             raise ValueError(f"line {number} has {len(row)} columns, not {width}")
-    table = np.array([[float(cell) if cell.strip() else np.nan for cell in row] for row in rows])
+        numbers.extend(float(cell) if cell.strip() else np.nan for cell in row)
+    if not numbers:
+        raise ValueError("it holds no frames")
+    table = np.array(numbers).reshape(-1, width)
     positions = 1e-3 * table[:, 2:].reshape(len(table), len(names), 3)
     positions[(positions == 0.0).all(axis=2)] = np.nan  # the exporter writes a missing marker as zeros
     return PointTracks(tuple(names), table[:, 1] - table[0, 1], positions)

@@ -27,6 +27,7 @@ from rhot_app.recording.recorder import free_bytes
 from rhot_node.errors import NodeError, printable
 from rhot_node.files import decode_message, replacing
 from rhot_node.keys import KeyPair, connect_with
+from rhot_node.network.context import Context
 from rhot_node.video.avi import read_stamps
 from rhot_node.video.recorder import READ_MAX, VideoInfo, VideoName
 
@@ -185,7 +186,7 @@ class _Channel:
         self.node = node
         self._own = own
         self._patience_s = patience_s
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._context = Context()
         self._socket: zmq.Socket[bytes] | None = None
 
     def close(self) -> None:
@@ -251,7 +252,6 @@ class _Channel:
 
     def _connect(self) -> zmq.Socket[bytes]:
         socket = self._context.socket(zmq.REQ)
-        socket.linger = 0
         socket.maxmsgsize = _ANSWER_MAX
         if self.node.public_key:
             connect_with(socket, self._own, self.node.public_key)

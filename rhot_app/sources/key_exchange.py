@@ -19,6 +19,7 @@ from rhot_node.errors import printable
 from rhot_node.files import decode_message
 from rhot_node.keys import HexKey, KeyPair, connect_with
 from rhot_node.logs import LogLimit
+from rhot_node.network.context import Context
 
 ASK_NS = 250_000_000
 """A node is not asked more often than this."""
@@ -58,7 +59,7 @@ class KeyExchange:
         paired = [link for link in links if link.paired]
         if paired and own is None:
             raise SourceError(f"node {paired[0].node.name} is paired, but this program has no keys to speak to it.")
-        self._context: zmq.Context[zmq.Socket[bytes]] | None = zmq.Context() if paired else None
+        self._context: Context | None = Context() if paired else None
         for link in paired:
             self._connect(link, own)
 
@@ -129,7 +130,6 @@ class KeyExchange:
         assert self._context is not None and own is not None
         node = link.node
         socket = self._context.socket(zmq.DEALER)
-        socket.linger = 0
         socket.setsockopt(zmq.IMMEDIATE, 1)
         socket.setsockopt(zmq.RECONNECT_IVL, _RECONNECT_MS)
         connect_with(socket, own, node.public_key)

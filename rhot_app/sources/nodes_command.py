@@ -7,7 +7,7 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import SourceError
+from rhot_app.errors import SourceError, finite
 
 if TYPE_CHECKING:
     from rhot_app.sources.discovery import FoundNode, Search
@@ -17,7 +17,7 @@ SECONDS_MAX = 60.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot nodes``."""
-    parser.add_argument("--seconds", type=float, default=3.0, metavar="S", help="how long to look (default: 3)")
+    parser.add_argument("--seconds", type=finite, default=3.0, metavar="S", help="how long to look (default: 3)")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
 
 

@@ -20,6 +20,7 @@ from rhot_app.keys import KnownNode, MasterKeys, remember_node
 from rhot_node.errors import printable
 from rhot_node.files import PRINTABLE, decode_message
 from rhot_node.keys import Name
+from rhot_node.network.context import Context
 from rhot_node.network.pairing import NO_CODE, NONCE_LENGTH, Transcript, proof, proves, read_code
 
 PAIRING_PORT = 47803
@@ -122,21 +123,20 @@ def pair(address: NodeAddress, code_text: str, keys: MasterKeys, timeout_s: floa
 
 def _ask(questions: Sequence[tuple[NodeAddress, dict[str, Any]]], timeout_s: float) -> list[bytes | str | None]:
     """The bytes of every answer; None for silence, a sentence for an address that cannot be asked."""
-    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    context = Context()
     poller = zmq.Poller()
     sockets: dict[zmq.Socket[bytes], int] = {}
     answers: list[bytes | str | None] = [None] * len(questions)
     try:
         for place, (address, question) in enumerate(questions):
             socket = context.socket(zmq.REQ)
-            socket.linger = 0
             socket.maxmsgsize = _ANSWER_MAX
             try:
                 socket.connect(f"tcp://{address}")
                 socket.send(msgspec.json.encode(question), zmq.DONTWAIT)
             except zmq.Again:
                 continue  # what listens there has hung up already; waiting to send would be for ever
-            except zmq.ZMQError as exc:
+            except (zmq.ZMQError, UnicodeError) as exc:
                 answers[place] = f"{str(address)!r} is not an address that can be asked ({exc})."
                 continue
             sockets[socket] = place

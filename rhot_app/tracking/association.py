@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from rhot_app.geometry.camera import project_normalised, undistort_points
+from rhot_app.geometry.camera import pixels_per_metre, project_with_slope, undistort_points
 from rhot_app.tracking.locate import GATE_FLOOR_PX
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.tracker import CameraObservations
@@ -164,16 +164,8 @@ class MarkerAssociation:
         points[~tracked] = np.nan
         points[by_hand] = points[newest].mean(axis=0) if newest.any() else np.nan
         spread[by_hand] = (self._hand_sd_m**2)[by_hand, None, None] * np.eye(3)
-        rotation = rig.cameras[camera, :, :3]
-        local = points @ rotation.T + rig.cameras[camera, :, 3]
-        depth = np.where(local[:, 2] > 0.0, local[:, 2], np.nan)
-        normalised = np.ascontiguousarray(local[:, :2] / depth[:, None])
-        slope = np.zeros((len(points), 2, 3))  # px per m along the camera's axes, lens distortion left out
-        slope[:, 0, 0] = slope[:, 1, 1] = 1.0
-        slope[:, :, 2] = -normalised
-        slope *= rig.focal[camera][None, :, None] / depth[:, None, None]
-        slope = slope @ rotation
-        return project_normalised(normalised, rig.intrinsics[camera]), slope @ spread @ slope.transpose(0, 2, 1)
+        pixels, slope = project_with_slope(points, rig.cameras[camera], rig.intrinsics[camera])
+        return pixels, slope @ spread @ slope.transpose(0, 2, 1)
 
     def _choose(self, listed: _CandidateList, predicted: Array, covariances: Array) -> tuple[Indices, Indices]:
         """The candidate of each marker (M,), and another one that is about as likely; -1 for none.
@@ -227,23 +219,22 @@ class MarkerAssociation:
         """Points (H, 3) m, world frame, where the rays of candidates of the same marker meet in two cameras, and (H,)
         the rows of the candidates in `listed`. `rays` (N, 2): normalised coordinates of `listed`."""
         rig, others = self._rig, _list_candidates(other)
-        pair = [frame.camera, other.camera]
         rows, columns = np.nonzero(listed.markers[:, None] == others.markers[None])
         other_rays = undistort_points(others.pixels, rig.intrinsics[other.camera])[columns]
-        cameras = rig.cameras[pair]
+        cameras = rig.cameras[[frame.camera, other.camera]]
         # (x p3 - p1) X = 0 and (y p3 - p2) X = 0 for both cameras
         observed = np.stack([rays[rows], other_rays], axis=1)[..., None]
         planes = (observed * cameras[None, :, 2:3] - cameras[None, :, :2]).reshape(-1, 4, 4)
         normal = np.einsum("hki,hkj->hij", planes[..., :3], planes[..., :3]) + 1e-12 * np.eye(3)
         side = -np.einsum("hki,hk->hi", planes[..., :3], planes[..., 3])
         points = np.linalg.solve(normal, side[..., None])[..., 0]
-        local = np.einsum("cij,hj->hci", cameras[..., :3], points) + cameras[None, ..., 3]
-        in_front = (local[..., 2] > 0.0).all(axis=1)
-        depth = np.where(local[..., 2] > 0.0, local[..., 2], np.nan)
-        residuals_px = rig.focal[pair] * (local[..., :2] / depth[..., None] - observed[..., 0])
+        expected, slopes = project_with_slope(points, cameras[0], rig.intrinsics[frame.camera])
+        off_px = np.abs(np.hstack([
+            expected - listed.pixels[rows],
+            project_with_slope(points, cameras[1], rig.intrinsics[other.camera])[0] - others.pixels[columns]]))
         moved_m = HAND_SPEED * 1e-9 * abs(other.t_row0_master_ns - frame.t_row0_master_ns)
-        moved_px = moved_m * rig.focal[frame.camera, 0] / depth[:, 0]
-        meet = in_front & (np.abs(residuals_px).max(axis=(1, 2)) < GATE_FLOOR_PX + moved_px)
+        moved_px = moved_m * np.array([pixels_per_metre(slope) for slope in slopes])
+        meet = off_px.max(axis=1, initial=0.0) < GATE_FLOOR_PX + moved_px  # NaN, so false, behind a camera
         return rows[meet], points[meet]
 
     def _largest_cluster(self, markers: Indices, points: Array) -> Indices:

@@ -110,7 +110,7 @@ class ClassicTracker:
         rig, shapes = self._rig, self._shapes()
         markers = LocateArrays(len(rig.cameras), len(rig.marker_ids))
         locate.locate_raw(t_s, paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics,
-                          rig.cameras, rig.focal, shapes, rig.law, rig.reach, self._memory, self._confirmed,
+                          rig.cameras, shapes, rig.law, rig.reach, self._memory, self._confirmed,
                           markers.used, markers.doubtful, markers.accepted, markers.restarted, markers.raw,
                           markers.covariances, markers.errors)
         clock.lap("triangulate")
@@ -122,7 +122,7 @@ class ClassicTracker:
         locate.filter_pixels(t_s, markers.used, markers.restarted, paired.pixels, pixel.parameters, pixel.state,
                              position.state, pixel.gap_s, pixels)
         clock.lap("filter")
-        locate.locate_filtered(pixels, paired.covariances, markers.used, rig.intrinsics, rig.cameras, rig.focal,
+        locate.locate_filtered(pixels, paired.covariances, markers.used, rig.intrinsics, rig.cameras,
                                shapes, rig.law, markers.positions)
         clock.lap("triangulate")
         locate.filter_positions(t_s, markers.positions, position.parameters, position.state, position.gap_s,

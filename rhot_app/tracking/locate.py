@@ -52,13 +52,13 @@ def choose_views(flags: NDArray[np.int64], live: Mask, used: Mask, doubtful: Mas
 
 
 @njit(cache=True)
-def _locate(rays: Array, covariances: Array, cameras: Array, focal: Array, used: Mask, shape: Array, position: Array,
+def _locate(rays: Array, covariances: Array, cameras: Array, by_pixel: Array, used: Mask, shape: Array, position: Array,
             covariance: Array) -> tuple[float, int]:
-    error, outcome = triangulate(rays, covariances, cameras, focal, used, position, covariance)
+    error, outcome = triangulate(rays, covariances, cameras, by_pixel, used, position, covariance)
     if outcome == 0 and shape[0, 0] + shape[1, 1] + shape[2, 2] > 0.0:
         centred = np.empty_like(rays)
         point_rays(rays, cameras, shape, position, centred)
-        error, outcome = triangulate(centred, covariances, cameras, focal, used, position, covariance)
+        error, outcome = triangulate(centred, covariances, cameras, by_pixel, used, position, covariance)
     return error, outcome
 
 
@@ -73,24 +73,25 @@ def _gate(pixel_covariances: Array, used: Mask) -> float:
 
 
 @njit(cache=True)
-def locate_all(pixels: Array, covariances: Array, used: Mask, intrinsics: Array, cameras: Array, focal: Array,
-               shapes: Array, positions: Array, position_covariances: Array, errors: Array) -> None:
+def locate_all(pixels: Array, covariances: Array, used: Mask, intrinsics: Array, cameras: Array, shapes: Array,
+               positions: Array, position_covariances: Array, errors: Array) -> None:
     """Locate M markers from C cameras.
 
-    `pixels` (C, M, 2) raw px with `covariances` (C, M, 2, 2); `used` (C, M) which count; `intrinsics` (C, 9),
-    `cameras` (C, 3, 4), `focal` (C, 2), `shapes` (M, 3, 3) as in `RigArrays`. Fills `positions` (M, 3) m,
+    `pixels` (C, M, 2) raw px with `covariances` (C, M, 2, 2); `used` (C, M) which count; `intrinsics` (C, 13),
+    `cameras` (C, 3, 4), `shapes` (M, 3, 3) as in `RigArrays`. Fills `positions` (M, 3) m,
     `position_covariances` (M, 3, 3) m^2 and `errors` (M,) px rms. A marker that cannot be located, or whose rays miss
     each other by more than the gate, has NaN positions; in the second case its error is still filled. With three
     cameras or more the one view whose removal leaves the smallest error is given up first, and cleared in `used`.
     """
     count = pixels.shape[0]
-    rays, ray_covariances = np.empty((count, 2)), np.empty((count, 2, 2))
+    rays, ray_covariances, by_pixel = np.empty((count, 2)), np.empty((count, 2, 2)), np.empty((count, 2, 2))
     views, trial = np.empty(count, np.bool_), np.empty(count, np.bool_)
     for m in range(pixels.shape[1]):
         for c in range(count):
             views[c] = used[c, m]
             x, y, xu, xv, yu, yv = undistort_point(pixels[c, m, 0], pixels[c, m, 1], intrinsics[c])
             rays[c, 0], rays[c, 1] = x, y
+            by_pixel[c, 0, 0], by_pixel[c, 0, 1], by_pixel[c, 1, 0], by_pixel[c, 1, 1] = xu, xv, yu, yv
             uu, vv = max(covariances[c, m, 0, 0], EXACT_PX2), max(covariances[c, m, 1, 1], EXACT_PX2)
             uv = covariances[c, m, 0, 1]
             ray_covariances[c, 0, 0] = xu * xu * uu + 2.0 * xu * xv * uv + xv * xv * vv
@@ -99,7 +100,7 @@ def locate_all(pixels: Array, covariances: Array, used: Mask, intrinsics: Array,
             ray_covariances[c, 1, 0] = ray_covariances[c, 0, 1]
             if not (math.isfinite(x) and math.isfinite(y)):
                 views[c] = False
-        error, outcome = _locate(rays, ray_covariances, cameras, focal, views, shapes[m], positions[m],
+        error, outcome = _locate(rays, ray_covariances, cameras, by_pixel, views, shapes[m], positions[m],
                                  position_covariances[m])
         if outcome == 0 and error > _gate(covariances[:, m], views) and np.sum(views) > 2:
             best, worst = error, -1
@@ -107,13 +108,13 @@ def locate_all(pixels: Array, covariances: Array, used: Mask, intrinsics: Array,
                 if views[c]:
                     trial[:] = views
                     trial[c] = False
-                    error, outcome = _locate(rays, ray_covariances, cameras, focal, trial, shapes[m], positions[m],
+                    error, outcome = _locate(rays, ray_covariances, cameras, by_pixel, trial, shapes[m], positions[m],
                                              position_covariances[m])
                     if outcome == 0 and error < best:
                         best, worst = error, c
             if worst >= 0:
                 views[worst] = False
-            error, outcome = _locate(rays, ray_covariances, cameras, focal, views, shapes[m], positions[m],
+            error, outcome = _locate(rays, ray_covariances, cameras, by_pixel, views, shapes[m], positions[m],
                                      position_covariances[m])
         errors[m] = error
         if outcome != 0 or error > _gate(covariances[:, m], views):
@@ -156,12 +157,12 @@ def turn_band(world_from_palm: Array, half_axes: Array, shape: Array) -> None:
 
 @njit(cache=True)
 def locate_raw(t_s: float, flags: NDArray[np.int64], live: Mask, pixels: Array, covariances: Array, intrinsics: Array,
-               cameras: Array, focal: Array, shapes: Array, law: Array, reach: Array, memory: Array, confirmed: Mask,
+               cameras: Array, shapes: Array, law: Array, reach: Array, memory: Array, confirmed: Mask,
                used: Mask, doubtful: Mask, accepted: Mask, restarted: Mask, raw: Array, raw_covariances: Array,
                errors: Array) -> None:
     """Unfiltered positions decide what to believe. Arrays as in `locate`, `estimate` and `trust`."""
     choose_views(flags, live, used, doubtful)
-    _locate_markers(pixels, covariances, used, intrinsics, cameras, focal, shapes, law, raw, raw_covariances, errors)
+    _locate_markers(pixels, covariances, used, intrinsics, cameras, shapes, law, raw, raw_covariances, errors)
     trust.judge(t_s, raw, raw_covariances, memory, accepted, restarted)
     trust.keep_within_reach(raw, raw_covariances, reach, memory, accepted, restarted, confirmed)
     trust.confirm(raw, raw_covariances, memory, accepted, doubtful, restarted, reach, confirmed)
@@ -173,13 +174,13 @@ def locate_raw(t_s: float, flags: NDArray[np.int64], live: Mask, pixels: Array, 
 
 
 @njit(cache=True)
-def _locate_markers(pixels: Array, covariances: Array, used: Mask, intrinsics: Array, cameras: Array, focal: Array,
-            shapes: Array, law: Array, positions: Array, position_covariances: Array, errors: Array) -> None:
+def _locate_markers(pixels: Array, covariances: Array, used: Mask, intrinsics: Array, cameras: Array,
+                    shapes: Array, law: Array, positions: Array, position_covariances: Array, errors: Array) -> None:
     """By triangulation, or by disparity where the rig has a law for it."""
     if law.shape[0] > 0:
         locate_by_disparity(pixels, covariances, used, law, positions, position_covariances, errors)
     else:
-        locate_all(pixels, covariances, used, intrinsics, cameras, focal, shapes, positions,
+        locate_all(pixels, covariances, used, intrinsics, cameras, shapes, positions,
                           position_covariances, errors)
 
 
@@ -204,11 +205,11 @@ def filter_pixels(t_s: float, used: Mask, restarted: Mask, pixels: Array, parame
 
 
 @njit(cache=True)
-def locate_filtered(pixels: Array, covariances: Array, used: Mask, intrinsics: Array, cameras: Array, focal: Array,
+def locate_filtered(pixels: Array, covariances: Array, used: Mask, intrinsics: Array, cameras: Array,
                     shapes: Array, law: Array, positions: Array) -> None:
     """Fill `positions` (M, 3) m from filtered pixels; covariances and errors stay those of the unfiltered ones."""
     markers = positions.shape[0]
-    _locate_markers(pixels, covariances, used.copy(), intrinsics, cameras, focal, shapes, law, positions,
+    _locate_markers(pixels, covariances, used.copy(), intrinsics, cameras, shapes, law, positions,
             np.empty((markers, 3, 3)), np.empty(markers))
 
 

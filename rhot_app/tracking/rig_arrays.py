@@ -101,7 +101,7 @@ _ROUND = ("sphere", "capsule", "band")
 class RigArrays:
     """C cameras, M markers. Read-only.
 
-    `cameras` (C, 3, 4) camera_from_world m; `intrinsics` (C, 9) as `CameraModel`; `focal` (C, 2) px.
+    `cameras` (C, 3, 4) camera_from_world m; `intrinsics` (C, 13) as `CameraModel`; `focal` (C, 2) px.
     `shapes` (M, 3, 3) m^2: the markers' bodies as far as known without the hand's pose, zero for flat ones. `tips`
     (5,): marker index of each finger's tip, -1 without one; `wrist`: the same for the wrist. `band_half_axes`
     (3,) m along the palm's x, y, z; None when the wrist wears no band. `law` (7,): how distance follows from

@@ -87,7 +87,7 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     app.setApplicationName("RHOT")
     choose_format()
     apply_theme(app, scheme_named(settings.scheme))
-    controller = Controller(session, session.client)
+    controller = Controller(session)
     window = MainWindow(controller, settings)
     for number in (signal.SIGINT, signal.SIGTERM):
         # a handler may run in the middle of a drawing, so closing waits for its turn

@@ -11,8 +11,7 @@ import msgspec
 from rhot_app.engine.status import Advice, EngineStatus
 from rhot_app.errors import RigError
 from rhot_app.project import Rig, load_rig, parse_rig
-from rhot_app.ui.backend.contract import TwinPace
-from rhot_app.ui.backend.live import Client
+from rhot_app.ui.backend.contract import Asker, TwinPace
 from rhot_app.ui.common.controller import RESTART_ENGINE, RESTART_TWIN, Controller
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
@@ -126,7 +125,7 @@ class RigObservation:
     edited: bool
 
 
-def look_at_rig(client: Client) -> RigObservation:
+def look_at_rig(client: Asker) -> RigObservation:
     """Ask the engine and read the file. Waits; raises EngineError, RigError."""
     answer = client.command("rig")
     path = str(answer.get("path", ""))

@@ -15,7 +15,8 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
 from rhot_app.project import Rig, parse_rig, with_object
-from rhot_app.ui.common.controller import ClosableClient, Controller
+from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.models.notice import Notice
 from rhot_node.files import resource_path
 
@@ -77,7 +78,7 @@ class TrackedObjects(QObject):
         self._change(without, lambda rig: f"{name} is not tracked any more.")
 
     def _change(self, change: Callable[[Rig], Rig], words: Callable[[Rig], str]) -> None:
-        def work(client: ClosableClient) -> Rig:
+        def work(client: Asker) -> Rig:
             answer = client.command("rig")
             rig = change(parse_rig(msgspec.json.encode(answer["document"]), "the engine's rig"))
             client.command("set_rig", document=msgspec.to_builtins(rig), timeout_s=60.0)

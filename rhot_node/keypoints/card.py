@@ -16,12 +16,13 @@ import msgspec
 from msgspec import Meta
 
 from rhot_node.errors import KeypointError
+from rhot_node.files import read_input
 
 Side = Annotated[int, Meta(ge=16, le=1024)]
 Share = Annotated[float, Meta(gt=0, le=1)]
 FileName = Annotated[str, Meta(pattern=r"\A[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z")]
 
-CARD_BYTES_MAX, NETWORK_BYTES_MAX = 65_536, 268_435_456
+CARD_BYTES_MAX = 65_536
 
 
 class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -82,14 +83,11 @@ def card_path(name: str) -> Path:
 def load_card(path: Path) -> ModelCard:
     """Read a model card. Raises KeypointError naming file and field."""
     try:
-        with path.open("rb") as file:
-            data = file.read(CARD_BYTES_MAX + 1)
+        data = read_input(path, CARD_BYTES_MAX)
     except OSError as exc:
         raise KeypointError(f"{path}: there is no model card ({exc.strerror}). Place the card and its network there.") \
             from exc
     try:
-        if len(data) > CARD_BYTES_MAX:
-            raise ValueError(f"it is longer than {CARD_BYTES_MAX} bytes")
         return msgspec.convert(tomllib.loads(data.decode()), ModelCard)
     except (ValueError, RecursionError, msgspec.ValidationError) as exc:
         raise KeypointError(f"{path}: not a model card ({exc}). docs/landmarks.md describes it.") from exc
@@ -99,11 +97,9 @@ def read_network(card: Path, network: Network) -> bytes:
     """The bytes of a card's network, whose hash agrees. Raises KeypointError."""
     path = card.parent / network.file
     try:
-        if path.stat().st_size > NETWORK_BYTES_MAX:
-            raise KeypointError(f"{path}: longer than {NETWORK_BYTES_MAX >> 20} MiB; that is no network for a node.")
-        data = path.read_bytes()
+        data = read_input(path)
     except OSError as exc:
-        raise KeypointError(f"{path}: the network of {card.name} is not there ({exc.strerror}). Place it beside the "
+        raise KeypointError(f"{path}: the network of {card.name} cannot be read ({exc.strerror}). Place it beside the "
                             "card; RHOT downloads none.") from exc
     found = hashlib.sha256(data).hexdigest()
     if found != network.sha256:

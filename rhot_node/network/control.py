@@ -19,6 +19,7 @@ from rhot_node.config import NodeSettings
 from rhot_node.errors import LinkError, printable
 from rhot_node.keys import NodeTrust, serve_with
 from rhot_node.logs import LogLimit
+from rhot_node.network.context import Context
 from rhot_node.network.pairing import REQUEST_MAX as STRANGERS_REQUEST_MAX
 from rhot_node.network.pairing import Reception
 from rhot_node.network.pictures import PictureBox, encode_preview
@@ -43,7 +44,7 @@ class ControlServer:
         is open, nothing is encrypted and whoever reaches a port is answered."""
         self._node_id = settings.node_id
         self._address = settings.bind_address
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._context = Context()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._worker: Worker | None = None
         self._subscribed = 0
@@ -160,8 +161,7 @@ class ControlServer:
             self._poller.register(source, zmq.POLLIN)
 
     def _open(self, kind: int, port: int, setting: str, gate: Gate | None) -> tuple[zmq.Socket[bytes], int]:
-        sock = self._context.socket(kind)
-        sock.linger = 0  # options hold for connections of a port that is opened after they were set
+        sock = self._context.socket(kind)  # options hold for connections of a port that is opened after they were set
         sock.maxmsgsize = STRANGERS_REQUEST_MAX if setting == "pairing_port" else REQUEST_MAX
         sock.sndhwm = PREVIEWS_QUEUED
         try:
@@ -187,13 +187,12 @@ _KEY_LENGTH = 32
 class Gate:
     """The ZAP handler of one context. `step` belongs to the thread that serves the guarded sockets."""
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], trust: NodeTrust) -> None:
+    def __init__(self, context: Context, trust: NodeTrust) -> None:
         """Must be there before a socket is guarded."""
         self.trust = trust
         self.refused = 0  # handshakes of strangers
         self._limit = LogLimit()
         self.socket = context.socket(zmq.REP)
-        self.socket.linger = 0
         self.socket.bind(_ENDPOINT)
 
     def guard(self, sock: zmq.Socket[bytes]) -> None:

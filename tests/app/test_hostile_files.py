@@ -5,15 +5,22 @@ from __future__ import annotations
 import json
 import os
 import signal
+import struct
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from rhot_app.__main__ import main
-from rhot_node.files import resource_path
+from rhot_app.project import load_rig, save_rig
+from rhot_node.files import TABLE_LINES_MAX, resource_path
+from rhot_node.markers import load_markers
 
 RIG = resource_path("rigs", "two_pis.json")
+LANDMARKS = resource_path("markers", "landmarks21.json")
 PATIENCE_S = 20
 
 
@@ -46,6 +53,9 @@ READERS = {
     "hand": ["hand", "FILE"],
     "motion": ["simulate", "--motion", "FILE", "--seconds", "0.1", "--out", "FOLDER/out"],
     "markers": ["simulate", "--markers", "FILE", "--seconds", "0.1", "--out", "FOLDER/out"],
+    "landmarks": ["landmarks", "FILE", "FILE", "--rig", "RIG", "--fps", "30", "--out", "FOLDER/out"],
+    "alignment": ["calibrate", "alignment", "--foreign", "FILE", "--rig-points", "FILE"],
+    "layers": ["layers", "FILE", "--out", "FOLDER/layers.png"], "object": ["object", "FILE"],
     "depth": ["calibrate", "depth", "--table", "FILE"], "replay": ["replay", "FILE", "--json"],
     "bones": ["calibrate", "bones", "--tsv", "FILE"],
     "pictures": ["calibrate", "intrinsics", "--images", "FILE", "--board", "9x6", "--square-mm", "20"],
@@ -53,9 +63,30 @@ READERS = {
 }
 
 
+def code_of(arguments: list[str]) -> int:
+    """The exit code, also of what argparse refuses."""
+    try:
+        return main(arguments)
+    except SystemExit as exc:
+        return int(exc.code or 0)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def landmark_rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A rig of landmarks, for what takes no other."""
+    path = tmp_path_factory.mktemp("rig") / "rig.json"
+    save_rig(path, msgspec.structs.replace(load_rig(RIG), markers=load_markers(LANDMARKS)))
+    READERS["landmarks"] = [word.replace("RIG", str(path)) for word in READERS["landmarks"]]
+    return path
+
+
+def words_of(arguments: list[str], path: Path | str, folder: Path) -> list[str]:
+    return [word.replace("FILE", str(path)).replace("FOLDER", str(folder)) for word in arguments]
+
+
 def refused(arguments: list[str], path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     entries = sorted(folder.iterdir())
-    code = main([word.replace("FILE", str(path)).replace("FOLDER", str(folder)) for word in arguments])
+    code = main(words_of(arguments, path, folder))
     said = capsys.readouterr().err
     assert code == 2
     assert path.name in said, "the sentence names the file"
@@ -80,6 +111,69 @@ def test_pipes_and_folders_are_not_read(command: str, tmp_path: Path, capsys: py
         refused(READERS[command], tmp_path / name, tmp_path, capsys)
 
 
+LINES = TABLE_LINES_MAX + 1
+MUCH = {"picture": b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + struct.pack(">IIBBBBB", 30000, 30000, 8, 2, 0, 0, 0) + bytes(99),
+        "lines": b"\n" * LINES, "line": b"1,2,3,4;" * 500_000,
+        "loop": json.dumps({"format": "rhot-articulated", "version": 1, "name": "loop", "root": {"name": "root"},
+                            "frames": [{"name": f"f{k}", "parent": f"f{(k + 1) % 40_000}"} for k in range(40_000)]}
+                           ).encode()}
+
+
+@pytest.mark.parametrize("content", MUCH)
+@pytest.mark.parametrize("command", READERS)
+def test_no_file_is_too_much(command: str, content: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / f"{content}.json"
+    path.write_bytes(MUCH[content])
+    refused(READERS[command], path, tmp_path, capsys)
+
+
+@pytest.mark.parametrize("name", ["a" * 300, "b" * 5000, "c\x1b[31m\x07.json", "d\udcff"],
+                         ids=["long", "longer", "escape", "no UTF-8"])
+@pytest.mark.parametrize("command", READERS)
+def test_no_name_is_more_than_a_sentence(command: str, name: str, tmp_path: Path,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(words_of(READERS[command], name, tmp_path)) == 2
+    said = capsys.readouterr()
+    assert said.err.strip() and "Traceback" not in said.err and "\x1b" not in said.err + said.out
+
+
+@pytest.mark.study("rhot_app", "rhot_node")
+def test_no_input_takes_a_gigabyte_or_twenty_seconds(landmark_rig: Path, tmp_path: Path) -> None:
+    signal.alarm(0)  # of `_no_hang`: there are two hundred programs
+    with (tmp_path / "sparse").open("wb") as file:
+        file.truncate(6 << 30)
+    os.mkfifo(tmp_path / "pipe")
+    for name, content in (CONTENTS | MUCH).items():
+        (tmp_path / name).write_bytes(content)
+    for name in ("/dev/zero", *(path.name for path in sorted(tmp_path.iterdir()))):
+        for arguments in READERS.values():
+            words = words_of(arguments, tmp_path / name, tmp_path / "new")
+            program = subprocess.Popen([sys.executable, "-m", "rhot_app", *words], stdin=subprocess.DEVNULL,
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+            assert program.stderr is not None
+            said = program.stderr.read()
+            _, status, used = os.wait4(program.pid, 0)
+            assert os.waitstatus_to_exitcode(status) == 2 and b"Traceback" not in said, (words, said)
+            assert used.ru_maxrss < 1_000_000 and used.ru_utime + used.ru_stime < PATIENCE_S, (words, used)
+
+
+NUMBERS = [["simulate", "--out", "FOLDER/out", "--distance"], ["simulate", "--out", "FOLDER/out", "--seed"],
+           ["export", "FILE", "--out", "FOLDER/a.csv", "--rate"], ["hand", "--length"], ["evaluate", "--loss"],
+           ["calibrate", "alignment", "--foreign", "FILE", "--rig-points", "FILE", "--search"],
+           ["calibrate", "depth", "--table", "FILE", "--baseline-mm"], ["poses", "--source", "udp:0", "--seconds"],
+           ["fit-hand", "--rig", "FILE", "--pictures", "FILE", "--at"], ["batch", "FILE", "--do", "track", "--out",
+                                                                        "FOLDER/out", "--workers"]]
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "-inf", "1e999", "9" * 5000, "x\x1b[31m"])
+@pytest.mark.parametrize("arguments", NUMBERS, ids=lambda words: f"{words[0]} {words[-1]}")
+def test_no_number_is_more_than_a_sentence(arguments: list[str], number: str, tmp_path: Path,
+                                           capsys: pytest.CaptureFixture[str]) -> None:
+    assert code_of(words_of([*arguments[:-1], f"{arguments[-1]}={number}"], RIG, tmp_path)) == 2
+    said = capsys.readouterr().err
+    assert arguments[-1] in said and "\x1b" not in said and list(tmp_path.iterdir()) == []
+
+
 WRITERS = {
     "hand": ["hand", "--out", "FILE"], "drawing": ["hand", "--draw", "FILE"],
     "target": ["target", "chessboard", "--board", "9x6", "--square-mm", "20", "--out", "FILE"],
@@ -101,6 +195,6 @@ def test_pipes_and_folders_are_not_replaced(command: str, tmp_path: Path, capsys
 def test_a_time_that_never_ends_is_refused(command: str, seconds: str, tmp_path: Path,
                                            capsys: pytest.CaptureFixture[str]) -> None:
     arguments = [command, f"--seconds={seconds}", *(["--out", str(tmp_path / "out")] if command == "simulate" else [])]
-    assert main(arguments) == 2
+    assert code_of(arguments) == 2
     assert "seconds" in capsys.readouterr().err or command == "evaluate"
     assert not (tmp_path / "out").exists()

@@ -13,13 +13,13 @@ from shipped_rig import LEFT_MODEL, RIGHT_HAND, RIGHT_MODEL
 
 from rhot_app.barehand.surface import SHAPE, Surface, surface_of
 from rhot_app.evaluation.searched_nodes import SearchedNodes
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.camera import LENS, CameraModel, rig_intrinsics
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
+from rhot_app.project import CameraPose, Rig, RigNode
 from rhot_app.simulator.scene.motion import load_motion
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
@@ -37,8 +37,7 @@ def rig_of(cameras: list[CameraModel], hand: HandAnatomy = RIGHT_HAND) -> Rig:
     """A rig with these cameras and this hand; nobody wears its markers."""
     nodes = tuple(
         RigNode(k + 1, f"camera {k + 1}",
-                Intrinsics(camera.width, camera.height, *(float(v) for v in camera.intrinsics[:4]),
-                           tuple(float(v) for v in camera.intrinsics[4:])),
+                rig_intrinsics((camera.width, camera.height), camera.intrinsics[:LENS]),
                 CameraPose(tuple(float(v) for v in quaternion_from_rotation(camera.world_from_camera[:3, :3])),
                            tuple(float(v) for v in camera.centre)))
         for k, camera in enumerate(cameras))

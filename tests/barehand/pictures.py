@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import camera_centre
 from rhot_app.barehand.surface import FOREARM, Surface, capsules_of, ray_to_capsule
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.camera import CameraModel, intrinsics_row
 from rhot_app.geometry.transforms import inverse, rigid
 from rhot_app.hand.skeleton import HandPose
 
@@ -39,7 +39,7 @@ def look_at(place: Array, target: Array, focal: float = 600.0, width: int = 640,
     x = np.cross([0.0, 1.0, 0.0], z)
     x /= np.linalg.norm(x)
     world = rigid(np.column_stack([x, np.cross(z, x), z]), place)
-    return CameraModel(width, height, np.array([focal, focal, 0.5 * width - 0.5, 0.5 * height - 0.5, 0, 0, 0, 0, 0.0]),
+    return CameraModel(width, height, intrinsics_row([focal, focal, 0.5 * width - 0.5, 0.5 * height - 0.5]),
                        world, inverse(world))
 
 

@@ -10,17 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.board.boards import Board, Chessboard
+from rhot_app.geometry.camera import full_lens
 
 Array = NDArray[np.float64]
 
 PAPER, INK, ROOM = 215.0, 35.0, 120.0
 MARGIN = 1.2  # of the sheet around the outermost squares, in squares
-LENS = np.array([535.0, 535.0, 322.3, 238.1, -0.28, 0.09, 0.001, -0.0005, 0.0])
+LENS = full_lens([535.0, 535.0, 322.3, 238.1, -0.28, 0.09, 0.001, -0.0005])
 
 
 @dataclass(frozen=True)
 class Photo:
-    """How pictures are taken: size px, lens (9,), optical blur (SD, px), noise (SD, grey levels), sub-pixels a side."""
+    """How pictures are taken: size px, lens (12,), blur (SD, px), noise (SD, grey levels), sub-pixels a side.
+
+    `equidistant`: by a lens whose pixels are `lens` (4,) f, f, cx, cy times the angle from its axis, within 90 degrees.
+    """
 
     width: int = 640
     height: int = 480
@@ -28,6 +32,7 @@ class Photo:
     blur_px: float = 0.7
     noise: float = 2.0
     oversampling: int = 4
+    equidistant: bool = False
 
 
 def pose(rotation: tuple[float, float, float], centre_m: tuple[float, float, float], board: Board) -> Array:
@@ -52,7 +57,7 @@ def corners_px(board: Board, camera_from_board: Array, lens: Array | tuple[float
 def take(board: Board, camera_from_board: Array, photo: Photo = Photo(), seed: int = 0) -> NDArray[np.uint8]:
     """(H, W) uint8, the board on a white sheet in a grey room."""
     n = photo.oversampling
-    rays = _rays(photo.width, photo.height, photo.lens, n)
+    rays = _rays(photo.width, photo.height, photo.lens, n, photo.equidistant)
     image = np.full((photo.height, photo.width), ROOM)
     v0, v1, u0, u1 = _sheet_px(board, camera_from_board, photo)
     part = rays[v0 * n:v1 * n, u0 * n:u1 * n]
@@ -67,9 +72,14 @@ def take(board: Board, camera_from_board: Array, photo: Photo = Photo(), seed: i
 
 
 @functools.lru_cache(maxsize=2)
-def _rays(width: int, height: int, parameters: tuple[float, ...], n: int) -> Array:
+def _rays(width: int, height: int, parameters: tuple[float, ...], n: int, equidistant: bool) -> Array:
     """(H n, W n, 2) normalised coordinates of all sub-pixels: between those of the pixels, as no lens bends more."""
     lens = np.array(parameters)
+    if equidistant:
+        v, u = ((np.arange(size * n) + 0.5) / n - 0.5 for size in (height, width))
+        x, y = np.meshgrid((u - lens[2]) / lens[0], (v - lens[3]) / lens[1])
+        angle = np.maximum(np.hypot(x, y), 1e-12)
+        return np.stack([x, y], -1) * (np.tan(np.minimum(angle, 1.57)) / angle)[..., None]
     matrix = np.array([[lens[0], 0, lens[2]], [0, lens[1], lens[3]], [0, 0, 1]])
     v, u = np.mgrid[-1.0:height + 1, -1.0:width + 1]
     rays = cv2.undistortPointsIter(np.stack([u, v], -1).reshape(-1, 1, 2), matrix, lens[4:], None, None,
@@ -83,7 +93,7 @@ def _sheet_px(board: Board, camera_from_board: Array, photo: Photo) -> tuple[int
     outline = board.outline() + margin * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     lens = np.array(photo.lens)
     local = outline @ camera_from_board[:3, :3].T + camera_from_board[:3, 3]
-    if not (local[:, 2] > 0).all():
+    if photo.equidistant or not (local[:, 2] > 0).all():
         return 0, photo.height, 0, photo.width
     places = lens[:2] * local[:, :2] / local[:, 2:] + lens[2:4]  # undistorted: barrel distortion only draws them in
     low, high = np.floor(places.min(axis=0)).astype(int), np.ceil(places.max(axis=0)).astype(int)

@@ -14,6 +14,7 @@ from rhot_app.calibration.board.boards import Chessboard
 from rhot_app.calibration.board.corners import BoardView, detect
 from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.lens.fit import LensStart
+from rhot_app.geometry.camera import full_lens
 
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "stereo_chessboard"
 NUMBERS = range(1, 15)
@@ -48,5 +49,5 @@ def shared(left: list[BoardView | None], right: list[BoardView | None],
 
 def rough() -> list[LensStart]:
     """Lenses as a first guess has them, to be found from the same views."""
-    lens = np.array([530.0, 530.0, 319.5, 239.5, -0.25, 0.0, 0.0, 0.0, 0.0])
+    lens = full_lens([530.0, 530.0, 319.5, 239.5, -0.25])
     return [LensStart(lens.copy(), SIZE, None, "views") for _ in range(2)]

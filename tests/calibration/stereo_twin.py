@@ -11,21 +11,21 @@ from rhot_app.calibration.board.boards import Board, Chessboard
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.lens.fit import LensStart
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.camera import CameraModel, full_lens, intrinsics_row
 from rhot_app.geometry.transforms import exp_so3, inverse, rigid
 
 Array = NDArray[np.float64]
 
 SIZE = (640, 480)
-LENSES = np.array([[535.0, 536.0, 342.0, 235.0, -0.27, 0.08, 0.0007, -0.0003, 0.0],
-                   [540.0, 539.0, 327.0, 249.0, -0.28, 0.10, 0.0003, 0.0001, 0.0]])
+LENSES = np.array([full_lens([535.0, 536.0, 342.0, 235.0, -0.27, 0.08, 0.0007, -0.0003]),
+                   full_lens([540.0, 539.0, 327.0, 249.0, -0.28, 0.10, 0.0003, 0.0001])])
 RIGHT_FROM_LEFT = rigid(exp_so3([0.0067, 0.0045, -0.0035]), [-0.0998, 0.0011, 0.0001])
 BOARD = Chessboard(9, 6, 0.030)
 
 
 @dataclass(frozen=True)
 class Twin:
-    """The truth: `lenses` (C, 9), `camera_from_world` (C, 4, 4), one `world_from_board` (S, 4, 4) per shot."""
+    """The truth: `lenses` (C, 12), `camera_from_world` (C, 4, 4), one `world_from_board` (S, 4, 4) per shot."""
 
     names: tuple[str, ...]
     board: Board
@@ -52,7 +52,8 @@ class Twin:
         world = points @ world_from_board[:3, :3].T + world_from_board[:3, 3]
         camera_from_world = self.camera_from_world[camera]
         facing = (camera_from_world @ world_from_board)[:3, 2] @ (camera_from_world @ world_from_board)[:3, 3]
-        model = CameraModel(*SIZE, self.lenses[camera], inverse(camera_from_world), camera_from_world)
+        model = CameraModel(*SIZE, intrinsics_row(self.lenses[camera]), inverse(camera_from_world),
+                            camera_from_world)
         pixels = model.project(world)
         inside = (pixels >= 0.0) & (pixels <= np.array(SIZE) - 1.0)
         if facing <= 0.0 or not inside.all():

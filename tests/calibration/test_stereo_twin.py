@@ -18,7 +18,7 @@ from rhot_app.calibration.stereo.points import locate
 from rhot_app.calibration.stereo.report import StereoFigures, StereoReport
 from rhot_app.calibration.stereo.ruler import RulerReading, read_ruler
 from rhot_app.errors import CalibrationError
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.camera import CameraModel, full_lens, intrinsics_row
 from rhot_app.geometry.transforms import exp_so3, inverse, rigid
 
 
@@ -29,7 +29,7 @@ def figures(report: StereoReport) -> StereoFigures:
 
 def about(twin: Twin, origin: str = "views") -> list[LensStart]:
     """Lenses some percent off, to be found."""
-    scale = np.array([1.02, 1.02, 1.02, 0.98, 0.9, 0.9, 1.0, 1.0, 1.0])
+    scale = np.repeat([1.02, 0.98, 0.9, 1.0], [3, 1, 2, 6])
     return [LensStart(lens * scale, SIZE, None, origin) for lens in twin.lenses]  # type: ignore[arg-type]
 
 
@@ -143,7 +143,7 @@ def test_stated_certainty_is_that_of_the_noise() -> None:
     stds = [figures(calibrate(twin.views(np.random.default_rng(0), noise), twin.starts())).pairs[0].translation_std_m
             for noise in (0.1, 0.2)]
     assert stds[1] == pytest.approx(2.0 * stds[0], rel=0.1)
-    unsure = [replace(lens, std=np.array([2.0, 2, 2, 2, 0, 0, 0, 0, 0])) for lens in twin.starts()]
+    unsure = [replace(lens, std=full_lens([2.0, 2, 2, 2])) for lens in twin.starts()]
     wider = figures(calibrate(twin.views(np.random.default_rng(0), 0.1), unsure))
     assert np.all(wider.pairs[0].translation_std_m > 2.0 * stds[0])
     assert wider.cameras[0].lens_std[:4] == pytest.approx([2.0, 2.0, 2.0, 2.0])
@@ -157,7 +157,7 @@ def test_the_expected_error_is_what_triangulation_shows() -> None:
         found = figures(calibrate(twin.views(np.random.default_rng(seed), 0.3), twin.starts()))
         stated.append(found.error_m[0])
         point, other = np.array([[0.05, 0.0, 0.6]]), np.array([[0.05, 0.1, 0.6]])
-        models = [CameraModel(*SIZE, lens, inverse(pose), pose)
+        models = [CameraModel(*SIZE, intrinsics_row(lens), inverse(pose), pose)
                   for lens, pose in zip(twin.lenses, twin.camera_from_world, strict=True)]
         ends = np.stack([np.vstack([model.project(point), model.project(other)]) for model in models])
         measured = read_ruler(RulerReading(0.1, ends), found.state)

@@ -13,7 +13,7 @@ import distributed
 import pytest
 
 from rhot_app.__main__ import main
-from rhot_app.export.batch import BatchJob, run_batch
+from rhot_app.export.batch import MANIFEST, BatchJob, run_batch
 from rhot_app.export.export import export_log
 from rhot_app.export.plan import ExportOptions
 
@@ -98,6 +98,22 @@ def test_mistakes_are_sentences(more: tuple[str, ...], words: str, folder: Path,
                                 capsys: pytest.CaptureFixture[str]) -> None:
     assert batch(folder, "a", *more) == 2
     assert words in capsys.readouterr().err and not (folder / "out").exists()
+
+
+@pytest.mark.parametrize("content", ["[]", "1", '{"format": "rhot-batch", "version": 1, "done": [1]}', "{",
+                                     '{"format": "rhot-batch", "version": 1, "done": {"a.csv": {"states": "x"}}}'])
+def test_a_list_of_another_shape_is_written_anew(content: str, folder: Path) -> None:
+    (folder / "out").mkdir()
+    (folder / "out" / MANIFEST).write_text(content)
+    assert batch(folder, "a") == 0
+    assert json.loads((folder / "out" / MANIFEST).read_text())["done"]["a.csv"]["states"] > 0
+
+
+def test_a_rig_that_is_a_pipe_fails_by_itself(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    os.mkfifo(folder / "rig.json")
+    assert batch(folder, "a", "--rig", str(folder / "rig.json")) == 2
+    said = capsys.readouterr()
+    assert "only files are read" in said.out + said.err
 
 
 def test_two_logs_of_one_name_are_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

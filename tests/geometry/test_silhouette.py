@@ -44,12 +44,13 @@ def test_the_centre_of_a_sphere_is_found_behind_its_outline(centre, radius):
     world = np.array(centre)
     seen = np.array([polygon_centroid(outline(camera @ [*world, 1.0], radius * np.eye(3))) for camera in CAMERAS])
     position, covariance = np.empty(3), np.empty((3, 3))
-    used, focal, unit = np.ones(2, bool), np.full((2, 2), FOCAL), np.tile(np.eye(2), (2, 1, 1))
-    triangulate(seen, unit, CAMERAS, focal, used, position, covariance)
+    used, unit = np.ones(2, bool), np.tile(np.eye(2), (2, 1, 1))
+    by_pixel = unit / FOCAL
+    triangulate(seen, unit, CAMERAS, by_pixel, used, position, covariance)
     assert world[2] - position[2] == pytest.approx(radius**2 / world[2], rel=1e-3)
     corrected = np.empty((2, 2))
     point_rays(seen, CAMERAS, ball(radius), position, corrected)
-    triangulate(corrected, unit, CAMERAS, focal, used, position, covariance)
+    triangulate(corrected, unit, CAMERAS, by_pixel, used, position, covariance)
     assert np.abs(position - world).max() < 1e-6
 
 
@@ -58,11 +59,12 @@ def test_the_centre_of_a_flat_tilted_band_is_found_too():
     rotation, half_axes = exp_so3([0.4, 0.7, -0.3]), np.array([0.011, 0.031, 0.021])
     seen = np.array([polygon_centroid(outline(camera @ [*world, 1.0], rotation * half_axes)) for camera in CAMERAS])
     naive, position, covariance = np.empty(3), np.empty(3), np.empty((3, 3))
-    used, focal, unit = np.ones(2, bool), np.full((2, 2), FOCAL), np.tile(np.eye(2), (2, 1, 1))
-    triangulate(seen, unit, CAMERAS, focal, used, naive, covariance)
+    used, unit = np.ones(2, bool), np.tile(np.eye(2), (2, 1, 1))
+    by_pixel = unit / FOCAL
+    triangulate(seen, unit, CAMERAS, by_pixel, used, naive, covariance)
     corrected = np.empty((2, 2))
     point_rays(seen, CAMERAS, ellipsoid(rotation, half_axes), naive, corrected)
-    triangulate(corrected, unit, CAMERAS, focal, used, position, covariance)
+    triangulate(corrected, unit, CAMERAS, by_pixel, used, position, covariance)
     assert np.linalg.norm(naive - world) > 5e-4
     assert np.linalg.norm(position - world) < 1e-6
 

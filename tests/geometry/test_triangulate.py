@@ -23,15 +23,14 @@ def nominal() -> list[CameraModel]:
 
 
 def solve(cameras, pixels, covariance_px, used=None):
-    rays, covariances = np.empty((len(cameras), 2)), np.empty((len(cameras), 2, 2))
+    rays, covariances, slopes = np.empty((len(cameras), 2)), *np.empty((2, len(cameras), 2, 2))
     for c, model in enumerate(cameras):
         x, y, *jacobian = undistort_point(*pixels[c], model.intrinsics)
         j = np.array(jacobian).reshape(2, 2)
-        rays[c], covariances[c] = (x, y), j @ covariance_px[c] @ j.T
+        rays[c], slopes[c], covariances[c] = (x, y), j, j @ covariance_px[c] @ j.T
     position, covariance = np.empty(3), np.empty((3, 3))
     rms, outcome = triangulate(rays, covariances, np.array([m.camera_from_world[:3] for m in cameras]),
-                               np.array([m.intrinsics[:2] for m in cameras]),
-                               np.ones(len(cameras), bool) if used is None else used, position, covariance)
+                               slopes, np.ones(len(cameras), bool) if used is None else used, position, covariance)
     return position, covariance, rms, Outcome(outcome)
 
 

@@ -30,7 +30,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     # the app, from the bottom up
     "rhot_app.errors": ("rhot_node.files",),
     "rhot_app.diagnostics": (),
-    "rhot_app.progress": (),
+    "rhot_app.progress": ("rhot_node.errors",),
     "rhot_app.keys": ("rhot_node",),
     "rhot_app.rig_history": ("rhot_node", "rhot_app.errors", "rhot_app.project", "rhot_app.hand.anatomy"),
     "rhot_app.project": ("rhot_node", "resources", "rhot_app.errors", "rhot_app.hand.anatomy", "rhot_app.hand.skeleton",

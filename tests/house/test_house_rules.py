@@ -87,6 +87,13 @@ def test_pictures_and_videos_of_others_are_opened_in_one_place() -> None:
     assert set(found) <= allowed, f"use rhot_node/pictures.py: {', '.join(sorted(set(found) - allowed))}"
 
 
+def test_numbers_of_options_are_checked() -> None:
+    """`float` takes NaN, which no limit refuses, and `int` numbers that fit nowhere."""
+    found = [str(path.relative_to(ROOT)) for path in sources("rhot_app") if "add_argument" in path.read_text()
+             and re.search(r"type=(float|int)[,)]", path.read_text())]
+    assert not found, f"use finite and whole of rhot_app/errors.py: {', '.join(found)}"
+
+
 def test_what_is_left_for_later_has_an_owner() -> None:
     found = [f"{path.relative_to(ROOT)}: {match.group()}" for path, text in tracked_text(".py")
              for match in UNOWNED.finditer(text)]

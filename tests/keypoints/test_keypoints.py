@@ -84,7 +84,7 @@ def test_an_upright_region_turns_with_the_points(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("changes", "says"), [
-    ({"network__file": '"other.onnx"'}, "other.onnx: the network of tiny.toml is not there"),
+    ({"network__file": '"other.onnx"'}, "other.onnx: the network of tiny.toml cannot be read"),
     ({"network__sha256": f'"{"0" * 64}"'}, "is not the network that tiny.toml describes. Its SHA-256 is"),
     ({"points__count": "20"}, "has 21 landmarks, but the network of tiny.toml finds 20 points"),
     ({"points__numbers": "2"}, "gives 63 numbers; tiny.toml expects 21 points of 2"),

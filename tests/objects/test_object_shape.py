@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import builtins
+import os
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from patience import quickest
 from shapes_oracle import box_distance, box_mesh, star, surface_distance, winding_number
 
 from rhot_app.errors import RigError
@@ -111,6 +113,36 @@ def test_files_are_read_in_their_unit(tmp_path, suffix):
     assert load_mesh(path, "m").size_m[2] == pytest.approx(0.1)
     with pytest.raises(RigError, match="Give the unit m"):
         load_mesh(path, "mm")
+
+
+def test_a_fine_mesh_is_searched_in_groups(monkeypatch):
+    """Sixteen times the triangles take four times as long, not sixteen, and there is a most."""
+    points, times = np.random.default_rng(3).normal(0.0, 0.06, (500, 3)), []
+    for subdivisions in (3, 5):
+        sphere = trimesh.creation.icosphere(subdivisions=subdivisions, radius=0.05)
+        mesh = Mesh(np.asarray(sphere.vertices), np.asarray(sphere.faces))
+        mesh.signed_distance(points[:1])
+        times.append(quickest(lambda mesh=mesh: mesh.signed_distance(points)))
+    assert times[1] < 9.0 * times[0]
+    monkeypatch.setattr("rhot_app.objects.shape.FACES_MAX", 11)
+    with pytest.raises(RigError, match="12 faces; at most 11"):
+        Mesh(*box_mesh((0.1, 0.1, 0.1)))
+
+
+def test_only_what_a_gltf_file_needs_is_read_beside_it(tmp_path):
+    """A material of an OBJ file is not opened, and a glTF file names files of its own folder only."""
+    os.mkfifo(tmp_path / "box.mtl")
+    box = trimesh.Trimesh(*box_mesh((60.0, 40.0, 100.0)))
+    (tmp_path / "box.obj").write_text("mtllib box.mtl\nusemtl a\n" + box.export(file_type="obj"))
+    assert len(load_mesh(tmp_path / "box.obj", "mm").faces) == 12
+    for name, data in box.export(file_type="gltf").items():
+        (tmp_path / name).write_bytes(data)
+    assert len(load_mesh(tmp_path / "model.gltf", "mm").faces) == 12
+    text = (tmp_path / "model.gltf").read_text()
+    for other in ("../gltf_buffer_0.bin", "box.mtl"):
+        (tmp_path / "other.gltf").write_text(text.replace("gltf_buffer_0.bin", other))
+        with pytest.raises(RigError, match=r"other\.gltf"):
+            load_mesh(tmp_path / "other.gltf", "mm")
 
 
 def test_wrong_files_end_with_a_sentence(tmp_path, monkeypatch):

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.camera import CameraModel, intrinsics_row
 from rhot_app.geometry.transforms import inverse
 from rhot_app.objects.motion import CameraArrays
 from rhot_app.objects.object_file import cube
@@ -40,8 +40,8 @@ def load_camera(angle: int) -> CameraModel:
         return np.array([float(value) for value in part.replace("- ", "").split()])
 
     matrix, transform = numbers("camera_matrix").reshape(3, 3), numbers("tf_world_to_camera").reshape(4, 4)
-    intrinsics = np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *numbers("distortion_coefficients")])
-    return CameraModel(540, 540, intrinsics, inverse(transform), transform)
+    lens = [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *numbers("distortion_coefficients")]
+    return CameraModel(540, 540, intrinsics_row(lens), inverse(transform), transform)
 
 
 def quadrilateral(path: Path) -> np.ndarray:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.camera import CameraModel, intrinsics_row
 from rhot_app.hand.model import neutral_pose
 from rhot_app.simulator.render.body import PALM_GROUP, SKIN
 from rhot_app.simulator.render.camera_controls import Controls, Lamp
@@ -20,7 +20,7 @@ from rhot_app.simulator.scene.rigid_target import RigidTarget
 Array = NDArray[np.float64]
 
 FOCAL = 530.5
-CAMERA = CameraModel(640, 480, np.array([FOCAL, FOCAL, 319.5, 239.5, -0.05, 0.0, 0.0, 0.0, 0.0]), np.eye(4), np.eye(4))
+CAMERA = CameraModel(640, 480, intrinsics_row([FOCAL, FOCAL, 319.5, 239.5, -0.05]), np.eye(4), np.eye(4))
 RELAXED = neutral_pose().angles
 NEUTRAL, STEADY = Controls(), Lamp()
 STILL = Shutter(0.004, 48e-6)
@@ -83,7 +83,7 @@ def ball_image(centre: Array, radius: float) -> tuple[Array, float]:
     around = np.cos(angles) * side + np.sin(angles) * np.cross(axis, side)
     half = np.arcsin(radius / distance)
     rim = np.cos(half) * axis + np.sin(half) * around
-    outline, _ = cv2.projectPoints(rim, np.zeros(3), np.zeros(3), CAMERA.matrix, CAMERA.intrinsics[4:9])
+    outline, _ = cv2.projectPoints(rim, np.zeros(3), np.zeros(3), CAMERA.matrix, CAMERA.intrinsics[4:12])
     x, y = outline.reshape(-1, 2).T
     cross = x * np.roll(y, -1) - np.roll(x, -1) * y
     area = 0.5 * cross.sum()

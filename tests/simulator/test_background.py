@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from rhot_app.errors import SimulatorError
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.camera import CameraModel, intrinsics_row
 from rhot_app.geometry.transforms import rigid
 from rhot_app.simulator.scene.background import BACKGROUNDS, BEHIND_HAND_M, background_image
 
 BASELINE_M, FOCAL = 0.075, 132.6
-PINHOLE = CameraModel(160, 120, np.array([FOCAL, FOCAL, 79.5, 59.5, 0.0, 0.0, 0.0, 0.0, 0.0]), np.eye(4), np.eye(4))
+PINHOLE = CameraModel(160, 120, intrinsics_row([FOCAL, FOCAL, 79.5, 59.5]), np.eye(4), np.eye(4))
 
 
 @pytest.mark.parametrize("name", BACKGROUNDS)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from simulator_solids import NEUTRAL, OPTICS, STILL, Gliding, balls
 
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.camera import CameraModel, intrinsics_row
 from rhot_app.simulator.render.camera_controls import Lamp, flicker_gain, lamp_gains, level_gain
 from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.render import Exposure, FrameRenderer
@@ -16,7 +16,7 @@ from rhot_app.simulator.render.solids_painter import SolidsPainter
 from rhot_node.detect.image import YuvImage, from_i420
 
 WIDTH, HEIGHT = 96, 64
-CAMERA = CameraModel(WIDTH, HEIGHT, np.array([530.0, 530.0, 47.5, 31.5, 0, 0, 0, 0, 0]), np.eye(4), np.eye(4))
+CAMERA = CameraModel(WIDTH, HEIGHT, intrinsics_row([530.0, 530.0, 47.5, 31.5]), np.eye(4), np.eye(4))
 
 
 def picture(lamp: Lamp, shutter: Shutter = STILL, nominal_s: float = STILL.exposure_s) -> YuvImage:

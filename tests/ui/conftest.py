@@ -43,7 +43,7 @@ class Bench(Person):
         settings.scheme = scheme
         self._passed_s = 0.0
         self.backend.engine.clock = self.clock
-        self.controller = Controller(self.backend, self.backend.client, clock=self.clock)
+        self.controller = Controller(self.backend, clock=self.clock)
         self.window = MainWindow(self.controller, settings, make_solver)
         if QApplication.palette().color(QPalette.ColorRole.Window).name() != scheme_named(scheme).window:
             self.window.appearance.set_scheme(scheme)

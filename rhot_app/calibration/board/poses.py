@@ -18,7 +18,7 @@ from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.bundle.adjustment import Bundle, adjust
 from rhot_app.calibration.bundle.model import POINT, BoardFreedom, LensFreedom, Observations
 from rhot_app.estimation.quantiles import f_tail
-from rhot_app.geometry.camera import undistort_points
+from rhot_app.geometry.camera import lens_rays
 from rhot_app.geometry.transforms import apply, exp_so3, rigid
 from rhot_app.progress import Progress, silent
 
@@ -72,11 +72,8 @@ class PosedView:
 
 
 def pose_view(view: BoardView, board: Board, lens: Array) -> PosedView | None:
-    """All poses of the board that explain a view; None when the lens cannot see where the corners are.
-
-    `lens` (9,): fx, fy, cx, cy, k1, k2, p1, p2, k3.
-    """
-    rays = undistort_points(np.ascontiguousarray(view.pixels), lens)
+    """All poses of the board that explain a view; None when the lens (12,) cannot see where the corners are."""
+    rays = lens_rays(view.pixels, lens)
     seen = np.isfinite(rays).all(axis=1)
     if np.count_nonzero(seen) < 4:
         return None

@@ -93,6 +93,12 @@ def adjust(start: BundleState, seen: Observations, lenses: Sequence[LensFreedom]
                   _covariance(state, seen, layout, weights, spread))
 
 
+def misfit(bundle: Bundle, seen: Observations, noise_px: float) -> float:
+    """Twice the negative logarithm of a result's likelihood and prior, less a constant, where corners scatter by
+    `noise_px`: what a likelihood-ratio test compares."""
+    return 2.0 * _Iterate(bundle.state, seen, bundle.layout, noise_px).cost
+
+
 def _report(progress: Progress, taken: int) -> None:
     progress("adjusting cameras and boards", min(1.0, taken / _USUAL_STEPS))
 

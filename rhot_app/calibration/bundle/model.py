@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from rhot_app.geometry.camera import LENS, linearise_lenses, own_parameters
 from rhot_app.geometry.transforms import exp_so3
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-LENS = 9
-"""Parameters of a camera's lens: fx, fy, cx, cy, k1, k2, p1, p2, k3."""
 TWIST = 6
 """Parameters of a pose's change: rotation vector (rad), translation (m)."""
 POINT = 3
@@ -55,7 +54,7 @@ class Observations:
 class BundleState:
     """All that is estimated.
 
-    `lenses` (C, 9) px and OpenCV's distortion, `camera_from_world` (C, 4, 4) and `world_from_board` (S, 4, 4), one per
+    `lenses` (C, 12) px and OpenCV's distortion, `camera_from_world` (C, 4, 4) and `world_from_board` (S, 4, 4), one per
     shot, m; `board_errors` (N, 3) m, how far each of the board's corners is from where it should be, None where the
     board is taken as drawn.
     """
@@ -69,7 +68,7 @@ class BundleState:
 @dataclass(frozen=True, slots=True)
 class Linearised:
     """Residuals seen minus expected (M, 2) px, and the derivatives of what is expected: by the camera's pose (M, 2, 6),
-    by the board's pose (M, 2, 6), by the lens (M, 2, 9) and by the corner's place on the board (M, 2, 3)."""
+    by the board's pose (M, 2, 6), by the lens (M, 2, 12) and by the corner's place on the board (M, 2, 3)."""
 
     residuals: Array
     by_camera: Array
@@ -80,24 +79,25 @@ class Linearised:
 
 def residuals(state: BundleState, seen: Observations) -> Array:
     """Seen minus expected (M, 2) px; NaN for a corner at or behind its camera's plane."""
-    return seen.pixels - _expected(_local(state, seen)[1], state.lenses[seen.camera])
+    local = _local(state, seen)[1]
+    ahead = np.where(local[:, 2] > 0.0, local[:, 2], np.nan)
+    return np.asarray(seen.pixels - linearise_lenses(local[:, :2] / ahead[:, None], state.lenses[seen.camera])[0])
 
 
 def linearise(state: BundleState, seen: Observations) -> Linearised:
     """Residuals and derivatives at `state`."""
     turned, local = _local(state, seen)
-    lens = state.lenses[seen.camera]
-    depth = local[:, 2]
-    x, y = local[:, 0] / depth, local[:, 1] / depth
-    by_lens, by_ray = _lens_derivatives(x, y, lens)
+    depth = np.where(local[:, 2] > 0.0, local[:, 2], np.nan)
+    rays = local[:, :2] / depth[:, None]
+    pixels, by_ray, by_lens = linearise_lenses(rays, state.lenses[seen.camera])
     by_local = np.empty((len(seen), 2, 3))
     by_local[:, :, :2] = by_ray / depth[:, None, None]
-    by_local[:, :, 2] = -(by_ray[:, :, 0] * (x / depth)[:, None] + by_ray[:, :, 1] * (y / depth)[:, None])
+    by_local[:, :, 2] = -np.einsum("mij,mj->mi", by_local[:, :, :2], rays)
     camera = state.camera_from_world[seen.camera]
     world_rotated = local - camera[:, :3, 3]
     by_world = by_local @ camera[:, :3, :3]
     return Linearised(
-        residuals=seen.pixels - _expected(local, lens),
+        residuals=seen.pixels - pixels,
         by_camera=np.concatenate([-_times_skew(by_local, world_rotated), by_local], axis=2),
         by_board=np.concatenate([-_times_skew(by_world, turned), by_world], axis=2),
         by_lens=by_lens,
@@ -114,44 +114,6 @@ def _local(state: BundleState, seen: Observations) -> tuple[Array, Array]:
     return turned, np.einsum("mij,mj->mi", camera[:, :3, :3], turned + board[:, :3, 3]) + camera[:, :3, 3]
 
 
-def _expected(local: Array, lens: Array) -> Array:
-    depth = np.where(local[:, 2] > 0.0, local[:, 2], np.nan)
-    x, y = local[:, 0] / depth, local[:, 1] / depth
-    xd, yd = _distorted(x, y, lens)
-    return np.stack([lens[:, 0] * xd + lens[:, 2], lens[:, 1] * yd + lens[:, 3]], axis=1)
-
-
-def _distorted(x: Array, y: Array, lens: Array) -> tuple[Array, Array]:
-    k1, k2, p1, p2, k3 = lens[:, 4:].T
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    return (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y)
-
-
-def _lens_derivatives(x: Array, y: Array, lens: Array) -> tuple[Array, Array]:
-    """Derivatives of the pixel by the lens (M, 2, 9) and by the normalised coordinates (M, 2, 2)."""
-    fx, fy = lens[:, 0], lens[:, 1]
-    k1, k2, p1, p2, k3 = lens[:, 4:].T
-    xd, yd = _distorted(x, y, lens)
-    r2 = x * x + y * y
-    by_lens = np.zeros((len(x), 2, LENS))
-    by_lens[:, 0, 0], by_lens[:, 1, 1] = xd, yd
-    by_lens[:, 0, 2] = by_lens[:, 1, 3] = 1.0
-    for column, power in ((4, r2), (5, r2 * r2), (8, r2 * r2 * r2)):
-        by_lens[:, 0, column], by_lens[:, 1, column] = fx * x * power, fy * y * power
-    by_lens[:, 0, 6], by_lens[:, 1, 6] = fx * 2.0 * x * y, fy * (r2 + 2.0 * y * y)
-    by_lens[:, 0, 7], by_lens[:, 1, 7] = fx * (r2 + 2.0 * x * x), fy * 2.0 * x * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))  # d radial / dx = slope * x
-    cross = slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y
-    by_ray = np.empty((len(x), 2, 2))
-    by_ray[:, 0, 0] = fx * (radial + slope * x * x + 2.0 * p1 * y + 6.0 * p2 * x)
-    by_ray[:, 0, 1], by_ray[:, 1, 0] = fx * cross, fy * cross
-    by_ray[:, 1, 1] = fy * (radial + slope * y * y + 6.0 * p1 * y + 2.0 * p2 * x)
-    return by_lens, by_ray
-
-
 def _times_skew(rows: Array, vectors: Array) -> Array:
     """rows (M, 2, 3) times the cross-product matrix of each vector (M, 3): row x vector, by the triple product."""
     return np.cross(rows, vectors[:, None, :])
@@ -163,9 +125,9 @@ def _times_skew(rows: Array, vectors: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class LensFreedom:
-    """How one camera's lens may change: by `basis` (9, K) times K unknowns; K = 0 keeps it.
+    """How one camera's lens may change: by `basis` (12, K) times K unknowns; K = 0 keeps it.
 
-    `prior_mean` and `prior_std` (9,): what is known beforehand; an infinite std says nothing.
+    `prior_mean` and `prior_std` (12,): what is known beforehand; an infinite std says nothing.
     """
 
     basis: Array
@@ -178,11 +140,12 @@ class LensFreedom:
         return cls(np.zeros((LENS, 0)), np.zeros(LENS), np.full(LENS, np.inf))
 
     @classmethod
-    def free(cls, parameters: Sequence[bool], mean: Array, std: Array | None = None, *,
+    def free(cls, mean: Array, std: Array | None = None, *, only: NDArray[np.bool_] | None = None,
              square_pixels: bool = False) -> LensFreedom:
-        """`parameters` (9,) says which are free; with `square_pixels` fx and fy change as one."""
-        basis = np.eye(LENS)[:, list(parameters)]
-        if square_pixels and parameters[0] and parameters[1]:
+        """Everything that a lens of the kind of `mean` has, or `only` (12,) these parameters; with `square_pixels` fx
+        and fy change as one."""
+        basis = np.eye(LENS)[:, own_parameters(mean) if only is None else only]
+        if square_pixels:
             basis = np.column_stack([basis[:, 0] + basis[:, 1], basis[:, 2:]])
         return cls(basis, mean, np.full(LENS, np.inf) if std is None else std)
 

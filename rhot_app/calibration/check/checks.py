@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.check.camera_calibration import calibration_finding
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.camera import CameraModel, is_wide, lens_parameters
 from rhot_app.geometry.transforms import inverse
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.places import ROLES
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 WORKING_DISTANCES_M = (0.4, 0.6, 1.0)
 
-_USUAL_VIEW_DEG = (25.0, 120.0)  # horizontal field of view: a tele lens to a wide one
+_USUAL_VIEW_DEG = (25.0, 120.0)  # horizontal field of view: a tele lens to the widest of five coefficients
 _POSSIBLE_VIEW_DEG = (8.0, 170.0)
 _USUAL_OFFSET = 0.15  # of the picture's side, principal point from the middle
 _USUAL_ASPECT = 0.05  # fx against fy: pixels are square
@@ -59,10 +59,9 @@ class PairGeometry:
 
 def lens_figures(node: RigNode) -> LensFigures:
     """Fields of view, and how much of the picture has a direction."""
-    lens = node.intrinsics
-    usable = np.isfinite(_model(node).undistort(_grid(node))).all(axis=1)
-    return LensFigures(node.name, (2.0 * float(np.arctan(0.5 * lens.width / lens.fx)),
-                                   2.0 * float(np.arctan(0.5 * lens.height / lens.fy))), float(np.mean(usable)))
+    model = _model(node)
+    usable = np.isfinite(model.undistort(_grid(node))).all(axis=1)
+    return LensFigures(node.name, model.field_of_view, float(np.mean(usable)))
 
 
 def pair_geometry(first: RigNode, second: RigNode) -> PairGeometry:
@@ -128,9 +127,11 @@ _STEREO = "Run the stereo calibration."
 
 def _view_finding(node: RigNode, figures: LensFigures) -> Finding | None:
     degrees = float(np.degrees(figures.view_rad[0]))
-    if _USUAL_VIEW_DEG[0] <= degrees <= _USUAL_VIEW_DEG[1]:
+    widest = (_POSSIBLE_VIEW_DEG if is_wide(lens_parameters(node.intrinsics)) else _USUAL_VIEW_DEG)[1]
+    if _USUAL_VIEW_DEG[0] <= degrees <= widest:
         return None
-    possible = _POSSIBLE_VIEW_DEG[0] <= degrees <= _POSSIBLE_VIEW_DEG[1]
+    as_pinhole = np.degrees(2.0 * np.arctan(0.5 * node.intrinsics.width / node.intrinsics.fx))
+    possible = all(_POSSIBLE_VIEW_DEG[0] <= each <= _POSSIBLE_VIEW_DEG[1] for each in (degrees, as_pinhole))
     return Finding(
         "field_of_view", Grade.FAIR if possible else Grade.POOR,
         f"{node.name.capitalize()} sees {degrees:.0f} degrees across (f {node.intrinsics.fx:.0f} px, picture "

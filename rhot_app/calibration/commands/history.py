@@ -7,6 +7,7 @@ import json
 from typing import TYPE_CHECKING
 
 from rhot_app.calibration.commands.output import add_json_argument, add_rig_argument, rig_of
+from rhot_app.errors import whole
 
 if TYPE_CHECKING:
     from rhot_app.rig_history import Version
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot history``."""
     add_rig_argument(parser)
-    parser.add_argument("--restore", type=int, metavar="N",
+    parser.add_argument("--restore", type=whole, metavar="N",
                         help="bring version N of the list back; what is there now becomes a version itself")
     add_json_argument(parser)
 

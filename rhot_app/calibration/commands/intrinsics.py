@@ -58,14 +58,13 @@ def run(args: argparse.Namespace) -> int:
 
 def fields_of(report: IntrinsicsReport) -> dict[str, Any]:
     """The JSON's fields."""
-    from rhot_app.calibration.lens.fit import PARAMETERS
     from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
 
     lens, errors = report.intrinsics, report.board_errors
     return {
         "rms_px": report.rms_px, "fx": lens.fx, "fy": lens.fy, "cx": lens.cx, "cy": lens.cy,
         "distortion": list(lens.distortion), "size": list(report.size),
-        "std": dict(zip(PARAMETERS, map(float, report.std), strict=True)),
+        "std": {name: std for name, (_, std) in report.parameters.items()},
         "disagreement": report.error_inflation,
         "undetermined": list(report.undetermined),
         "views_used": len(report.views),
@@ -83,19 +82,17 @@ def fields_of(report: IntrinsicsReport) -> dict[str, Any]:
 def lines_of(report: IntrinsicsReport) -> list[str]:
     """The figures for people."""
     from rhot_app.calibration.bundle.robust_error import what_is_reported
-    from rhot_app.calibration.lens.fit import PARAMETERS
     from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
 
     lines = [f"left out: {each.name}: {each.reason}" for each in report.dropped]
-    lines += [f"{name:<4}{value:12.4f} +- {std:.4f}" + (" px" if place < 4 else "")
-              for place, (name, value, std) in enumerate(zip(PARAMETERS, report.lens, report.std, strict=True))]
+    lines += [f"{name:<4}{value:12.4f} +- {std:.4f}" + (" px" if name[0] in "fc" else "")
+              for name, (value, std) in report.parameters.items()]
     lines.append(what_is_reported(report.error_inflation))
     cover = report.coverage
     lines.append(f"coverage, of what is needed: across {100 * cover.x:.0f} %, up and down {100 * cover.y:.0f} %, "
                  f"nearness {100 * cover.size:.0f} %, tilt {100 * cover.skew:.0f} %; corners in "
                  f"{100 * cover.share:.0f} % of the picture (55 % and more are good)")
-    lines.append(f"by the lens alone, a point {WORKING_DISTANCE_M:g} m away is {1e3 * report.errors.typical_m:.2f} mm "
-                 f"off (SD), in the picture's corners, where few views reach, {1e3 * report.errors.worst_m:.2f} mm")
+    lines.append(f"error of a point {WORKING_DISTANCE_M:g} m away by the lens alone (SD): {report.errors}")
     worst = sorted(report.views, key=lambda view: -view.rms_px)[:3]
     lines.append("worst views: " + ", ".join(f"{view.source} {view.rms_px:.2f} px" for view in worst))
     return lines

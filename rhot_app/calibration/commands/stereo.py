@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
-from rhot_app.errors import CalibrationError
+from rhot_app.errors import CalibrationError, finite
 
 if TYPE_CHECKING:
     from rhot_app.calibration.lens.fit import LensStart
@@ -117,9 +117,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     lenses.add_argument("--refine-intrinsics", action="store_true",
                         help="let given lenses change within their standard deviations")
     checks = parser.add_argument_group("a second known length, which alone can tell a wrong square size")
-    checks.add_argument("--baseline-mm", type=float, metavar="B",
+    checks.add_argument("--baseline-mm", type=finite, metavar="B",
                         help="distance of the first two cameras, measured by hand from lens to lens (75 as built)")
-    checks.add_argument("--ruler-mm", type=float, metavar="L", help="length of a ruler that the cameras saw")
+    checks.add_argument("--ruler-mm", type=finite, metavar="L", help="length of a ruler that the cameras saw")
     checks.add_argument("--ruler", action="append", default=[], metavar="NAME=x,y,x,y",
                         help="its two ends in a camera's picture, px from the upper left; for two cameras")
     rig = parser.add_argument_group("rig")
@@ -205,9 +205,6 @@ def _base_rig(args: argparse.Namespace) -> Rig:
 
 # -- printed report ----------------------------------------------------------------------------------------------------
 
-LENS_NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-
-
 def fields_of(report: StereoReport, frame: WorldFrame | None) -> dict[str, Any]:
     """The JSON's fields; those of the first pair stand at the top. None where nothing was solved."""
     from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M
@@ -276,12 +273,14 @@ def lines_of(report: StereoReport, frame: WorldFrame | None) -> list[str]:
 
 
 def _camera(report: StereoReport, index: int) -> dict[str, Any]:
+    from rhot_app.geometry.camera import PARAMETERS, own_parameters, rig_intrinsics
+
     assert report.figures is not None
     camera = report.figures.cameras[index]
-    values = [float(value) for value in camera.lens]
-    return {"name": camera.name, **dict(zip(LENS_NAMES[:4], values[:4], strict=True)), "distortion": values[4:],
-            "size": list(camera.size), "rms_px": camera.rms_px,
-            "std": dict(zip(LENS_NAMES, [float(std) for std in camera.lens_std], strict=True))}
+    lens, own = rig_intrinsics(camera.size, camera.lens), own_parameters(camera.lens)
+    std = {name: float(std) for name, std, has in zip(PARAMETERS, camera.lens_std, own, strict=True) if has}
+    return {"name": camera.name, "fx": lens.fx, "fy": lens.fy, "cx": lens.cx, "cy": lens.cy,
+            "distortion": list(lens.distortion), "size": list(camera.size), "rms_px": camera.rms_px, "std": std}
 
 
 def _pair(pair: PairFigures) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from rhot_app.errors import CalibrationError
 from rhot_node.errors import printable
-from rhot_node.files import read_input
+from rhot_node.files import read_table
 
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
@@ -116,7 +116,7 @@ def read_depth_table(path: Path) -> DepthTable:
 
 def _text(path: Path) -> str:
     try:
-        data = read_input(path)
+        data = read_table(path)
     except OSError as exc:
         raise CalibrationError(f"{path}: the table cannot be read ({exc.strerror}).") from exc
     try:

@@ -52,14 +52,13 @@ OFF = (math.inf, 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Footage:
-    """What the filters work on. `times_s` (T,); `pixels` (T, C, M, 2), NaN where not to be used; `intrinsics` (C, 9),
-    `cameras` (C, 3, 4) camera_from_world m, `focal` (C, 2) px."""
+    """What the filters work on. `times_s` (T,); `pixels` (T, C, M, 2), NaN where not to be used; `intrinsics` (C, 13),
+    `cameras` (C, 3, 4) camera_from_world m."""
 
     times_s: Array
     pixels: Array
     intrinsics: Array
     cameras: Array
-    focal: Array
 
     @property
     def markers(self) -> int:
@@ -72,15 +71,14 @@ def make_footage(instants: InstantTable, rig: Rig) -> Footage:
     pixels = np.where(instants.measured[:, None, :, None], instants.pixels, np.nan)
     models = [CameraModel.from_rig(lens, pose) for lens, pose in _lenses(rig)]
     return Footage(instants.times_s, np.ascontiguousarray(pixels), np.array([model.intrinsics for model in models]),
-                   np.array([model.camera_from_world[:3] for model in models]),
-                   np.array([model.intrinsics[:2] for model in models]))
+                   np.array([model.camera_from_world[:3] for model in models]))
 
 
 def simulate(footage: Footage, pixel: Array, position: Array) -> tuple[Array, Array]:
     """Filtered pixels (T, C, M, 2) and positions (T, M, 3) with parameters (M, 3) of both filters."""
     cameras, markers = footage.pixels.shape[1:3]
     pixels, positions = np.empty_like(footage.pixels), np.empty((len(footage.times_s), markers, 3))
-    _run(footage.times_s, footage.pixels, footage.intrinsics, footage.cameras, footage.focal,
+    _run(footage.times_s, footage.pixels, footage.intrinsics, footage.cameras,
          np.tile(np.repeat(pixel, 2, axis=0), (cameras, 1)), np.repeat(position, 3, axis=0), one_euro.RESET_GAP_S,
          pixels, positions)
     return pixels, positions
@@ -99,23 +97,23 @@ def _lenses(rig: Rig) -> list[tuple[Intrinsics, CameraPose]]:
 
 
 @njit(cache=True)
-def _run(times: Array, seen: Array, intrinsics: Array, cameras: Array, focal: Array, pixel_parameters: Array,
+def _run(times: Array, seen: Array, intrinsics: Array, cameras: Array, pixel_parameters: Array,
          position_parameters: Array, gap_s: float, pixels: Array, positions: Array) -> None:
     count, markers = seen.shape[1], seen.shape[2]
     pixel_state = np.full((2 * count * markers, 3), math.nan)
     position_state = np.full((3 * markers, 3), math.nan)
-    rays, spread, used = np.empty((count, 2)), np.zeros((count, 2, 2)), np.empty(count, np.bool_)
-    covariance = np.empty((3, 3))
-    for c in range(count):
-        spread[c, 0, 0], spread[c, 1, 1] = 1.0 / focal[c, 0] ** 2, 1.0 / focal[c, 1] ** 2
+    rays, used, covariance = np.empty((count, 2)), np.empty(count, np.bool_), np.empty((3, 3))
+    by_pixel, spread = np.empty((count, 2, 2)), np.empty((count, 2, 2))
     for t in range(len(times)):
         one_euro.step(times[t], seen[t].reshape(-1), pixel_parameters, pixel_state, gap_s, pixels[t].reshape(-1))
         for m in range(markers):
             for c in range(count):
-                x, y, _, _, _, _ = undistort_point(pixels[t, c, m, 0], pixels[t, c, m, 1], intrinsics[c])
+                x, y, xu, xv, yu, yv = undistort_point(pixels[t, c, m, 0], pixels[t, c, m, 1], intrinsics[c])
                 rays[c, 0], rays[c, 1] = x, y
+                by_pixel[c, 0, 0], by_pixel[c, 0, 1], by_pixel[c, 1, 0], by_pixel[c, 1, 1] = xu, xv, yu, yv
+                spread[c] = by_pixel[c] @ by_pixel[c].T
                 used[c] = math.isfinite(x) and math.isfinite(y)
-            triangulate(rays, spread, cameras, focal, used, positions[t, m], covariance)
+            triangulate(rays, spread, cameras, by_pixel, used, positions[t, m], covariance)
         flat = positions[t].reshape(-1)
         one_euro.step(times[t], flat, position_parameters, position_state, gap_s, flat)
 

@@ -1,7 +1,8 @@
 """The fit of one camera's lens to its views of a board: without the views that do not fit, and with the board's own
 errors.
 
-All distortion coefficients are estimated; where the views do not determine one, what is known of lenses in general
+A lens is plain, with five distortion coefficients, or wide, with eight: the views decide, by a likelihood-ratio test.
+All coefficients of its kind are estimated; where the views do not determine one, what is known of lenses in general
 keeps it near zero. Leaving coefficients out when they are insignificant would bias the others: with a true k3 of 0.04
 the stated intervals of k1 and k2 then hold one time in two.
 """
@@ -19,45 +20,50 @@ from numpy.typing import NDArray
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.poses import BoardErrors, find_board_errors, pose_view
-from rhot_app.calibration.bundle.adjustment import Bundle, adjust
-from rhot_app.calibration.bundle.model import LENS, BundleState, LensFreedom, Observations
+from rhot_app.calibration.bundle.adjustment import Bundle, adjust, misfit
+from rhot_app.calibration.bundle.model import BundleState, LensFreedom, Observations
 from rhot_app.calibration.bundle.robust_error import MOST_DROPPED, error_inflation, misfit_limit
+from rhot_app.calibration.lens.misfit import residual_field, wider_than_model
+from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
+from rhot_app.estimation.quantiles import chi_squared_isf
+from rhot_app.geometry.camera import LENS, PARAMETERS, PLAIN, TANGENTIAL, is_wide
 from rhot_app.progress import Progress, silent, within
 
 # -- what is known of a lens beforehand --------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
-K3 = 8  # its place among the lens parameters
-
-
 @dataclass(frozen=True, slots=True)
 class LensStart:
-    """One camera's lens: `lens` (9,) fx, fy, cx, cy, k1, k2, p1, p2, k3 for pictures of `size` (width, height).
+    """One camera's lens: `lens` (12,), see `geometry.camera`, for pictures of `size` (width, height).
 
-    `std` (9,) the standard deviations, when known. `origin`: "given" by a file or the rig, or found from the same
-    "views" that now put the cameras together.
+    `std` (12,) the standard deviations, when known. `origin`: "given" by a file or the rig, or found from the same
+    "views" that now put the cameras together. `trouble`: why those views leave no usable lens.
     """
 
     lens: Array
     size: tuple[int, int]
     std: Array | None = None
     origin: Literal["given", "views"] = "given"
+    trouble: Finding | None = None
 
     def freedom(self, *, refine: bool) -> LensFreedom:
         """How the bundle adjustment may change it.
 
         Found from the same views: all of it, for these corners say it all. Given: not at all, or with `refine` within
-        its standard deviations; a k3 of zero then stays zero, because that lens was described without it.
+        its standard deviations; coefficients from k3 on that are zero then stay zero, because that lens was described
+        without them.
         """
         if self.origin == "views":
-            return LensFreedom.free([True] * len(self.lens), self.lens, loose_prior(self.lens, self.size))
+            if is_wide(self.lens):
+                return likely_lens(self.lens, wide=True, size=self.size)
+            return LensFreedom.free(self.lens, loose_prior(self.lens, self.size))
         if not refine:
             return LensFreedom.fixed()
-        free = np.ones(len(self.lens), bool)
-        free[K3] = self.lens[K3] != 0.0
-        return LensFreedom.free(list(free), self.lens, None if self.std is None else np.where(free, self.std, np.inf))
+        free = (self.lens != 0.0) | (np.arange(LENS) < PLAIN - 1)
+        std = None if self.std is None else np.where(free, self.std, np.inf)
+        return LensFreedom.free(self.lens, std, only=free)
 
     def mirrored(self) -> LensStart:
         """The lens of the same camera when its pictures are flipped left to right."""
@@ -67,25 +73,38 @@ class LensStart:
         return replace(self, lens=flipped)
 
 
-def loose_prior(lens: Array, size: tuple[int, int]) -> Array:
-    """Standard deviations (9,) of what lenses are: they keep a fit from running away, and pull at nothing that pictures
-    determine.
+WIDE: Array = np.array([19250.0, 5943.0, 0.0, 0.0, 256.0, 24255.0, 11025.0, 1225.0]) / 15015.0
+"""Distortion of an equidistant lens: Pade's approximant of the arctangent."""
 
-    Radial coefficients are limited by what they do in the picture's corner, each power less than the one before.
+
+def likely_lens(lens: Array, *, wide: bool, size: tuple[int, int], square_pixels: bool = False) -> LensFreedom:
+    """Everything free of a lens of that kind: about the focal length and centre of `lens` (12,), without distortion or,
+    if it is wide, equidistant."""
+    mean = np.concatenate([lens[:4], WIDE if wide else np.zeros(LENS - 4)])
+    return LensFreedom.free(mean, loose_prior(lens, size), square_pixels=square_pixels)
+
+
+def loose_prior(lens: Array, size: tuple[int, int]) -> Array:
+    """Standard deviations (12,) of what lenses are: they keep a fit from running away, and pull at nothing that
+    pictures determine.
+
+    Radial coefficients are limited by what they do in the picture's corner, or at 45 degrees where that is nearer, each
+    power less than the one before.
     """
     longest = float(max(size))
-    corner = (size[0] ** 2 + size[1] ** 2) / (4.0 * lens[0] * lens[1])  # squared radius, normalised
-    return np.array([longest, longest, 0.2 * longest, 0.2 * longest, 1.0 / corner, 0.3 / corner**2, 0.05, 0.05,
-                     0.05 / corner**3])
+    corner = min((size[0] ** 2 + size[1] ** 2) / (4.0 * lens[0] * lens[1]), 1.0)  # squared radius, normalised
+    radial = [1.0 / corner, 0.3 / corner**2, 0.05 / corner**3]
+    return np.array([longest, longest, 0.2 * longest, 0.2 * longest, *radial[:2], 0.05, 0.05, radial[2], *radial])
 
 
 # -- first estimate from the shared views ------------------------------------------------------------------------------
 
 FEWEST_VIEWS = 3
+_CHANCE = 1e-3  # of taking a plain lens for a wide one
 
 
 def find_lens(views: Sequence[BoardView], board: Board, name: str) -> LensStart:
-    """The lens of one camera from its views: Zhang's closed form, then a robust fit of everything.
+    """The lens of one camera from its views, plain or wide: Zhang's closed form, then a robust fit of everything.
 
     Raises CalibrationError naming the camera when the views do not determine a lens.
     """
@@ -101,12 +120,24 @@ def find_lens(views: Sequence[BoardView], board: Board, name: str) -> LensStart:
                         np.concatenate([view.object_points(board) for view, _ in usable]),
                         np.concatenate([view.pixels for view, _ in usable]))
     start = BundleState(lens[None], np.eye(4)[None], np.array([pose for _, pose in usable]))
-    free = LensFreedom.free([True] * LENS, lens, loose_prior(lens, size))
     try:
-        found = adjust(start, seen, [free]).state.lenses[0]
+        plain = adjust(start, seen, [likely_lens(lens, wide=False, size=size)])
+        found = _wide(plain, seen, size) or plain
     except CalibrationError as exc:
         raise CalibrationError(f"{name}: {exc}") from exc
-    return LensStart(found, size, None, "views")
+    lens, field = found.state.lenses[0], residual_field(seen.pixels, found.residuals, seen.shot, size)
+    return LensStart(lens, size, None, "views", wider_than_model(lens, size, field, f"the lens of {name}"))
+
+
+def _wide(plain: Bundle, seen: Observations, size: tuple[int, int]) -> Bundle | None:
+    """The fit of a wide lens, where it is better than the `plain` one by more than chance; else None.
+
+    Residuals count in units of their scatter and of the views' disagreement, so that a bent board makes no lens wide.
+    """
+    wide = adjust(plain.state, seen, [likely_lens(plain.state.lenses[0], wide=True, size=size)])
+    better = misfit(plain, seen, wide.noise_px) - misfit(wide, seen, wide.noise_px)
+    limit = chi_squared_isf(_CHANCE, LENS - PLAIN)
+    return wide if better > limit * error_inflation(wide, seen) ** 2 else None
 
 
 def _closed_form(views: Sequence[BoardView], board: Board, size: tuple[int, int]) -> Array:
@@ -117,14 +148,11 @@ def _closed_form(views: Sequence[BoardView], board: Board, size: tuple[int, int]
     longest = float(max(size))
     if not 0.3 * longest < focal < 10.0 * longest:  # views seen face on leave it open
         focal = longest
-    return np.array([focal, focal, (size[0] - 1) / 2, (size[1] - 1) / 2, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return np.array([focal, focal, (size[0] - 1) / 2, (size[1] - 1) / 2, *np.zeros(LENS - 4)])
 
 
 # -- the fit -----------------------------------------------------------------------------------------------------------
 # Views that do not fit are left out.
-
-PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-"""Names of the lens parameters, in their order."""
 
 _OPEN = 0.5  # of what is known of any lens: a standard deviation above it says that the views have added nothing
 _LOOSE = 0.05  # of the focal length: a standard deviation above it
@@ -148,21 +176,24 @@ class LensFit:
 
     @property
     def lens(self) -> Array:
-        """(9,) fx, fy, cx, cy, k1, k2, p1, p2, k3."""
+        """(12,), see `geometry.camera`."""
         return self.bundle.state.lenses[0]
 
     @property
     def covariance(self) -> Array:
-        """(9, 9) of the lens, poses and board errors marginalised; the views' disagreement is in it."""
+        """(12, 12) of the lens, poses and board errors marginalised; the views' disagreement is in it."""
         return self._by_corners * self.error_inflation**2
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Distortion coefficients that these views leave open: they stay near zero, where they most often are."""
+        """Distortion coefficients that these views leave open: they stay near zero, where they most often are.
+
+        The radial ones of a wide lens replace each other, and only together mean anything: none is named.
+        """
         std = np.sqrt(np.diag(self._by_corners))
         known = self.bundle.layout.lenses[0].prior_std
-        return tuple(name for place, name in enumerate(PARAMETERS) if place >= 4
-                     and std[place] > _OPEN * known[place])
+        asked = TANGENTIAL if is_wide(self.lens) else range(4, PLAIN)
+        return tuple(PARAMETERS[place] for place in asked if std[place] > _OPEN * known[place])
 
     @property
     def view_rms(self) -> Array:
@@ -171,7 +202,7 @@ class LensFit:
 
     @property
     def _by_corners(self) -> Array:
-        """(9, 9), the covariance by independent errors of the corners alone."""
+        """(12, 12), the covariance by independent errors of the corners alone."""
         basis = self.bundle.layout.lenses[0].basis
         at = self.bundle.layout.lens(0)
         return np.asarray(basis @ self.bundle.covariance[at, at] @ basis.T)
@@ -222,8 +253,7 @@ def _view_rms(bundle: Bundle, seen: Observations) -> Array:
 
 
 def _freedom(lens: Array, size: tuple[int, int], square_pixels: bool) -> LensFreedom:
-    mean = np.concatenate([lens[:4], np.zeros(LENS - 4)])
-    return LensFreedom.free([True] * LENS, mean, loose_prior(lens, size), square_pixels=square_pixels)
+    return likely_lens(lens, wide=is_wide(lens), size=size, square_pixels=square_pixels)
 
 
 def _observations(views: Sequence[BoardView], board: Board) -> Observations:

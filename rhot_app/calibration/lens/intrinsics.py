@@ -19,12 +19,14 @@ from rhot_app.calibration.board.poses import BoardErrors
 from rhot_app.calibration.board.shared_views import Dropped
 from rhot_app.calibration.bundle.robust_error import tilt_spread
 from rhot_app.calibration.lens.coverage import Coverage, cover
-from rhot_app.calibration.lens.fit import PARAMETERS, LensFit, LensStart, fit_lens
-from rhot_app.calibration.lens.intrinsics_checks import ExpectedErrors, Figures, blind_share, check, expected_errors
+from rhot_app.calibration.lens.fit import LensFit, LensStart, fit_lens
+from rhot_app.calibration.lens.intrinsics_checks import ExpectedErrors, Figures, check, expected_errors
+from rhot_app.calibration.lens.misfit import ResidualField, blind_share, residual_field
 from rhot_app.calibration.verdict import Finding, Verdict, judge
 from rhot_app.errors import CalibrationError
+from rhot_app.geometry.camera import PARAMETERS, lens_parameters, own_parameters, rig_intrinsics
 from rhot_app.progress import Progress, silent, within
-from rhot_app.project import Coefficient, Focal, Intrinsics, Pixel, Pixels
+from rhot_app.project import Distortion, Focal, Intrinsics, Pixel, Pixels, require_distortion
 from rhot_node.files import read_document, write_document
 
 Array = NDArray[np.float64]
@@ -48,9 +50,9 @@ class ViewFit:
 class IntrinsicsReport:
     """Everything a page or a file needs to know.
 
-    `lens` (9,): fx, fy, cx, cy, k1, k2, p1, p2, k3 for pictures of `size` (width, height), and its `covariance` (9, 9)
-    with poses and board errors marginalised. `rms_px` over all corners. `undetermined` names the coefficients that the
-    views leave open; `errors` what the uncertainty means in millimetres at the working distance.
+    `lens` (12,), see `geometry.camera`, for pictures of `size` (width, height), and its `covariance` (12, 12) with
+    poses and board errors marginalised. `rms_px` over all corners. `undetermined` names the coefficients that the views
+    leave open; `errors` what the uncertainty means in millimetres at the working distance.
     `error_inflation`: 1 where independent corner errors explain all; it is in all standard deviations.
     """
 
@@ -71,14 +73,20 @@ class IntrinsicsReport:
 
     @property
     def std(self) -> Array:
-        """(9,) standard deviations of the lens parameters."""
+        """(12,) standard deviations of the lens parameters."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
     def intrinsics(self) -> Intrinsics:
         """As a rig holds them."""
-        fx, fy, cx, cy, k1, k2, p1, p2, k3 = map(float, self.lens)
-        return Intrinsics(*self.size, fx, fy, cx, cy, (k1, k2, p1, p2, k3))
+        return rig_intrinsics(self.size, self.lens)
+
+    @property
+    def parameters(self) -> dict[str, tuple[float, float]]:
+        """Value and standard deviation of every parameter that a lens of this kind has, by name."""
+        own = own_parameters(self.lens)
+        return {name: (float(value), float(std)) for name, value, std, has
+                in zip(PARAMETERS, self.lens, self.std, own, strict=True) if has}
 
 
 def solve(views: Sequence[BoardView], board: Board, *, square_pixels: bool = False, dropped: Sequence[Dropped] = (),
@@ -104,14 +112,13 @@ def _report(fit: LensFit, views: Sequence[BoardView], board: Board, dropped: tup
     usual = float(np.median(fit.view_rms))
     dropped += tuple(Dropped(views[index].source, _why_off(views[index], rms, usual, used), "residual")
                      for index, rms in sorted(fit.dropped.items()))
-    residuals = fit.bundle.residuals
-    rms = float(np.sqrt(np.mean(np.sum(np.square(residuals), axis=1))))
-    field = residual_field(fit.seen.pixels, residuals, fit.seen.shot, size)
+    field = residual_field(fit.seen.pixels, fit.bundle.residuals, fit.seen.shot, size)
+    rms = field.rms_px
     coverage = cover(used, board)
     errors = expected_errors(fit.lens, fit.covariance, size)
     figures = Figures(
         lens=fit.lens, std=np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)), size=size, rms_px=rms,
-        views=len(used), outliers=len(fit.dropped), coverage=coverage, pattern_px=field.pattern_px,
+        views=len(used), outliers=len(fit.dropped), coverage=coverage, field=field,
         tilt_rad=tilt_spread(fit.bundle.state.world_from_board), undetermined=fit.undetermined,
         error_inflation=fit.error_inflation, blind=blind_share(fit.lens, size), errors=errors, board=board,
         board_errors=fit.board_errors, blur_px=float(np.nanmedian([view.blur_px for view in used] + [0.0])),
@@ -133,51 +140,6 @@ def _why_off(view: BoardView, rms: float, usual: float, used: Sequence[BoardView
     if rms > _MIXED_UP_PX:
         return f"{figure}: corners are mixed up, or it is another board, zoom or focus"
     return f"{figure}: the board was bent or moved, or something covers a part of it"
-
-
-# -- residual pattern over the image -----------------------------------------------------------------------------------
-
-CELLS = (6, 8)
-"""Rows and columns of the means."""
-
-_FEWEST = 4  # corners in a cell that make a mean
-
-
-@dataclass(frozen=True, slots=True)
-class ResidualField:
-    """All residuals of a fit and their means over the picture.
-
-    `places` (M, 2) px, where each corner was seen; `residuals` (M, 2) px, seen minus expected; `view` (M,) the index of
-    its view. `mean` (rows, cols, 2) px per part of the picture, NaN where too few corners are; `count` (rows, cols).
-    """
-
-    places: Array
-    residuals: Array
-    view: NDArray[np.intp]
-    mean: Array
-    count: NDArray[np.int64]
-
-    @property
-    def pattern_px(self) -> float:
-        """Rms of the means, less what the corners' own scatter leaves in them: 0 where the model explains all."""
-        known = np.isfinite(self.mean).all(axis=-1)
-        if not known.any():
-            return 0.0
-        scatter = float(np.mean(np.square(self.residuals).sum(axis=1)))
-        excess = np.square(self.mean[known]).sum(axis=-1) - scatter / self.count[known]
-        return float(np.sqrt(max(float(np.mean(excess)), 0.0)))
-
-
-def residual_field(places: Array, residuals: Array, view: NDArray[np.intp], size: tuple[int, int]) -> ResidualField:
-    """The field over a picture of `size` (width, height) px."""
-    rows, cols = CELLS
-    scale = np.array([cols / size[0], rows / size[1]])
-    col, row = np.clip(((places + 0.5) * scale).astype(int), 0, [cols - 1, rows - 1]).T
-    cell = row * cols + col
-    count = np.bincount(cell, minlength=rows * cols)
-    sums = np.stack([np.bincount(cell, residuals[:, axis], minlength=rows * cols) for axis in (0, 1)], axis=1)
-    mean = np.where(count[:, None] >= _FEWEST, sums / np.maximum(count, 1)[:, None], np.nan)
-    return ResidualField(places, residuals, view, mean.reshape(rows, cols, 2), count.reshape(rows, cols))
 
 
 # -- the file ``rhot-intrinsics`` --------------------------------------------------------------------------------------
@@ -204,14 +166,14 @@ class BoardUsed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class IntrinsicsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Pinhole with OpenCV's distortion (k1, k2, p1, p2, k3), px; (0, 0) is the centre of the top-left pixel."""
+    """Pinhole with OpenCV's distortion (`project.Intrinsics`), px; (0, 0) is the centre of the top-left pixel."""
 
     size: tuple[Pixels, Pixels]
     fx: Focal
     fy: Focal
     cx: Pixel
     cy: Pixel
-    distortion: tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    distortion: Distortion = (0.0, 0.0, 0.0, 0.0, 0.0)
     std: dict[str, NotNegative] = {}
     rms_px: NotNegative | None = None
     views: Count | None = None
@@ -224,6 +186,7 @@ class IntrinsicsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         unknown = sorted(set(self.std) - set(PARAMETERS))
         if unknown:
             raise ValueError(f"std names {unknown[0]!r}; the parameters are {', '.join(PARAMETERS)}")
+        require_distortion(self.distortion)
         if not np.isfinite([self.fx, self.fy, self.cx, self.cy, *self.distortion]).all():
             raise ValueError("a parameter is not a number")
 
@@ -235,8 +198,10 @@ class IntrinsicsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def lens(self) -> LensStart:
         """As other calibrations begin with them."""
-        std = np.array([self.std[name] for name in PARAMETERS]) if len(self.std) == len(PARAMETERS) else None
-        return LensStart(np.array([self.fx, self.fy, self.cx, self.cy, *self.distortion]), self.size, std)
+        lens = lens_parameters(self.intrinsics)
+        own = [name for name, has in zip(PARAMETERS, own_parameters(lens), strict=True) if has]
+        std = np.array([self.std.get(name, 0.0) for name in PARAMETERS]) if set(own) <= set(self.std) else None
+        return LensStart(lens, self.size, std)
 
 
 def load_intrinsics(path: Path) -> IntrinsicsFile:
@@ -258,7 +223,7 @@ def to_file(report: IntrinsicsReport) -> IntrinsicsFile:
     lens = report.intrinsics
     return IntrinsicsFile(
         report.size, lens.fx, lens.fy, lens.cx, lens.cy, lens.distortion,
-        dict(zip(PARAMETERS, map(float, report.std), strict=True)), report.rms_px, len(report.views),
+        {name: std for name, (_, std) in report.parameters.items()}, report.rms_px, len(report.views),
         _board(report.board), datetime.now(UTC).isoformat(timespec="seconds"))
 
 

@@ -12,8 +12,9 @@ from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.poses import BoardErrors
 from rhot_app.calibration.bundle.robust_error import in_words
 from rhot_app.calibration.lens.coverage import Coverage
+from rhot_app.calibration.lens.misfit import GRID, ResidualField, picture_grid, wider_than_model
 from rhot_app.calibration.verdict import Finding, Grade, told_apart
-from rhot_app.geometry.camera import undistort_points
+from rhot_app.geometry.camera import FARTHEST_DEG, lens_rays
 
 # -- uncertainty of a lens, as an error in space -----------------------------------------------------------------------
 
@@ -22,16 +23,8 @@ Array = NDArray[np.float64]
 WORKING_DISTANCE_M = 0.6
 """Where hands are tracked; errors in space are stated there."""
 
-_GRID = (12, 16)  # rows, columns of pixels at which rays are looked at
 _PERCENTILE = 95.0
 _SMALL_STEP = 1e-3  # of a standard deviation, for the derivatives
-
-
-def picture_grid(size: tuple[int, int]) -> Array:
-    """(N, 2) px, places spread evenly over a picture of `size` (width, height), its rim included."""
-    rows, cols = _GRID
-    x, y = np.meshgrid(np.linspace(0, size[0] - 1, cols), np.linspace(0, size[1] - 1, rows))
-    return np.column_stack([x.ravel(), y.ravel()])
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,53 +37,60 @@ class ExpectedErrors:
     worst_m: float
     map_m: Array
 
+    def __str__(self) -> str:
+        if not np.isfinite(self.typical_m):
+            return "not known"
+        return f"{1e3 * self.typical_m:.2f} mm, {1e3 * self.worst_m:.2f} mm in the corners"
+
 
 def expected_errors(lens: Array, covariance: Array, size: tuple[int, int],
                     distance_m: float = WORKING_DISTANCE_M) -> ExpectedErrors:
-    """What the lens's uncertainty does to points `distance_m` in front of the camera.
+    """What the lens's uncertainty does to points `distance_m` away from the camera.
 
-    `lens` (9,), `covariance` (9, 9), `size` (width, height) px. What a turn of the camera would do as well is left out:
-    a wrong principal point and a camera that looks elsewhere are one to everything that follows, because the cameras'
-    orientations are found with this lens. NaN when the lens has no ray for most pixels.
+    `lens` (12,), `covariance` (12, 12), `size` (width, height) px. What a turn of the camera would do as well is left
+    out: a wrong principal point and a camera that looks elsewhere are one to everything that follows, because the
+    cameras' orientations are found with this lens. NaN when the lens has no ray for most pixels.
     """
     pixels = picture_grid(size)
-    rays = undistort_points(pixels, lens)
+    rays = lens_rays(pixels, lens)
     change = _derivatives(pixels, lens, covariance)
     usable = np.isfinite(rays).all(axis=1) & np.isfinite(change).all(axis=(1, 2))
     variance = np.full(len(pixels), np.nan)
     if usable.mean() > 0.5:
-        turn, change = _turning(rays[usable]), change[usable].reshape(-1, len(lens))
-        remaining = change - turn @ np.linalg.lstsq(turn, change, rcond=None)[0]
-        variance[usable] = np.einsum("ni,ij,nj->n", remaining, covariance, remaining).reshape(-1, 2).sum(axis=1)
+        variance[usable] = _variances(rays[usable], change[usable], covariance)
     errors = distance_m * np.sqrt(np.maximum(variance, 0.0))
     known = errors[np.isfinite(errors)] if usable.mean() > 0.5 else np.array([np.nan])
-    return ExpectedErrors(float(np.median(known)), float(np.percentile(known, _PERCENTILE)), errors.reshape(_GRID))
+    return ExpectedErrors(float(np.median(known)), float(np.percentile(known, _PERCENTILE)), errors.reshape(GRID))
+
+
+def _variances(rays: Array, change: Array, covariance: Array) -> Array:
+    """(N,) rad^2, of the directions of `rays` (N, 2) that `change` (N, 2, 12) with the lens, but for the turn of the
+    camera that takes most off them, each in units of its own standard deviation."""
+    length = np.sqrt(1.0 + np.square(rays).sum(axis=1))
+    towards = np.column_stack([rays, np.ones(len(rays))]) / length[:, None]
+    by_ray = (np.eye(3)[:, :2] - towards[:, :, None] * towards[:, None, :2]) / length[:, None, None]
+    change = by_ray @ change
+    turn = np.cross(np.eye(3)[None], towards[:, None]).transpose(0, 2, 1)
+    certain = 1.0 / np.sqrt(np.maximum(_traces(change, covariance), 1e-24))[:, None, None]
+    best = np.linalg.lstsq((certain * turn).reshape(-1, 3), (certain * change).reshape(-1, change.shape[2]), rcond=None)
+    return _traces(change - turn @ best[0], covariance)
+
+
+def _traces(change: Array, covariance: Array) -> Array:
+    """(N,) variances, summed over the axes, of what changes by `change` (N, 3, 12) with a lens of `covariance`."""
+    return np.asarray(np.einsum("nai,ij,naj->n", change, covariance, change))
 
 
 def _derivatives(pixels: Array, lens: Array, covariance: Array) -> Array:
-    """(N, 2, 9), of the rays at fixed pixels by the lens parameters."""
-    steps = _SMALL_STEP * np.sqrt(np.maximum(np.diag(covariance), 1e-24))
-    columns = []
-    for place, step in enumerate(steps):
+    """(N, 2, 12), of the rays at fixed pixels by the lens parameters."""
+    steps = _SMALL_STEP * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    derivatives = np.zeros((*pixels.shape, len(lens)))
+    for place in np.flatnonzero(steps):
         up, down = lens.copy(), lens.copy()
-        up[place] += step
-        down[place] -= step
-        columns.append((undistort_points(pixels, up) - undistort_points(pixels, down)) / (2.0 * step))
-    return np.stack(columns, axis=2)
-
-
-def _turning(rays: Array) -> Array:
-    """(2N, 3), of the rays by small turns of the camera about its x, y and z axes."""
-    x, y = rays.T
-    by_x = np.column_stack([x * y, 1.0 + y * y])
-    by_y = np.column_stack([-1.0 - x * x, -x * y])
-    by_z = np.column_stack([y, -x])
-    return np.stack([by_x, by_y, by_z], axis=2).reshape(-1, 3)
-
-
-def blind_share(lens: Array, size: tuple[int, int]) -> float:
-    """Share of a picture's places that no ray belongs to: there the distortion has turned over."""
-    return float(np.mean(~np.isfinite(undistort_points(picture_grid(size), lens)).all(axis=1)))
+        up[place] += steps[place]
+        down[place] -= steps[place]
+        derivatives[:, :, place] = (lens_rays(pixels, up) - lens_rays(pixels, down)) / (2.0 * steps[place])
+    return derivatives
 
 
 # -- findings ----------------------------------------------------------------------------------------------------------
@@ -109,7 +109,7 @@ class Figures:
     views: int
     outliers: int
     coverage: Coverage
-    pattern_px: float
+    field: ResidualField
     tilt_rad: float
     undetermined: tuple[str, ...]
     error_inflation: float
@@ -135,6 +135,13 @@ def _grade(value: float, fair: float, poor: float) -> Grade | None:
     if not value > fair:  # NaN never passes for good: see `_certainty`
         return None
     return Grade.POOR if value > poor else Grade.FAIR
+
+
+def _model(f: Figures) -> Iterator[Finding]:
+    """First, because a lens that the model cannot describe spoils all that follows."""
+    found = wider_than_model(f.lens, f.size, f.field)
+    if found is not None:
+        yield found
 
 
 def _number_of_views(f: Figures) -> Iterator[Finding]:
@@ -168,10 +175,10 @@ def _fits(f: Figures) -> Iterator[Finding]:
                       "A board of another size, mixed-up corners, a bent board, blur, or an autofocus that moved.",
                       "Check the board's numbers of corners; glue it onto something flat; fix the focus; look at the "
                       "worst views.")
-    if f.pattern_px > max(0.1 * f.coarseness, 0.5 * f.rms_px):
-        yield Finding("pattern", Grade.FAIR, f"{f.pattern_px:.2f} px of it follow a pattern over the picture.",
-                      "The lens is not described by this model (a fisheye, a digital stabiliser, a dewarped picture).",
-                      "Switch off corrections inside the camera, or use a lens of less than 100 degrees.")
+    if f.field.pattern_px > max(0.1 * f.coarseness, 0.5 * f.rms_px):
+        yield Finding("pattern", Grade.FAIR, f"{f.field.pattern_px:.2f} px of it follow a pattern over the picture.",
+                      "The lens is not described by this model (a digital stabiliser, a dewarped picture).",
+                      "Switch off corrections inside the camera.")
 
 
 def _misfits(f: Figures) -> Iterator[Finding]:
@@ -199,8 +206,11 @@ def _certainty(f: Figures) -> Iterator[Finding]:
                       "taken as near zero, as for most lenses.", "No view reaches far enough from the middle.",
                       "Bring the board to the picture's corners.")
     typical, worst = 1e3 * f.errors.typical_m, 1e3 * f.errors.worst_m
-    grade = Grade.POOR if not np.isfinite(typical) else _grade(typical, 1.0, 5.0) or _grade(worst, 5.0, np.inf)
-    if grade:
+    grade = _grade(typical, 1.0, 5.0) or _grade(worst, 5.0, np.inf)
+    if not np.isfinite(typical):
+        yield Finding("expected_error", Grade.POOR, "The lens is known too loosely to say how far off a point at "
+                      f"{WORKING_DISTANCE_M:.1f} m may be.", "", MORE_VIEWS)
+    elif grade:
         yield Finding("expected_error", grade, f"By the lens alone a point at {WORKING_DISTANCE_M:.1f} m may be off by "
                       f"{told_apart(typical, 1.0, 1)} mm, in the picture's corners by {told_apart(worst, 5.0, 1)} mm "
                       "(SD; 1 and 5 mm are good).",
@@ -226,7 +236,9 @@ def _plausible(f: Figures) -> Iterator[Finding]:
     grade = _grade(f.blind, 0.0, 0.1)
     if grade:
         yield Finding("blind", grade, f"No ray belongs to {100 * f.blind:.0f} % of the picture: its distortion turns "
-                      "over there.", "No view reaches these parts.", "Bring the board to the picture's corners.")
+                      "over there, or it looks back.", "No view reaches these parts, or they look more than "
+                      f"{FARTHEST_DEG:.0f} degrees aside.", "Bring the board to the picture's corners; keep hands in "
+                      "the rest of the picture.")
 
 
 def _sharp(f: Figures) -> Iterator[Finding]:
@@ -255,4 +267,4 @@ def _board(f: Figures) -> Iterator[Finding]:
 
 
 CHECKS: tuple[Callable[[Figures], Iterator[Finding]], ...] = (
-    _number_of_views, _alike, _covered, _fits, _misfits, _certainty, _plausible, _sharp, _board)
+    _model, _number_of_views, _alike, _covered, _fits, _misfits, _certainty, _plausible, _sharp, _board)

@@ -25,9 +25,10 @@ from rhot_app.calibration.stereo.ruler import RulerReading, baseline_finding, re
 from rhot_app.calibration.stereo.start import Link, PlacedShot, WorldFrame, all_links, place_shot, spanning_tree
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
+from rhot_app.geometry.camera import lens_parameters, rig_intrinsics
 from rhot_app.geometry.transforms import inverse, quaternion_from_rotation, rigid, rotation_from_quaternion
 from rhot_app.progress import Progress, silent
-from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode
+from rhot_app.project import CameraCalibration, CameraPose, Rig, RigNode
 
 Array = NDArray[np.float64]
 
@@ -61,6 +62,7 @@ def calibrate(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool =
     _check_sizes(views, lenses)
     known = known or KnownLengths()
     outcome = solve(views, lenses, refine=refine, progress=progress)
+    noticed = [*noticed, *(lens.trouble for lens in lenses if lens.trouble is not None)]
     if isinstance(outcome, Finding):
         summary = f"{' and '.join(views.cameras)} cannot be put together."
         return StereoReport(views.cameras, None, tuple(dropped), summary, judge(summary, [*noticed, outcome]))
@@ -199,8 +201,7 @@ def require_nodes(rig: Rig, cameras: Sequence[str]) -> None:
 
 def lens_of(node: RigNode) -> LensStart:
     """The lens that a rig states for a node."""
-    lens = node.intrinsics
-    return LensStart(np.array([lens.fx, lens.fy, lens.cx, lens.cy, *lens.distortion]), (lens.width, lens.height))
+    return LensStart(lens_parameters(node.intrinsics), (node.intrinsics.width, node.intrinsics.height))
 
 
 def calibrated_rig(rig: Rig, figures: StereoFigures, frame: WorldFrame | None = None) -> Rig:
@@ -218,8 +219,7 @@ def calibrated_rig(rig: Rig, figures: StereoFigures, frame: WorldFrame | None = 
     for node in rig.nodes:
         if node.name in names:
             camera = figures.cameras[names.index(node.name)]
-            fx, fy, cx, cy, k1, k2, p1, p2, k3 = (float(value) for value in camera.lens)
-            lens = Intrinsics(*camera.size, fx, fy, cx, cy, (k1, k2, p1, p2, k3))
+            lens = rig_intrinsics(camera.size, camera.lens)
             nodes.append(msgspec.structs.replace(node, intrinsics=lens, pose=_pose(poses[names.index(node.name)])))
         else:
             nodes.append(msgspec.structs.replace(node, pose=_pose(new_from_old @ _matrix(node.pose))))

@@ -16,7 +16,7 @@ from rhot_app.calibration.bundle.model import BundleState
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.adjust import StereoSolution
 from rhot_app.calibration.verdict import Finding, Grade
-from rhot_app.geometry.camera import undistort_points
+from rhot_app.geometry.camera import intrinsics_row, undistort_with_slope
 from rhot_app.geometry.triangulate import triangulate
 
 Array = NDArray[np.float64]
@@ -46,14 +46,14 @@ def locate(pixels: Array, state: BundleState) -> Array:
 def locate_with_covariance(pixels: Array, state: BundleState) -> tuple[Array, Array]:
     """`locate`, and the points' covariances (N, 3, 3) m^2 for noise of 1 px per axis in every camera."""
     cameras = np.ascontiguousarray(state.camera_from_world[:, :3, :])
-    focal = np.ascontiguousarray(state.lenses[:, :2])
-    rays = np.stack([undistort_points(np.ascontiguousarray(each), lens)
-                     for each, lens in zip(pixels, state.lenses, strict=True)])
-    spread = np.array([np.diag(1.0 / each**2) for each in focal])
+    rays, by_pixel = (np.stack(each, axis=1) for each in zip(
+        *(undistort_with_slope(np.ascontiguousarray(each), intrinsics_row(lens))
+          for each, lens in zip(pixels, state.lenses, strict=True)), strict=True))
+    spread = by_pixel @ by_pixel.transpose(0, 1, 3, 2)
     points, covariances = np.full((pixels.shape[1], 3), np.nan), np.full((pixels.shape[1], 3, 3), np.nan)
     every = np.ones(len(cameras), bool)
     for i in range(len(points)):
-        triangulate(np.ascontiguousarray(rays[:, i]), spread, cameras, focal, every, points[i], covariances[i])
+        triangulate(rays[i], spread[i], cameras, by_pixel[i], every, points[i], covariances[i])
     return points, covariances
 
 
@@ -87,7 +87,7 @@ def measure_squares(used: Sequence[Sequence[BoardView | None]], board: Board, st
 
 def epipolar_px(used: Sequence[Sequence[BoardView | None]], state: BundleState, first: int, second: int) -> float:
     """Rms distance in px between a corner and the epipolar line of its partner in the other camera, both ways; NaN
-    without shared views. In undistorted pixels: normalised coordinates times the focal length."""
+    without shared views."""
     second_from_first = state.camera_from_world[second] @ np.linalg.inv(state.camera_from_world[first])
     x, y, z = second_from_first[:3, 3]
     essential = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ second_from_first[:3, :3]
@@ -97,12 +97,12 @@ def epipolar_px(used: Sequence[Sequence[BoardView | None]], state: BundleState, 
         if a is None or b is None:
             continue
         _, in_a, in_b = np.intersect1d(a.ids, b.ids, return_indices=True)
-        left, right = (_homogeneous(view.pixels[those], state.lenses[camera])
-                       for view, those, camera in ((a, in_a, first), (b, in_b, second)))
+        (left, by_left), (right, by_right) = (_homogeneous(view.pixels[those], state.lenses[camera])
+                                              for view, those, camera in ((a, in_a, first), (b, in_b, second)))
         algebraic = np.sum(right * (left @ essential.T), axis=1)
-        for line, camera in ((left @ essential.T, second), (right @ essential, first)):
-            distance = algebraic / np.linalg.norm(line[:, :2] / state.lenses[camera, :2], axis=1)
-            squares.append(distance**2)
+        for line, by_pixel in ((left @ essential.T, by_right), (right @ essential, by_left)):
+            slope = np.einsum("ni,nij->nj", line[:, :2], by_pixel)
+            squares.append((algebraic / np.linalg.norm(slope, axis=1)) ** 2)
     return float(np.sqrt(np.nanmean(np.concatenate(squares)))) if squares else float("nan")
 
 
@@ -114,9 +114,9 @@ def _span(line: Array) -> tuple[float, int]:
     return float(np.linalg.norm(line[located[-1]] - line[located[0]])), int(located[-1] - located[0])
 
 
-def _homogeneous(pixels: Array, lens: Array) -> Array:
-    rays = undistort_points(np.ascontiguousarray(pixels), lens)
-    return np.column_stack([rays, np.ones(len(rays))])
+def _homogeneous(pixels: Array, lens: Array) -> tuple[Array, Array]:
+    rays, by_pixel = undistort_with_slope(np.ascontiguousarray(pixels), intrinsics_row(lens))
+    return np.column_stack([rays, np.ones(len(rays))]), by_pixel
 
 
 def _off_plane(points: Array) -> tuple[Array, Array]:
@@ -189,7 +189,7 @@ def mismatch_finding(solution: StereoSolution, lenses: Sequence[LensStart]) -> F
 
 
 def _of_another_camera(solution: StereoSolution, lenses: Sequence[LensStart], fresh: Array) -> Finding | None:
-    """Whether a kept lens fits another camera's pictures as that one's own does; `fresh` (C, 9) fit each camera's."""
+    """Whether a kept lens fits another camera's pictures as that one's own does; `fresh` (C, 12) fit each camera's."""
     views = [[those[camera] for those in solution.views] for camera in range(len(lenses))]
     own = [_rms(_errors(seen, solution.board, lens)[:, None]) for seen, lens in zip(views, fresh, strict=True)]
     for camera, freedom in enumerate(solution.bundle.layout.lenses):

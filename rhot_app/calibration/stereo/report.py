@@ -14,7 +14,6 @@ from rhot_app.calibration.board.poses import BoardErrors
 from rhot_app.calibration.board.shared_views import Dropped
 from rhot_app.calibration.bundle.adjustment import Bundle
 from rhot_app.calibration.bundle.model import (
-    LENS,
     TWIST,
     BundleState,
     Layout,
@@ -30,6 +29,7 @@ from rhot_app.calibration.stereo.adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo.points import Squares, epipolar_px, locate, measure_squares
 from rhot_app.calibration.stereo.ruler import RulerResult
 from rhot_app.calibration.verdict import Verdict
+from rhot_app.geometry.camera import LENS
 from rhot_app.geometry.transforms import exp_so3, inverse, log_so3
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ MARKER_NOISE_PX = 0.1
 
 @dataclass(frozen=True, slots=True)
 class CameraFigures:
-    """One camera: `lens` (9,) and its standard deviations, `size` of its pictures, rms of its corners in px."""
+    """One camera: `lens` (12,) and its standard deviations, `size` of its pictures, rms of its corners in px."""
 
     name: str
     size: tuple[int, int]
@@ -163,15 +163,15 @@ _TURN = 1e-6  # rad
 
 @dataclass(frozen=True, slots=True)
 class Certainty:
-    """Covariance over all cameras: `factor` (C * 15, K), whose product with its transpose is the covariance of each
-    camera's lens (9) and pose (6: rotation and translation of camera_from_world), camera by camera. In it is how much
+    """Covariance over all cameras: `factor` (C * 18, K), whose product with its transpose is the covariance of each
+    camera's lens (12) and pose (6: rotation and translation of camera_from_world), camera by camera. In it is how much
     the shots disagree, `error_inflation` times what independent corner errors explain."""
 
     factor: Array
     error_inflation: float
 
     def lens_std(self, camera: int) -> Array:
-        """(9,) standard deviations of a lens."""
+        """(12,) standard deviations of a lens."""
         return np.asarray(np.linalg.norm(self._rows(camera)[:LENS], axis=1))
 
     def pose_covariance(self, camera: int) -> Array:
@@ -214,7 +214,7 @@ def certainty(bundle: Bundle, seen: Observations, lenses: Sequence[LensStart]) -
 
 
 def _given_errors(bundle: Bundle, lenses: Sequence[LensStart]) -> Array:
-    """(9C, K), one column of one standard deviation for each parameter of a lens that was kept, where it is known."""
+    """(12C, K), one column of one standard deviation for each parameter of a lens that was kept, where it is known."""
     std = np.zeros(LENS * len(lenses))
     for camera, lens in enumerate(lenses):
         if bundle.layout.lenses[camera].basis.shape[1] == 0 and lens.std is not None:
@@ -226,7 +226,7 @@ def _in_pictures(bundle: Bundle, seen: Observations, given: Array) -> Array:
     """(2M, K) px, how far such errors of kept lenses move the corners."""
     if not given.shape[1]:
         return np.zeros((2 * len(seen), 0))
-    every = Layout([LensFreedom.free([True] * LENS, lens) for lens in bundle.state.lenses],
+    every = Layout([LensFreedom.free(lens, only=np.ones(LENS, bool)) for lens in bundle.state.lenses],
                    len(bundle.state.world_from_board), seen)
     return np.asarray(every.jacobian(linearise(bundle.state, seen))[:, :every.camera_at] @ given)
 
@@ -282,7 +282,7 @@ def _pixels(points: Array, state: BundleState) -> Array:
 
 
 def _moved(state: BundleState, change: Array) -> BundleState:
-    """`state` with each camera's lens and pose changed by `change` (C * 15,)."""
+    """`state` with each camera's lens and pose changed by `change` (C * 18,)."""
     parts = change.reshape(len(state.lenses), LENS + TWIST)
     poses = state.camera_from_world.copy()
     for pose, part in zip(poses, parts, strict=True):

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.quantiles import chi_squared, chi_squared_isf
 from rhot_node.errors import printable
-from rhot_node.files import read_document_bytes
+from rhot_node.files import read_table, why
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -151,7 +151,10 @@ def read_stream(path: Path, columns: tuple[str, ...]) -> MotionStream:
 
     Rows that repeat the time before are left out. Raises CalibrationError naming file, line and remedy.
     """
-    data = read_document_bytes(path, CalibrationError)
+    try:
+        data = read_table(path)
+    except (OSError, ValueError) as exc:
+        raise CalibrationError(f"{path}: cannot be read ({why(exc)}).") from exc
     try:
         lines = [line.strip() for line in data.decode("utf-8-sig").splitlines()]
     except UnicodeDecodeError as exc:

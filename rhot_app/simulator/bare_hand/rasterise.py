@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.geometry.camera import distort
+from rhot_app.geometry.camera import REACH, project_ray
 from rhot_app.simulator.render.exposure_samples import STILL_PX
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ Image = NDArray[np.float32]
 SAMPLES: Final = 16
 _STEP_Y, _STEP_T = 5, 7  # of the rank-1 lattice (1, 5, 7) / 16 in x, y and time, as in `render.rays`
 NEAREST_M: Final = 0.05
-_OUTSIDE_PX: Final = 64.0  # rays that the lens model is asked for beyond the picture's edge
+_OUTSIDE_PX: Final = 64.0  # vertices farther from the picture do not bound what is drawn
 
 
 @njit(cache=True, fastmath=True)
@@ -32,7 +32,6 @@ def project_at(series: Array, timing: Array, offset: float, intrinsics: Array, u
     """Fill `out` (V, 3): px, px and 1/z of vertices whose camera coordinates are `series` (V, 3, NODES) in tau, at
     `offset` in tau from the mid-exposure of their own rows; `rows` (V,) is where they were seen, and are seen now
     after `steps` of iteration. Only vertices that are `used` (V,) count."""
-    half_x, half_y = intrinsics[2] + _OUTSIDE_PX, intrinsics[3] + _OUTSIDE_PX
     for n in range(len(series)):
         if not used[n]:
             continue
@@ -47,12 +46,11 @@ def project_at(series: Array, timing: Array, offset: float, intrinsics: Array, u
                 break
             inverse = 1.0 / z
             xn, yn = x * inverse, y * inverse
-            if abs(xn * intrinsics[0]) < 2.0 * half_x and abs(yn * intrinsics[1]) < 2.0 * half_y:
-                xd, yd, _, _, _, _ = distort(xn, yn, intrinsics[4:9])
-            else:
-                xd, yd = xn, yn
-            out[n, 0] = intrinsics[0] * xd + intrinsics[2]
-            out[n, 1] = intrinsics[1] * yd + intrinsics[3]
+            radius = math.sqrt((xn * xn + yn * yn) / intrinsics[REACH])
+            inside = 0.9999 / radius if radius > 0.9999 else 1.0  # what is beyond the lens is drawn further out
+            u, v, _, _, _, _ = project_ray(inside * xn, inside * yn, intrinsics)
+            out[n, 0] = (u - intrinsics[2]) / inside + intrinsics[2]
+            out[n, 1] = (v - intrinsics[3]) / inside + intrinsics[3]
             out[n, 2] = inverse
             rows[n] = out[n, 1]
 

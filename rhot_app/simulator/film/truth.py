@@ -17,7 +17,7 @@ from rhot_app.simulator.bare_hand.painter import BareHand
 from rhot_app.simulator.film.scene_objects import SceneObject
 from rhot_app.simulator.render.body import HandBody
 from rhot_app.simulator.scene.rigid_target import RigidTarget
-from rhot_node.files import open_input
+from rhot_node.files import open_archive
 
 Array = NDArray[np.float64]
 
@@ -147,7 +147,7 @@ def _cameras(data: Any) -> tuple[FrameTruth, ...]:
 def _opened(path: Path) -> Iterator[Any]:
     """An open truth file; whatever is wrong with it becomes a SimulatorError."""
     try:
-        with open_input(path) as file, np.load(file) as data:
+        with open_archive(path) as file, np.load(file) as data:
             yield data
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as exc:
         raise SimulatorError(f"{path}: not a truth file of a simulated run ({exc}). "

@@ -34,6 +34,7 @@ from rhot_app.simulator.scene.scene_description import Show
 from rhot_node.config import load_settings
 from rhot_node.errors import NodeError, SettingsError
 from rhot_node.logs import cut_log, log_to_stderr
+from rhot_node.network.context import Context
 from rhot_node.threads import Worker
 
 # -- control socket ----------------------------------------------------------------------------------------------------
@@ -51,9 +52,8 @@ class TwinServer:
         """Open the door; raises SimulatorError when it cannot be opened there."""
         self._path = directory / SERVER_NAME
         self._perform = perform
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._context = Context()
         self._socket = self._context.socket(zmq.REP)
-        self._socket.linger = 0
         self._socket.maxmsgsize = _REQUEST_MAX
         try:
             self._path.unlink(missing_ok=True)

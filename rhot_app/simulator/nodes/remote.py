@@ -30,6 +30,7 @@ from rhot_app.errors import SimulatorError
 from rhot_app.simulator.render.camera_controls import Controls, Lamp
 from rhot_app.simulator.scene.scene_description import Show
 from rhot_node.files import decode_message
+from rhot_node.network.context import Context
 
 # -- requests and answers ----------------------------------------------------------------------------------------------
 # Stage, lamp and caps on lenses belong to the room, not to the rig: nothing that is asked here reaches nodes or engine
@@ -140,7 +141,7 @@ class TwinRemote:
     def __init__(self, directory: Path) -> None:
         """`directory`: that of the twin; in the app, the session's. Nothing is sent yet."""
         self._directory = directory
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._context = Context()
 
     def show(self, what: Show) -> TwinState:
         """Show something else, from its beginning."""
@@ -179,7 +180,6 @@ class TwinRemote:
 
     def _answer(self, request: Request, timeout_s: float) -> dict[str, Any]:
         socket = self._context.socket(zmq.REQ)
-        socket.linger = 0
         try:
             socket.connect(server_address(self._directory))
             socket.send(msgspec.json.encode(request))

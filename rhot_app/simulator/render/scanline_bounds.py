@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.geometry.camera import distort, undistort_point
+from rhot_app.geometry.camera import REACH, project_ray, undistort_point
 from rhot_app.simulator.render.body import BOUNDS, CAPSULE, PLAIN
 from rhot_app.simulator.render.exposure_samples import evaluate
 from rhot_app.simulator.render.paint import is_painted, local_point
@@ -67,12 +67,23 @@ def outline(kind: int, row: Array, size: Array, n: int, intrinsics: Array) -> tu
     nearest = min(az, bz) - radius
     if not nearest > NEAR_M:
         return math.nan, math.nan, math.nan, math.nan, math.nan
-    lens = intrinsics[4:9]
-    x, y, _, _, _, _ = distort(ax / az, ay / az, lens)
-    u0, v0 = intrinsics[0] * x + intrinsics[2], intrinsics[1] * y + intrinsics[3]
-    x, y, _, _, _, _ = distort(bx / bz, by / bz, lens)
-    u1, v1 = intrinsics[0] * x + intrinsics[2], intrinsics[1] * y + intrinsics[3]
-    return u0, v0, u1, v1, 1.1 * max(intrinsics[0], intrinsics[1]) * radius / nearest + 1.0
+    u0, v0 = _within(ax / az, ay / az, intrinsics)
+    u1, v1 = _within(bx / bz, by / bz, intrinsics)
+    u, v = _within((ax + bx) / (az + bz), (ay + by) / (az + bz), intrinsics)
+    length = math.hypot(u1 - u0, v1 - v0)
+    bent = abs((u - u0) * (v1 - v0) - (v - v0) * (u1 - u0)) / max(length, 1.0)  # px: a lens bends straight lines
+    return u0, v0, u1, v1, 1.1 * max(intrinsics[0], intrinsics[1]) * radius / nearest + 1.5 * bent + 1.0
+
+
+@njit(cache=True)
+def _within(x: float, y: float, intrinsics: Array) -> tuple[float, float]:
+    """The pixel of a ray, and of one that the lens does not reach the last one in its direction."""
+    square = x * x + y * y
+    if square > intrinsics[REACH]:
+        inside = 0.9999 * math.sqrt(intrinsics[REACH] / square)
+        x, y = inside * x, inside * y
+    u, v, _, _, _, _ = project_ray(x, y, intrinsics)
+    return u, v
 
 
 @njit(cache=True)

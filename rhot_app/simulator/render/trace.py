@@ -96,7 +96,7 @@ class Moving(NamedTuple):
 class View(NamedTuple):
     """A camera during one frame.
 
-    `rays` (H + 2, W + 2, 2): normalised coordinates of the pixel centres with a border of one. `intrinsics` (9,).
+    `rays` (H + 2, W + 2, 2): normalised coordinates of the pixel centres with a border of one. `intrinsics` (13,).
     `timing` (3,): tau of row 0's mid-exposure, tau per row, exposure in tau. `light` (3,): unit vector towards the
     lamp, camera frame; `shading` 0..1: its share of the brightness.
     """

@@ -24,7 +24,7 @@ from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS, HandPose
 from rhot_app.recording.qualisys import read_qualisys
 from rhot_app.simulator.scene.motion import FACING, WRIST_BELOW_CENTRE_M, Motion, Sway, SwayCurve
-from rhot_node.files import read_input
+from rhot_node.files import read_table
 
 # -- reading recordings ------------------------------------------------------------------------------------------------
 # Read here: Qualisys TSV exports (optical markers on fingertips and finger middles, a triad on the back of the hand)
@@ -59,7 +59,7 @@ class Landmarks:
 def read_landmarks(path: Path, model: HandModel) -> Landmarks:
     """Landmarks of a recording; `model` tells where along a finger a marker must sit. Raises SimulatorError."""
     try:
-        landmarks = _qualisys(path, model) if path.suffix.lower() == ".tsv" else _leap(read_input(path).decode())
+        landmarks = _qualisys(path, model) if path.suffix.lower() == ".tsv" else _leap(read_table(path).decode())
     except (OSError, UnicodeDecodeError, RecordingError) as exc:
         raise SimulatorError(f"{path}: cannot be read as a recording ({exc}).") from exc
     except (ValueError, IndexError, KeyError, csv.Error) as exc:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import SourceError
+from rhot_app.errors import SourceError, finite
 
 if TYPE_CHECKING:
     from rhot_app.sources.poses.source import ForeignPose, PoseSource
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="openvr, libsurvive, run:PROGRAM, tcp:HOST:PORT, udp:PORT, or a CSV file")
     parser.add_argument("--tracker", default="", metavar="NAME",
                         help="the tracker's serial number or role (default: the only one)")
-    parser.add_argument("--seconds", type=float, default=20.0, metavar="N",
+    parser.add_argument("--seconds", type=finite, default=20.0, metavar="N",
                         help="how long to listen (default: 20); a CSV file is read whole")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the tracked poses as CSV")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rhot_app.estimation.filter import update
 from rhot_app.estimation.residual import stack
-from rhot_app.geometry.camera import undistort_points
+from rhot_app.geometry.camera import pixels_per_metre, project_with_slope, undistort_points
 from rhot_app.geometry.transforms import fit_rigid, rigid
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.landmarks import LASTING_M, NOISE_M
@@ -95,7 +95,7 @@ class Starter:
         rig, count = self._rig, len(self._rig.marker_ids)
         positions, covariances, clear = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count, np.bool_)
         _locate_clear(paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics, rig.cameras,
-                      rig.focal, rig.shapes, positions, covariances, clear)
+                      rig.shapes, positions, covariances, clear)
         return Located(paired.t_ns, positions, covariances, clear)
 
     def pose_of(self, markers: Array, scale: float = 1.0) -> HandPose | None:
@@ -188,19 +188,20 @@ def pose_on_plane(plane: PalmOnPlane, frame: MarkerFrame, process: HandProcess) 
         return None
     state, world = best[1], np.eye(4)
     world[:3] = state[:ANGLES].reshape(3, 4)
-    metres_per_px = float(rotation[2] @ place + shift[2]) / m.intrinsics[frame.camera, 0]
+    _, slopes = project_with_slope(place[None], m.poses[frame.camera], m.intrinsics[frame.camera])
+    metres_per_px = 1.0 / pixels_per_metre(slopes[0])
     off_px = np.linalg.norm(frame.pixels - frame.expected(state), axis=1)[seen]
     return HandPose(world, state[ANGLES:VELOCITY].copy()) if np.all(metres_per_px * off_px < UNFIT_M) else None
 
 
 @njit(cache=True)
 def _locate_clear(flags: NDArray[np.int64], live: NDArray[np.bool_], pixels: Array, covariances: Array,
-                  intrinsics: Array, cameras: Array, focal: Array, shapes: Array, positions: Array,
+                  intrinsics: Array, cameras: Array, shapes: Array, positions: Array,
                   position_covariances: Array, clear: NDArray[np.bool_]) -> None:
     """Fill what `Located` holds of one instant; arrays as in `Paired` and `RigArrays`."""
     used, count = np.empty(flags.shape, np.bool_), positions.shape[0]
     choose_views(flags, live, used, clear)
-    locate_all(pixels, covariances, used, intrinsics, cameras, focal, shapes, positions, position_covariances,
+    locate_all(pixels, covariances, used, intrinsics, cameras, shapes, positions, position_covariances,
                np.empty(count))
     for m in range(count):
         clear[m] = not (clear[m] or math.isnan(positions[m, 0]))

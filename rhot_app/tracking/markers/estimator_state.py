@@ -176,7 +176,7 @@ class EstimatorStates:
             world[:3] = state[:ANGLES].reshape(3, 4)
             locate.turn_band(world, rig.band_half_axes, self._shapes[rig.wrist])
         locate_all(aligned, observations.covariances, fresh & (np.count_nonzero(fresh, axis=0) > 1), rig.intrinsics,
-                   rig.cameras, rig.focal, self._shapes, raw, raw_covariances, errors)
+                   rig.cameras, self._shapes, raw, raw_covariances, errors)
         palm = _conclude(covariance, covariances, shown, m.finger, markers, joints, angles, angle_sd)
         in_sight = (np.count_nonzero(age <= 2 * observations.fresh_ns[:, None], axis=0) > 1).all()
         world, deviation = np.eye(4), np.sqrt(np.maximum(np.diag(covariance), 0.0))

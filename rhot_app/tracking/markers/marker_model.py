@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.errors import RigError
-from rhot_app.geometry.camera import CameraModel, distort
+from rhot_app.geometry.camera import REACH, CameraModel, project_ray
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.landmarks import ANATOMY_SD_M, LASTING_S
 from rhot_app.hand.limits import PosePrior
@@ -48,7 +48,7 @@ class MarkerModel:
     their bodies along the palm's axes, zero for flat ones. `slender` (M,): visible area of a fingertip from its side
     over that from its end, less 1; negative where the size says nothing of the distance. `paint_variance` (M,) m^2.
     `landmark` (M,) bool: landmarks, which err as `hand.landmarks` says.
-    `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 9) as `CameraModel`. `limits` (21, 2) rad.
+    `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 13) as `CameraModel`. `limits` (21, 2) rad.
     """
 
     model: HandModel
@@ -147,7 +147,7 @@ def pose_prior_of(model: HandModel, variant: VariantName) -> PosePrior:
 def project_marker(point, world, half_axes, camera, intrinsics, pixel, slope):
     """Where the silhouette of a marker at `point` (3,) has its centre: `pixel` (2,) px and `slope` (2, 3) px/m.
 
-    `world` (3, 4): the palm's pose, along whose axes the body lies. False when it is not before the camera.
+    `world` (3, 4): the palm's pose, along whose axes the body lies. False when the camera cannot see it.
     `geometry.silhouette` has the formula; its slope is that of a point.
     """
     local = np.empty(3)
@@ -169,12 +169,12 @@ def project_marker(point, world, half_axes, camera, intrinsics, pixel, slope):
             zz += square * c * c
     depth = local[2] * local[2] - zz
     x, y = (local[0] * local[2] - xz) / depth, (local[1] * local[2] - yz) / depth
-    xd, yd, xx, xy, yx, yy = distort(x, y, intrinsics[4:9])
-    pixel[0] = intrinsics[0] * xd + intrinsics[2]
-    pixel[1] = intrinsics[1] * yd + intrinsics[3]
+    if not x * x + y * y <= intrinsics[REACH]:
+        return False
+    pixel[0], pixel[1], ux, uy, vx, vy = project_ray(x, y, intrinsics)
     for k in range(3):
         dx = (camera[0, k] - x * camera[2, k]) / local[2]
         dy = (camera[1, k] - y * camera[2, k]) / local[2]
-        slope[0, k] = intrinsics[0] * (xx * dx + xy * dy)
-        slope[1, k] = intrinsics[1] * (yx * dx + yy * dy)
+        slope[0, k] = ux * dx + uy * dy
+        slope[1, k] = vx * dx + vy * dy
     return True

@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.residual import UNIT, Rows, student
+from rhot_app.geometry.camera import is_wide, pixels_per_metre, project_with_slope
 from rhot_app.hand.kinematics import direction_jacobian, forward_arrays, jacobian_arrays
 from rhot_app.hand.landmarks import COMMON_M, NOISE_M
 from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
@@ -132,7 +133,7 @@ def _add_noise(state, dh, half_axes, pose, intrinsics, noise_m, covariances):
     for m in range(count):
         if noise_m[m] > 0.0 and project_marker(points[m], world, half_axes[m], pose, intrinsics, pixel, slope):
             for r in range(2):
-                covariances[m, r, r] += (noise_m[m] / _metres_per_px(slope)) ** 2
+                covariances[m, r, r] += (noise_m[m] * pixels_per_metre(slope)) ** 2
 
 
 @njit(cache=True)
@@ -188,7 +189,7 @@ def _linearise(state, dh, half_axes, pose, intrinsics, seen, pixels, covariances
         error[used] = (pixels[m, 0] - pixel[0]) / a
         error[used + 1] = (pixels[m, 1] - pixel[1] - b * error[used]) / c
         if common_m[m] > 0.0:
-            common_px = common_m[m] / _metres_per_px(slope)
+            common_px = common_m[m] * pixels_per_metre(slope)
             shift[used, 0], shift[used + 1, 1] = common_px / a, common_px / c
             shift[used + 1, 0] = -common_px * b / (a * c)
             for j in range(POSE):
@@ -206,7 +207,7 @@ def _linearise(state, dh, half_axes, pose, intrinsics, seen, pixels, covariances
         used, observations = used + 2, observations + 1
     if common_m.max() > 0.0 and used > 0:
         _marginalise(shift[:used], error[:used], out[:used])
-    bone, line, turning = np.empty(3), np.empty(3), np.empty((3, POSE))
+    bone, line, change, turning = np.empty(3), np.empty(3), np.empty(3), np.empty((3, POSE))
     for m in range(count):
         if math.isnan(log_width[m]) or not seen[m]:
             continue
@@ -216,23 +217,39 @@ def _linearise(state, dh, half_axes, pose, intrinsics, seen, pixels, covariances
         direction_jacobian(dh, world, frames, m, bone, turning)
         shown = -0.5 * slender[m] / (1.0 + slender[m] * side) * along / side
         expected = log_width[m] + _log_shown(slender[m], side)
-        size = math.log(diameters[m] * _metres_per_px(slope)) + 0.5 * math.log(_still(state, slope, jacobian, m, row_s))
+        size = (math.log(diameters[m] / pixels_per_metre(slope))
+                + 0.5 * math.log(_still(state, slope, jacobian, m, row_s)))
         error[used] = (size - expected) / size_sd[m]
-        depth = pose[2, 3]
-        for i in range(3):
-            depth += pose[2, i] * points[m, i]
+        _size_change(points[m], pose, intrinsics, line, distance, change)
         for j in range(POSE):
-            farther, turned, deeper = 0.0, 0.0, 0.0
+            farther, turned, larger = 0.0, 0.0, 0.0
             for i in range(3):
                 farther += line[i] * jacobian[m, i, j]
-                deeper += pose[2, i] * jacobian[m, i, j]
+                larger += change[i] * jacobian[m, i, j]
             for i in range(3):
                 turned += line[i] * turning[i, j] + bone[i] * (jacobian[m, i, j] - farther * line[i]) / distance
-            # a pixel's size grows with depth^1.5 / distance^0.5
-            out[used, j] = (shown * turned - 1.5 * deeper / depth + 0.5 * farther / distance) / size_sd[m]
+            out[used, j] = (shown * turned - larger) / size_sd[m]
         first[observations] = used
         used, observations = used + 1, observations + 1
     return used, observations
+
+
+@njit(cache=True)
+def _size_change(point, pose, intrinsics, line, distance, change):
+    """Fill `change` (3,) per m: of ln of the size of a pixel at `point` (3,) with its place. `line` (3,): direction
+    from the camera, `distance` m."""
+    if not is_wide(intrinsics):
+        depth = pose[2, 3] + pose[2, 0] * point[0] + pose[2, 1] * point[1] + pose[2, 2] * point[2]
+        for i in range(3):  # it grows with depth^1.5 / distance^0.5, but for a plain lens's distortion
+            change[i] = 1.5 * pose[2, i] / depth - 0.5 * line[i] / distance
+        return
+    step, near = 1e-3 * distance, np.empty((6, 3))
+    for i in range(6):
+        near[i] = point
+        near[i, i // 2] += step if i % 2 else -step
+    _, slopes = project_with_slope(near, pose, intrinsics)
+    for i in range(3):
+        change[i] = math.log(pixels_per_metre(slopes[2 * i]) / pixels_per_metre(slopes[2 * i + 1])) / (2.0 * step)
 
 
 @njit(cache=True)
@@ -275,14 +292,6 @@ def _log_shown(slender, side):
 
 
 @njit(cache=True)
-def _metres_per_px(slope):
-    """Size of a pixel at a place, as a ball covers them, of a projection with `slope` (2, 3) px/m."""
-    u, v = slope[0], slope[1]
-    x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-    return 1.0 / math.sqrt(math.sqrt(x * x + y * y + z * z))
-
-
-@njit(cache=True)
 def _still(state, slope, jacobian, m, row_s):
     """Area of a marker at rest over that of the moving one, which the rolling shutter stretches."""
     down = 0.0
@@ -301,7 +310,7 @@ def _widths(state, dh, half_axes, pose, intrinsics, plain, slender, diameters, r
     for m in range(count):
         if plain[m] and project_marker(points[m], world, half_axes[m], pose, intrinsics, pixel, slope):
             side, _, _ = _view(dh, frames, points, pose, m, bone, line)
-            out[m] = (math.log(diameters[m] * _metres_per_px(slope)) - _log_shown(slender[m], side)
+            out[m] = (math.log(diameters[m] / pixels_per_metre(slope)) - _log_shown(slender[m], side)
                       + 0.5 * math.log(_still(state, slope, jacobian, m, row_s)))
 
 
@@ -346,7 +355,7 @@ def _predict_pixels(state, covariance, dh, half_axes, pose, intrinsics, late_s, 
                         product[i] += row[r, j] * covariance[j, i]
             for s in range(2):
                 covariances[m, r, s] = np.dot(product, row[s])
-            covariances[m, r, r] += (common_m[m] / _metres_per_px(slope)) ** 2
+            covariances[m, r, r] += (common_m[m] * pixels_per_metre(slope)) ** 2
         if common_m[m] > 0.0:
             for r in range(2):
                 product[r] = np.dot(row[r, :POSE], state[VELOCITY:ACCELERATION])
@@ -371,7 +380,7 @@ def triangulation_covariance(state, dh, half_axes, poses, intrinsics, pixel_sd, 
             information[i, i] = 1e4  # of 10 mm, where the cameras do not tell the distance
         for camera in range(poses.shape[0]):
             if project_marker(points[m], world, half_axes[m], poses[camera], intrinsics[camera], pixel, slope):
-                variance = pixel_sd**2 + (lasting_m[m] / _metres_per_px(slope)) ** 2
+                variance = pixel_sd**2 + (lasting_m[m] * pixels_per_metre(slope)) ** 2
                 for i in range(3):
                     for j in range(3):
                         for r in range(2):

@@ -193,17 +193,17 @@ class RigRefiner:
     def _keep_marker(self, t_s: float, marker: int, paired: Paired, used: NDArray[np.bool_], speed: Array,
                      bounds_s: Array) -> None:
         rig, cameras = self._compiled, len(self._stored)
-        rays, noise = np.full((cameras, 2), np.nan), np.tile(np.eye(2), (cameras, 1, 1))
+        rays, (noise, by_pixel) = np.full((cameras, 2), np.nan), np.tile(np.eye(2), (2, cameras, 1, 1))
         for camera in np.flatnonzero(used):
             u, v = paired.pixels[camera, marker]
             x, y, xu, xv, yu, yv = undistort_point(u, v, rig.intrinsics[camera])
-            slope = np.array([[xu, xv], [yu, yv]])
+            slope = by_pixel[camera] = np.array([[xu, xv], [yu, yv]])
             late = bounds_s[camera] / math.sqrt(3.0) * speed[camera]  # evenly distributed within the bound
             pixels = paired.covariances[camera, marker] + np.outer(late, late) + EXACT_PX2 * np.eye(2)
             rays[camera], noise[camera] = (x, y), slope @ pixels @ slope.T
         place, covariance = np.empty(3), np.empty((3, 3))
         observed = used & np.isfinite(rays[:, 0])
-        _, outcome = triangulate(rays, noise, rig.cameras, rig.focal, observed, place, covariance)
+        _, outcome = triangulate(rays, noise, rig.cameras, by_pixel, observed, place, covariance)
         if outcome != Outcome.OK:
             return
         centred = np.empty_like(rays)

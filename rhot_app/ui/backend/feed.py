@@ -6,6 +6,7 @@ last travels (measured on two cores beside engine and twin: half as many picture
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections import deque
@@ -115,15 +116,12 @@ class LiveFeed:
             return self._problems[camera]
 
     def _run(self, camera: str) -> None:
-        asker = self._connect()
-        try:
+        with contextlib.closing(self._connect()) as asker:
             while not self._ending.is_set():
                 self._resumed.wait()
                 if self._ending.wait(self._wait_s(camera)):
                     break
                 self.step(camera, asker)
-        finally:
-            asker.close()
 
     def _wait_s(self, camera: str) -> float:
         """Take the next turn of this camera; how long until then."""
@@ -213,14 +211,11 @@ class StateFeed:
                 self._states.popleft()
 
     def _run(self) -> None:
-        client: Listener | None = None
-        while not self._ending.wait(_PERIOD_S):
-            try:
-                client = client or self._listen()
-                for message in client.poll():
-                    if isinstance(message, HandState):
-                        self.add(message)
-            except RhotError:  # an engine of another version, or none: what is shown stays empty until there is one
-                self._ending.wait(_AGAIN_S)
-        if client is not None:
-            client.close()
+        with contextlib.closing(self._listen()) as client:
+            while not self._ending.wait(_PERIOD_S):
+                try:
+                    for message in client.poll():
+                        if isinstance(message, HandState):
+                            self.add(message)
+                except RhotError:  # an engine of another version: what is shown stays empty until it is this one
+                    self._ending.wait(_AGAIN_S)

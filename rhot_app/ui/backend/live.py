@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.engine.status import EngineStatus, Preview, Published
 from rhot_app.state import HandState, SeenContour
+from rhot_app.ui.backend.contract import Listener
 from rhot_app.ui.models.meters import STACKED, JitterWindow, LatencyWindow, LossMeter, RateRows, rate_names
 from rhot_app.ui.models.series import Series
 
@@ -29,18 +29,6 @@ _PAUSE_NS = 400_000_000
 LATENCY_COLUMNS: tuple[str, ...] = (*(f"{stage} p50" for stage in STACKED), "all p50",
                                     *(f"{stage} p99" for stage in STACKED), "all p99")
 LOST = "lost"
-
-
-class Client(Protocol):
-    """What the app needs of `rhot_app.engine.client.EngineClient`."""
-
-    def poll(self) -> list[Published]:
-        """Everything that arrived since the last call; never waits."""
-        ...
-
-    def command(self, name: str, **args: Any) -> dict[str, Any]:
-        """Ask the engine; raises EngineError."""
-        ...
 
 
 class Live:
@@ -79,7 +67,7 @@ class Live:
         self._losses.clear()
         self._rates.clear()
 
-    def step(self, client: Client) -> None:
+    def step(self, client: Listener) -> None:
         """Take in what arrived. Every state counts for the windows; only the newest is kept for drawing."""
         for message in client.poll():
             self.take(message)

@@ -5,44 +5,36 @@ Everything that waits runs as a `Job`; `step()` is called by the window's timer 
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
-from rhot_app.ui.backend.contract import Backend, Opened, TwinChoice, TwinPace
-from rhot_app.ui.backend.live import SILENCE_S, Client, Live
+from rhot_app.ui.backend.contract import Asker, Backend, Listener, Opened, TwinChoice, TwinPace
+from rhot_app.ui.backend.live import SILENCE_S, Live
 from rhot_app.ui.common.job import Job, Progress
 
 # -- The window's client of the engine ---------------------------------------------------------------------------------
 
-class ClosableClient(Client, Protocol):
-    """The engine's client, which can be closed."""
-
-    def close(self) -> None:
-        """Disconnect."""
-        ...
-
-
 class EngineLink(QObject):
     """`client` is None while no engine is wanted. `failed` hears of every command that fails, as a sentence."""
 
-    def __init__(self, connect: Callable[[], ClosableClient], failed: Callable[[str], None],
-                 parent: QObject | None = None) -> None:
+    def __init__(self, backend: Backend, failed: Callable[[str], None], parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._connect = connect
+        self._backend = backend
         self._failed = failed
         self._jobs: list[Job] = []
-        self.client: ClosableClient | None = None
+        self.client: Listener | None = None
 
     def open(self) -> None:
         """A fresh client in place of the last one."""
         self.close()
-        self.client = self._connect()
+        self.client = self._backend.client()
 
     def close(self) -> None:
         """Disconnect, if connected."""
@@ -52,20 +44,23 @@ class EngineLink(QObject):
 
     def command(self, name: str, **args: Any) -> None:
         """Give a command; only its failure is heard of."""
-        self.work(lambda client: client.command(name, **args), lambda answer: None)
+        self.work(lambda asker: asker.command(name, **args), lambda answer: None)
 
-    def work(self, op: Callable[[ClosableClient], Any], done: Callable[[Any], None],
+    def work(self, op: Callable[[Asker], Any], done: Callable[[Any], None],
              failed: Callable[[str], None] | None = None) -> None:
-        """Run something short with the client in a worker; nothing happens without a client.
+        """Ask something short in a worker, by a client of its own; nothing happens while no engine is wanted.
 
         `done(result)` or `failed(sentence)` follow in the window's thread; `failed` is the link's own by default.
         """
-        client = self.client
-        if client is None:
+        if self.client is None:
             return
+
+        def ask() -> Any:
+            with contextlib.closing(self._backend.asker()) as asker:
+                return op(asker)
+
         self._jobs = [job for job in self._jobs if job.running]
-        self._jobs.append(Job(lambda progress: op(client), done, failed or self._failed, None, self))
-        self._jobs[-1].start()
+        self._jobs.append(Job(lambda progress: ask(), done, failed or self._failed, None, self).start())
 
     def wait(self, timeout_s: float) -> None:
         """Let what is under way come to its end, each at most `timeout_s`."""
@@ -93,7 +88,7 @@ class Controller(QObject):
     busy_changed = Signal()
     failed = Signal(str)
 
-    def __init__(self, backend: Backend, connect: Callable[[], ClosableClient], parent: QObject | None = None,
+    def __init__(self, backend: Backend, parent: QObject | None = None,
                  clock: Callable[[], float] = time.monotonic) -> None:
         """`clock` gives the seconds of the engine's clock, by which everything in the window is timed."""
         super().__init__(parent)
@@ -102,7 +97,7 @@ class Controller(QObject):
         self.live = Live(clock)
         self.opened: Opened | None = None
         self.twin_choice = TwinChoice()
-        self.link = EngineLink(connect, self._on_command_failed, self)
+        self.link = EngineLink(backend, self._on_command_failed, self)
         self._job: Job | None = None
         self.busy: tuple[str, float] | None = None
         self.problem = ""

@@ -134,6 +134,7 @@ class Job(QObject):
 
     def _on_stopped(self) -> None:
         Job._under_way.discard(self)
+        self.deleteLater()  # or its parent would keep every job that it ever had
 
     def _on_done(self, result: Any) -> None:
         if not self.progress.cancelled:

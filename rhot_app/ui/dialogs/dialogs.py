@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig, RigNode
 from rhot_app.ui.common.controller import Controller
@@ -48,6 +49,16 @@ class Dialogs:
         self.outputs: OutputsDialog | None = None
         self.mouse: MouseWindow | None = None
         self.layers: LayersDialog | None = None
+        self.export: ExportDialog | None = None
+
+    def _hold(self, name: str, dialog: QDialog) -> None:
+        """Hold a dialog until it is closed, then let go of it."""
+        def forget() -> None:
+            setattr(self, name, None)
+            dialog.deleteLater()
+
+        setattr(self, name, dialog)
+        dialog.finished.connect(forget)
 
     def choose_rig(self, last_rig: str) -> Path | None:
         """A rig file, looked for beside the one opened last; None when the person thought better of it."""
@@ -60,13 +71,14 @@ class Dialogs:
     def connect_nodes(self, scheme: Scheme) -> Path | None:
         """The rig file written for two nodes that answered; None when there is none."""
         dialog = NodesDialog(scheme, self._parent)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         return dialog.rig_path if dialog.exec() else None
 
     def export_recording(self, log: Path | None = None) -> None:
         """What to write of a recording, beside the window; `log` None is asked for."""
-        self.export = ExportDialog(log, recordings_folder(), self._parent)
-        self.export.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.export.open()
+        dialog = ExportDialog(log, recordings_folder(), self._parent)
+        self._hold("export", dialog)
+        dialog.open()
 
     def show_rig(self, rig: Rig, page: str) -> None:
         """What the rig says, to read; `page` is "cameras", "markers" or "hand"."""
@@ -81,13 +93,11 @@ class Dialogs:
             return
         if self.tracker is None:
             path = Path(opened.rig_path) if opened.rig_path else None
-            self.tracker = TrackerDialog(opened.rig, path, controller.backend.asker,
-                                         lambda: controller.live.state if controller.running else None, self._parent)
-            self.tracker.rig_used.connect(lambda rig: rig_used())
-            self.tracker.finished.connect(self._forget_tracker)
-        self.tracker.show()
-        self.tracker.raise_()
-        self.tracker.activateWindow()
+            dialog = TrackerDialog(opened.rig, path, controller.backend.asker,
+                                   lambda: controller.live.state if controller.running else None, self._parent)
+            dialog.rig_used.connect(lambda rig: rig_used())
+            self._hold("tracker", dialog)
+        _bring_forward(self.tracker)
 
     def show_outputs(self, controller: Controller, scheme: Callable[[], Scheme], actions: Sequence[QAction],
                      rig_used: Callable[[], None]) -> None:
@@ -96,14 +106,12 @@ class Dialogs:
         if opened is None:
             return
         if self.outputs is None:
-            self.outputs = OutputsDialog(opened, controller.backend.asker, lambda: controller.live.status, scheme,
-                                         self._parent)
-            self.outputs.addActions(actions)
-            self.outputs.rig_used.connect(lambda rig: rig_used())
-            self.outputs.finished.connect(self._forget_outputs)
-        self.outputs.show()
-        self.outputs.raise_()
-        self.outputs.activateWindow()
+            dialog = OutputsDialog(opened, controller.backend.asker, lambda: controller.live.status, scheme,
+                                   self._parent)
+            dialog.addActions(actions)
+            dialog.rig_used.connect(lambda rig: rig_used())
+            self._hold("outputs", dialog)
+        _bring_forward(self.outputs)
 
     def follow_rig(self, controller: Controller) -> None:
         """Another rig is open, or none."""
@@ -119,41 +127,20 @@ class Dialogs:
             else:
                 self.outputs.follow(controller.opened)
 
-    def _forget_tracker(self) -> None:
-        if self.tracker is not None:
-            self.tracker.deleteLater()
-            self.tracker = None
-
-    def _forget_outputs(self) -> None:
-        if self.outputs is not None:
-            self.outputs.deleteLater()
-            self.outputs = None
-
     def show_mouse(self, controller: Controller, scheme: Scheme) -> None:
         """The 3-D mouse beside the window; with or without a rig."""
         if self.mouse is None:
-            self.mouse = MouseWindow(controller.backend.client(), lambda: controller.rig, scheme,
-                                     lambda: self.open_guide("mouse"), self._parent, controller.clock)
-            self.mouse.finished.connect(self._forget_mouse)
-        self.mouse.show()
-        self.mouse.raise_()
-        self.mouse.activateWindow()
+            self._hold("mouse", MouseWindow(controller.backend.client(), lambda: controller.rig, scheme,
+                                            lambda: self.open_guide("mouse"), self._parent, controller.clock))
+        _bring_forward(self.mouse)
 
     def show_layers(self, controller: Controller, scheme: Scheme) -> None:
         """Which link of the tracked hand hides which, beside the window."""
         if self.layers is None:
             from rhot_app.ui.dialogs.layers_dialog import LayersDialog
 
-            self.layers = LayersDialog(controller, scheme, lambda: self.open_guide("scene"), self._parent)
-            self.layers.finished.connect(self._forget_layers)
-        self.layers.show()
-        self.layers.raise_()
-        self.layers.activateWindow()
-
-    def _forget_layers(self) -> None:
-        if self.layers is not None:
-            self.layers.deleteLater()
-            self.layers = None
+            self._hold("layers", LayersDialog(controller, scheme, lambda: self.open_guide("scene"), self._parent))
+        _bring_forward(self.layers)
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change the colours of what paints by itself."""
@@ -162,16 +149,13 @@ class Dialogs:
         if self.mouse is not None:
             self.mouse.set_scheme(scheme)
 
-    def _forget_mouse(self) -> None:
-        if self.mouse is not None:
-            self.mouse.deleteLater()
-            self.mouse = None
-
     def open_guide(self, page: str) -> None:
         """A page of the guide beside the window."""
-        if self.guide is None:
-            self.guide = GuideViewer(self._parent)
-        self.guide.open_page(page)
+        guide = self.guide
+        if guide is None:
+            guide = GuideViewer(self._parent)
+            self._hold("guide", guide)
+        guide.open_page(page)
 
     @property
     def guide_page(self) -> str:
@@ -180,9 +164,16 @@ class Dialogs:
 
     def close(self) -> None:
         """Close what stands beside the window."""
-        for window in (self.guide, self.tracker, self.outputs, self.mouse, self.layers):
+        for window in (self.guide, self.tracker, self.outputs, self.mouse, self.layers, self.export):
             if window is not None:
                 window.close()
+
+
+def _bring_forward(window: QWidget | None) -> None:
+    if window is not None:
+        window.show()
+        window.raise_()
+        window.activateWindow()
 
 
 # -- what the rig file says, to read -----------------------------------------------------------------------------------
@@ -205,7 +196,7 @@ def camera_rows(rig: Rig) -> Rows:
 
 def _camera_row(node: RigNode) -> list[str]:
     lens = node.intrinsics
-    wide = 2 * np.degrees(np.arctan(0.5 * lens.width / lens.fx))
+    wide = np.degrees(CameraModel.from_rig(lens, node.pose).field_of_view[0])
     return [node.name, f"{lens.width} × {lens.height}", f"{wide:.1f}°", f"{lens.fx:.1f}, {lens.fy:.1f}",
             f"{lens.cx:.1f}, {lens.cy:.1f}", f"{lens.distortion[0]:.3f}, {lens.distortion[1]:.3f}",
             f"{node.address}:{node.control_port}"]

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QTimer
-from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -239,12 +238,12 @@ class ExportDialog(QDialog):
     def _say(self, sentence: str) -> None:
         self.sentence.setText(sentence)
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+    def done(self, result: int) -> None:
         """An export that is under way ends with the dialog, and leaves nothing."""
         for job in (self._job, self._look):
             if job is not None:
                 job.cancel()
-        super().closeEvent(event)
+        super().done(result)
 
 
 def _box(entries: Any, meaning: str) -> QComboBox:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Final
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QColor, QIcon, QImage, QKeySequence, QPainter, QPixmap, QShortcut
+from PySide6.QtGui import QColor, QIcon, QImage, QKeySequence, QPainter, QPixmap, QShortcut
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -175,11 +175,10 @@ class LayersDialog(QDialog):
         self._job = None
         self.sentence.setText(sentence)
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+    def done(self, result: int) -> None:
         """Nothing goes on behind a closed window."""
         self._timer.stop()
-        self.done(0)
-        event.accept()
+        super().done(result)
 
 
 class _Picture(QWidget):

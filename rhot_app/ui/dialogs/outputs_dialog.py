@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 
 import msgspec
@@ -195,11 +196,8 @@ class OutputsDialog(QDialog):
             return
 
         def work() -> tuple[tuple[OutputSettings, ...], Rig]:
-            asker = self._connect()
-            try:
+            with contextlib.closing(self._connect()) as asker:
                 return change_outputs(asker.command, edit)
-            finally:
-                asker.close()
 
         def done(result: tuple[tuple[OutputSettings, ...], Rig]) -> None:
             before, rig = result

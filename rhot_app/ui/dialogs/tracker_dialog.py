@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -201,11 +202,8 @@ class TrackerDialog(QDialog):
 
     def _start(self, rig: Rig, work: Callable[[Asker], None], done: Callable[[], None]) -> None:
         def with_engine() -> None:
-            asker = self._connect()
-            try:
+            with contextlib.closing(self._connect()) as asker:
                 work(asker)
-            finally:
-                asker.close()
 
         self.sentence.setText(progress_text(rig))
         self._fit()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -40,11 +41,8 @@ def fit_live(fit: HandFit, path: Path | None, connect: Callable[[], Asker], list
 
     def use(hand: HandAnatomy) -> None:
         """The hand into the engine's rig and its file, which keeps what it had."""
-        asker = connect()
-        try:
+        with contextlib.closing(connect()) as asker:
             RigChange(fit.rig, msgspec.structs.replace(fit.rig, hand=hand), path, REASON).use(asker.command)
-        finally:
-            asker.close()
         fit.rig = msgspec.structs.replace(fit.rig, hand=hand)
 
     def stop() -> None:

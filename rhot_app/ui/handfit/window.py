@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from PySide6.QtCore import Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QLineEdit, QMessageBox, QWidget
 
 from rhot_app.hand.anatomy import HandAnatomy
@@ -206,15 +206,13 @@ class HandFitWindow(QDialog):
 
     def reject(self) -> None:
         """Escape and Close: ask only when something would be lost."""
-        if self.fit.unsaved and not self._may_lose():
-            return
-        self.end()
-        super().reject()
+        if not self.fit.unsaved or self._may_lose():
+            super().reject()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
-        """The window's own close button is Escape."""
-        event.ignore()
-        self.reject()
+    def done(self, result: int) -> None:
+        """What runs ends with the window."""
+        self.end()
+        super().done(result)
 
     def _may_lose(self) -> bool:
         answer = QMessageBox.question(self, TITLE, _KEEP,

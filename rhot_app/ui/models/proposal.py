@@ -15,6 +15,7 @@ from rhot_app.calibration.verdict import Verdict
 from rhot_app.engine.compilation import TITLE, compile_part, is_missing, part_of
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
+from rhot_node.files import read_input
 
 Command = Callable[..., dict[str, Any]]
 """``command(name, **arguments)`` of the engine; raises EngineError."""
@@ -213,6 +214,6 @@ def age_text(when: datetime, now: datetime | None = None) -> str:
 
 def _text(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_input(path)
     except OSError:
         return b""

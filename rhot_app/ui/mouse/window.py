@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Callable
 from typing import Final
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QComboBox, QDialog, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app.engine.status import EngineStatus
@@ -224,12 +223,11 @@ class MouseWindow(QDialog):
         self.badge.set_scheme(scheme)
         self.view.set_scheme(scheme)
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
-        """Stop listening."""
+    def done(self, result: int) -> None:
+        """Stop listening, however the window is closed."""
         self._timer.stop()
-        with contextlib.suppress(RhotError):
-            self._listener.close()
-        super().closeEvent(event)
+        self._listener.close()
+        super().done(result)
 
 
 def _button(title: str, meaning: str, action: Callable[[], None]) -> QPushButton:

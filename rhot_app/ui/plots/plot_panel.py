@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,8 @@ from rhot_app.ui.models.words import tip
 Array = NDArray[np.float64]
 
 _SIZE_PX = 11
+_pen, _brush = functools.cache(pg.mkPen), functools.cache(pg.mkBrush)
+"""By colour. pyqtgraph draws and keeps a triangle for every pen that it has not met."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +48,7 @@ class OverflowMarks:
         """Mark every run of every line above `top`."""
         found = [(line, peak) for line in lines for peak in peaks_above(seconds, line.values, top)]
         self.peaks = [(line.name, peak) for line, peak in found]
-        self._item.setData([{"pos": (peak.second, top), "brush": line.colour, "pen": line.colour,
+        self._item.setData([{"pos": (peak.second, top), "brush": _brush(line.colour), "pen": _pen(line.colour),
                              "data": (line.name, peak.value)} for line, peak in found])
 
     @property

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 from platformdirs import user_cache_path
 from PySide6.QtCore import QEvent, Qt, QUrl, Signal
-from PySide6.QtGui import QCloseEvent, QDesktopServices, QKeySequence, QShortcut
+from PySide6.QtGui import QDesktopServices, QKeySequence, QShortcut
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app.errors import RhotError
@@ -257,16 +257,12 @@ class LibraryWindow(QDialog):
                 not self.table.editing):
             self.refresh()
 
-    def reject(self) -> None:
-        """Escape closes the page."""
-        self.close()
-
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+    def done(self, result: int) -> None:
         """What was deleted is gone for good now; the work on summaries ends."""
         self.summaries.close()
         self._stop_collecting()
         self.library.empty_trash()
-        super().closeEvent(event)
+        super().done(result)
 
 
 def _collect(log: Path, rig: Rig | None, progress: Progress) -> list[Collected]:

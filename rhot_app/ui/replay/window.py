@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -44,6 +44,8 @@ _NO_STATE = Look("NO STATE", "cross", "bad", "The recording has no state at this
 
 class ReplayWindow(QMainWindow):
     """`open` tracks a recording and shows it. `tick` is one turn of the timer, so that tests can turn by hand."""
+
+    closed = Signal()
 
     def __init__(self, settings: Settings, scheme: Scheme, states: Path | None = None,
                  parent: QWidget | None = None, make_solver: Callable[[], Solver] = Solver,
@@ -287,6 +289,7 @@ class ReplayWindow(QMainWindow):
             self.replay.close()
             self.replay = None
         super().closeEvent(event)
+        self.closed.emit()
 
 
 def lasting_notices(replay: Replay | None, *, working: bool) -> list[Notice]:

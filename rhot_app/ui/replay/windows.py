@@ -35,20 +35,20 @@ class ReplayWindows:
 
     def open(self, path: Path) -> None:
         """Replay a recording, in the window that replays already if there is one."""
-        if self.window is None or not self.window.isVisible():
-            self._end_window()
+        if self.window is None:
             self.window = ReplayWindow(self._settings, self._scheme(), make_solver=self._make_solver)
+            self.window.closed.connect(self._forget_window)
         _bring_forward(self.window)
         self.window.open(path)
 
     def list(self) -> None:
         """The page with all recordings."""
-        if self.library is None or not self.library.isVisible():
-            self._end_library()
+        if self.library is None:
             self.library = LibraryWindow(self._scheme(), parent=self._parent, rig=self._rig,
                                          make_solver=self._make_solver)
             self.library.open_asked.connect(self.open)
             self.library.renamed.connect(self._follow)
+            self.library.finished.connect(self._forget_library)
         else:
             self.library.refresh()
         _bring_forward(self.library)
@@ -61,23 +61,22 @@ class ReplayWindows:
 
     def close(self) -> None:
         """Close both."""
-        self._end_window()
-        self._end_library()
+        for part in (self.window, self.library):
+            if part is not None:
+                part.close()
 
     def _follow(self, before: Path, after: Path) -> None:
         """A recording that is open was renamed."""
         if self.window is not None:
             self.window.follow(before, after)
 
-    def _end_window(self) -> None:
+    def _forget_window(self) -> None:
         if self.window is not None:
-            self.window.close()
             self.window.deleteLater()
             self.window = None
 
-    def _end_library(self) -> None:
+    def _forget_library(self) -> None:
         if self.library is not None:
-            self.library.close()
             self.library.deleteLater()
             self.library = None
 

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.geometry.camera import lens_parameters, lens_rays
 from rhot_app.project import CameraPose, Intrinsics
 from rhot_app.state import HandState
 
@@ -163,12 +164,14 @@ def frustum_lines(intrinsics: Intrinsics, pose: CameraPose, depth_m: float, up: 
     """A camera's field of view up to `depth_m` as line segments (20, 3), pairs of ends, scene frame, m.
 
     Four edges from the centre to the corners, the far rectangle, and a small roof over its top edge that says where
-    the picture's up is. Distortion is left out: at this size it cannot be seen.
+    the picture's up is. A corner without a ray is drawn as if the lens had no distortion.
     """
-    u = np.array([-0.5, intrinsics.width - 0.5, intrinsics.width - 0.5, -0.5])
-    v = np.array([-0.5, -0.5, intrinsics.height - 0.5, intrinsics.height - 0.5])
-    corners = depth_m * np.stack([(u - intrinsics.cx) / intrinsics.fx, (v - intrinsics.cy) / intrinsics.fy,
-                                  np.ones(4)], axis=1)
+    right, low = intrinsics.width - 0.5, intrinsics.height - 0.5
+    pixels = np.array([[-0.5, -0.5], [right, -0.5], [right, low], [-0.5, low]])
+    lens = lens_parameters(intrinsics)
+    rays = lens_rays(pixels, lens)
+    corners = depth_m * np.column_stack([np.where(np.isfinite(rays), rays, (pixels - lens[2:4]) / lens[:2]),
+                                         np.ones(4)])
     roof = 0.5 * (corners[0] + corners[1]) + np.array([0.0, -0.18 * np.ptp(corners[:, 1]), 0.0])
     centre = np.zeros(3)
     segments = [end for corner in corners for end in (centre, corner)]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 
 from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QLineEdit, QPushButton
 
 from rhot_app.errors import EngineError
-from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.common.job import Job
@@ -108,7 +108,7 @@ class TogetherPage(Page):
 
     def __init__(self, step: TogetherStep, states: StateFeed, kit: Kit) -> None:
         super().__init__(step)
-        self.together, self._states, self._ask = step, states, kit.connect
+        self.together, self._states, self._connect = step, states, kit.connect
         self._job: Job | None = None
         self.marker = QComboBox()
         self.marker.addItems(list(step.markers))
@@ -129,8 +129,7 @@ class TogetherPage(Page):
     def entered(self) -> None:
         """Hear the hand from now on; have a resting engine track."""
         self._states.start()
-        self._job = Job(lambda progress: _start_tracking(self._ask()), lambda _: None, self._refused, None,
-                        self).start()
+        self._job = Job(lambda progress: self._start_tracking(), lambda _: None, self._refused, None, self).start()
 
     def show_view(self, view: StepView) -> None:
         """The button's word."""
@@ -150,10 +149,7 @@ class TogetherPage(Page):
         self.together.problem = sentence
         self.changed.emit()
 
-
-def _start_tracking(asker: Asker) -> None:
-    try:
-        if not asker.command("hello").get("running", True):
-            asker.command("start")
-    finally:
-        asker.close()
+    def _start_tracking(self) -> None:
+        with contextlib.closing(self._connect()) as asker:
+            if not asker.command("hello").get("running", True):
+                asker.command("start")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
@@ -182,13 +183,9 @@ class Tryout(QObject):
             self._job = Job(lambda progress: self._send(wanted), self._sent, self._failed, None, self).start()
 
     def _send(self, wanted: dict[int, Settings]) -> None:
-        with self._lock:
-            asker = self._connect()
-            try:
-                for node_id, settings in wanted.items():
-                    try_settings(asker, node_id, settings)
-            finally:
-                asker.close()
+        with self._lock, contextlib.closing(self._connect()) as asker:
+            for node_id, settings in wanted.items():
+                try_settings(asker, node_id, settings)
 
     def _sent(self, _: None) -> None:
         self._job = None
@@ -204,16 +201,12 @@ class Tryout(QObject):
         """Have every node that was told anything go by `before` again; waits, so call it in a worker. A node that does
         not answer is left: what was tried out ends with its process."""
         self._wanted = {}
-        with self._lock:
-            asker = self._connect()
-            try:
-                for node_id in sorted(self._tried):
-                    try:
-                        try_settings(asker, node_id, before[node_id])
-                    except RhotError:
-                        continue
-            finally:
-                asker.close()
+        with self._lock, contextlib.closing(self._connect()) as asker:
+            for node_id in sorted(self._tried):
+                try:
+                    try_settings(asker, node_id, before[node_id])
+                except RhotError:
+                    continue
 
 
 def try_settings(asker: Asker, node_id: int, settings: Settings) -> None:

@@ -17,7 +17,7 @@ from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, LearningStep, 
 def make_plan(kit: Kit) -> Plan:
     """The wizard's pages for the rig at hand."""
     cameras = {node.name: node.node_id for node in kit.rig.nodes if node.node_id in kit.node_settings}
-    empty, skin = EmptyStep(cameras), SkinStep(cameras, lambda: kit.connect().command)
+    empty, skin = EmptyStep(cameras), SkinStep(cameras, kit.connect)
     accept = AcceptStep(lambda: propose(empty, skin), missing="Learn the empty scene and your hand first.")
     pages = (LearnPage(empty, kit, "Learn the empty scene"), LearnPage(skin, kit, "Learn my skin"),
              AcceptPage(accept, kit.scheme))
@@ -27,13 +27,10 @@ def make_plan(kit: Kit) -> Plan:
         for step in (empty, skin):
             step.stop()
         if accept.state != "used" and (empty.tried or skin.tried):
-            asker = kit.connect()
-            try:
+            with contextlib.closing(kit.connect()) as asker:
                 for node_id in cameras.values():
                     with contextlib.suppress(RhotError):  # a node that is gone has forgotten it anyway
                         ask_node(asker.command, node_id, "revert_foreground")
-            finally:
-                asker.close()
 
     return Plan("Background and skin", pages, put_back=put_back)
 
@@ -65,11 +62,8 @@ class LearnPage(Page):
         self.learn_button.setEnabled(self._job is None and bool(self._learning.nodes))
 
     def _ask(self) -> str:
-        asker = self._kit.connect()
-        try:
+        with contextlib.closing(self._kit.connect()) as asker:
             return self._learning.learn(asker.command)
-        finally:
-            asker.close()
 
     def _learnt(self, problem: str) -> None:
         self._job = None

@@ -110,14 +110,11 @@ class Launcher(QObject):
     def _look(self, wizard: Wizard | None) -> RigNow:
         if wizard is not None:
             wizard.load()
-        asker = self._connect()
-        try:
+        with contextlib.closing(self._connect()) as asker:
             answer = asker.command("rig")
             path = str(answer.get("path", ""))
             rig = parse_rig(msgspec.json.encode(answer["document"]), path or "the engine's rig")
             settings = _node_settings(asker, rig) if wizard is not None else {}
-        finally:
-            asker.close()
         return RigNow(rig, Path(path) if path else None, settings)
 
     def _show(self, wizard: Wizard, now: RigNow) -> None:
@@ -155,8 +152,13 @@ class Launcher(QObject):
             return
         self.versions = VersionsDialog(now.path, now.rig, self._connect, self._scheme(), self._window)
         self.versions.rig_used.connect(lambda rig: self.rig_used.emit())
-        self.versions.finished.connect(self.versions.deleteLater)
+        self.versions.finished.connect(self._forget_versions)
         self.versions.open()
+
+    def _forget_versions(self) -> None:
+        if self.versions is not None:
+            self.versions.deleteLater()
+            self.versions = None
 
     def _begin_fit(self) -> tuple[RigNow, HandFit]:
         from rhot_app.handfit.session import HandFit, warm_up
@@ -280,16 +282,13 @@ class VersionsDialog(QDialog):
             self._job = Job(lambda progress: self._restore(version), self._restored, self._failed, None, self).start()
 
     def _restore(self, version: Version) -> Rig:
-        asker = self._connect()
-        try:
+        with contextlib.closing(self._connect()) as asker:
             set_rig(asker.command, rig_history.load_version(self._path, version))
             try:
                 return rig_history.restore(self._path, version)
             except RhotError:
                 set_rig(asker.command, self._rig)
                 raise
-        finally:
-            asker.close()
 
     def _restored(self, rig: Rig) -> None:
         self._job = None

@@ -1,4 +1,4 @@
-"""Wizards' windows on a rig without processes; all are closed in the end."""
+"""Wizards' windows on a rig without processes; all are closed in the end, and every client with them."""
 
 from __future__ import annotations
 
@@ -25,13 +25,14 @@ def wizards(folder):
         kit = Kit(asker.rig, path, asker.connect, DARK, FakeMemory(), asker.told, listen, make_solver)
         hands = Hands(WizardWindow(make_plan(kit), kit))
         hands.path, hands.asker, hands.rig, hands.memory = path, asker, asker.rig, kit.memory
-        opened.append(hands.window)
+        opened.append(hands)
         return hands
 
     yield open_
-    for window in opened:
-        assert window.end().wait(PATIENCE_S)
-        window.deleteLater()
+    for hands in opened:
+        assert hands.window.end().wait(PATIENCE_S)
+        hands.until(lambda asker=hands.asker: asker.connected == asker.closed)
+        hands.window.deleteLater()
 
 
 @pytest.fixture

@@ -179,14 +179,14 @@ def test_the_verdict_names_what_is_wrong_with_a_mask(boxes, code):
 
 # -- a node that fails when it should keep something, or bring it back ---------------------------------------------
 
-def both_learnt(nodes, command):
+def both_learnt(nodes):
     """The proposal of a scene and a hand that both nodes have learnt."""
     cameras = {node.name: node.node_id for node in nodes.rig.nodes}
-    empty, skin = EmptyStep(cameras), SkinStep(cameras, lambda: command)
+    empty, skin = EmptyStep(cameras), SkinStep(cameras, nodes.connect)
     for step, hand in ((empty, False), (skin, True)):
         nodes.hand = hand
         step.begin()
-        step.finish(step.learn(command))
+        step.finish(step.learn(nodes.command))
     skin.take(skin.see(dict.fromkeys(cameras)))
     return propose(empty, skin)
 
@@ -196,7 +196,7 @@ def known(nodes):
 
 
 def test_what_one_node_cannot_keep_no_node_keeps_and_it_can_be_used_again(nodes):
-    proposal = both_learnt(nodes, nodes.command)
+    proposal = both_learnt(nodes)
     nodes.failing = [(2, "save_foreground")]
     with pytest.raises(EngineError, match="node 2 does not answer"):
         proposal.use(nodes.command)
@@ -211,7 +211,7 @@ def test_what_one_node_cannot_keep_no_node_keeps_and_it_can_be_used_again(nodes)
 
 
 def test_a_node_that_cannot_take_it_back_is_named_and_the_others_do(nodes):
-    proposal = both_learnt(nodes, nodes.command)
+    proposal = both_learnt(nodes)
     nodes.failing = [(2, "save_foreground"), (1, "revert_foreground")]
     with pytest.raises(EngineError, match="left still has what was learnt now"):
         proposal.use(nodes.command)

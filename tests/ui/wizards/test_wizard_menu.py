@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import threading
-from pathlib import Path
 
 import msgspec
 import pytest
 import sample_wizard
-from fake_backend import FakeBackend
 from fake_engine import synthetic_rig
 from patience import eventually
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from screen_pictures import check
 from wizard_hands import Hands
-from wizard_rig import FakeRigAsker
+from wizard_rig import RigBackend
 
 from rhot_app import rig_history
 from rhot_app.engine.status import Advice
-from rhot_app.project import load_rig, save_rig
+from rhot_app.project import load_rig
 from rhot_app.ui import actions, main_window
-from rhot_app.ui.backend.contract import Opened
 from rhot_app.ui.models.rows import rig_rows
 from rhot_app.ui.wizards import launcher
 from rhot_app.ui.wizards.framework import plan
@@ -39,24 +36,6 @@ class SampleWizard(Wizard):
 
 
 SAMPLE = (SampleWizard("sample", "Sample", "A small wizard.", "lens calibration"),)
-
-
-class RigBackend(FakeBackend):
-    """A fake engine whose rig has a file, and which answers the wizards' questions."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.path = path
-        self.rig_asker = FakeRigAsker(self.engine.rig)
-        self.rig_asker.path = str(path)
-        self.engine.rig_path = str(path)
-        save_rig(path, self.engine.rig)
-
-    def asker(self):
-        return self.rig_asker
-
-    def _opened(self, path, *, simulated):
-        return Opened(self.engine.rig, str(self.path), self.engine.running, self.ours, simulated)
 
 
 @pytest.fixture

@@ -5,14 +5,17 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import cv2
 import msgspec
 import numpy as np
+from fake_backend import FakeBackend
 
 from rhot_app.errors import EngineError
-from rhot_app.project import Rig, parse_rig
+from rhot_app.project import Rig, parse_rig, save_rig
+from rhot_app.ui.backend.contract import Opened
 from rhot_node.config import NodeSettings, changed_settings
 
 Draw = Callable[[int, float], np.ndarray]
@@ -45,8 +48,9 @@ class FakeRigAsker:
         self.commands: list[str] = []
         self.settings = {node.node_id: NodeSettings(node.node_id, node.name, rig.markers) for node in rig.nodes}
         self.path = ""
+        self.answers: dict[str, dict[str, Any]] = {}  # to other commands
         self.saved: list[int] = []
-        self.closed = 0
+        self.connected = self.closed = 0
         self.number = 0
         self._sent: dict[int, tuple[np.ndarray, bytes]] = {}  # the last picture of each node and its JPEG
         self._lock = threading.Lock()
@@ -58,6 +62,7 @@ class FakeRigAsker:
 
     def connect(self) -> FakeRigAsker:
         """One asker for everybody."""
+        self.connected += 1
         return self
 
     def close(self) -> None:
@@ -79,7 +84,7 @@ class FakeRigAsker:
             return {"document": msgspec.to_builtins(self.rig), "path": self.path}
         if name == "node":
             return {"answer": self._node(arguments["node_id"], arguments["request"])}
-        return {}
+        return self.answers.get(name, {})
 
     def _still(self, node_id: int, number: int) -> dict[str, Any]:
         now_s = time.monotonic()
@@ -97,3 +102,21 @@ class FakeRigAsker:
                 self.saved.append(node_id)
             return {"restart": []}
         return {"settings": self.told[node_id]}
+
+
+class RigBackend(FakeBackend):
+    """A fake engine whose rig has a file, and which answers the wizards' questions."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.path = path
+        self.rig_asker = FakeRigAsker(self.engine.rig)
+        self.rig_asker.path = str(path)
+        self.engine.rig_path = str(path)
+        save_rig(path, self.engine.rig)
+
+    def asker(self):
+        return self.rig_asker
+
+    def _opened(self, path, *, simulated):
+        return Opened(self.engine.rig, str(self.path), self.engine.running, self.ours, simulated)

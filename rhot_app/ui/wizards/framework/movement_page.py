@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -62,16 +63,13 @@ class MovementPage(Page):
                             self).start()
 
     def _ask(self, request: Request) -> None:
-        asker = self._connect()
-        try:
+        with contextlib.closing(self._connect()) as asker:
             if request.kind == "end":
                 asker.command("record_stop")
             else:
                 if not asker.command("hello").get("running", True):
                     asker.command("start")
                 asker.command("record", path=str(request.path))
-        finally:
-            asker.close()
 
     def _answered(self, request: Request) -> None:
         self.movement.answered(request)
@@ -118,9 +116,6 @@ class Movements:
         """End a recording that still runs, and throw the logs away. In a worker."""
         self.states.stop()
         if any(step.phase in ("beginning", "recording", "ending") for step in self._steps):
-            asker = self._connect()
-            try:
+            with contextlib.closing(self._connect()) as asker:
                 asker.command("record_stop")
-            finally:
-                asker.close()
         shutil.rmtree(self.folder, ignore_errors=True)

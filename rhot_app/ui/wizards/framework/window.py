@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QLineEdit, QMessageBox, QWidget
 
 from rhot_app.ui.backend.feed import LiveFeed, Picture
@@ -142,11 +143,8 @@ class WizardWindow(QDialog):
         self.refresh()
 
     def _carry_out(self, step: AcceptStep, outcome: State) -> None:
-        asker = self._kit.connect()
-        try:
+        with contextlib.closing(self._kit.connect()) as asker:
             (step.apply if outcome == "used" else step.take_back)(asker.command)
-        finally:
-            asker.close()
 
     def _applied(self, step: AcceptStep, outcome: State) -> None:
         self._job = None
@@ -234,18 +232,12 @@ class WizardWindow(QDialog):
     def reject(self) -> None:
         """Escape and Close: ask only when something would be lost."""
         if not self.busy and (not self.would_lose or self._may_lose()):
-            self.end()
             super().reject()
 
-    def accept(self) -> None:
-        """Close after use."""
+    def done(self, result: int) -> None:
+        """What runs ends with the window."""
         self.end()
-        super().accept()
-
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
-        """The window's own close button is Escape; when the app itself ends, nothing is asked."""
-        event.ignore()
-        self.reject()
+        super().done(result)
 
     def _may_lose(self) -> bool:
         answer = QMessageBox.question(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
 import time
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, judged_anew, told_apart
 from rhot_app.errors import EngineError, RhotError
+from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import ask_picture
 from rhot_app.ui.models.proposal import Command, Proposal, Row
 from rhot_app.ui.wizards.models.drawing import Layer, Overlay
@@ -209,12 +211,10 @@ class SkinStep(LearningStep):
     title = "Your hand"
     watches = True
 
-    def __init__(self, cameras: Mapping[str, int], command: Callable[[], Command]) -> None:
-        """`command`: gives the engine's, for the thread that looks at pictures."""
+    def __init__(self, cameras: Mapping[str, int], connect: Callable[[], Asker]) -> None:
         super().__init__(cameras)
         self.masks: dict[str, Mask] = {}
-        self._command = command
-        self._asker: Command | None = None
+        self._connect = connect
 
     def learn(self, command: Command) -> str:
         """The next picture's skin of each camera."""
@@ -230,14 +230,13 @@ class SkinStep(LearningStep):
 
     def see(self, pictures: Pictures) -> dict[str, Mask]:
         """What each node takes for the hand now."""
-        self._asker = self._asker or self._command()
         found = {}
-        for name in pictures:
-            if name in self.nodes:
-                try:
-                    found[name] = mask_of(ask_node(self._asker, self.nodes[name], "foreground_mask").get("data", b""))
-                except RhotError:
-                    continue  # its picture says what is wrong
+        with contextlib.closing(self._connect()) as asker:
+            for name in pictures:
+                if name in self.nodes:
+                    with contextlib.suppress(RhotError):  # its picture says what is wrong
+                        answer = ask_node(asker.command, self.nodes[name], "foreground_mask")
+                        found[name] = mask_of(answer.get("data", b""))
         return found
 
     def take(self, seen: dict[str, Mask]) -> None:

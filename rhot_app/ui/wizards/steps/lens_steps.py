@@ -270,6 +270,5 @@ def _rows(before: Rig, after: Rig, camera: str, report: IntrinsicsReport) -> tup
     rows = [Row(name, old[name], text.removesuffix(" px") + certain[name] if name in certain else text)
             for name, text in new.items()]
     rows.append(Row("corners, rms", "", f"{report.rms_px:.2f} px over {len(report.views)} views"))
-    rows.append(Row(f"error expected at {WORKING_DISTANCE_M:g} m", "", f"{1e3 * report.errors.typical_m:.2f} mm, "
-                    f"{1e3 * report.errors.worst_m:.2f} mm in the corners"))
+    rows.append(Row(f"error expected at {WORKING_DISTANCE_M:g} m", "", str(report.errors)))
     return tuple(rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
@@ -55,13 +56,10 @@ class EngineFeed:
             self.problem = str(exc)
 
     def _run(self) -> None:
-        asker = self._connect()
-        try:
+        with contextlib.closing(self._connect()) as asker:
             while not self._ending.is_set():
                 self.step(asker)
                 self._ending.wait(self._period_s)
-        finally:
-            asker.close()
 
 
 class MoveStep(Step):

@@ -1,0 +1,183 @@
+"""Every wizard, dialog and window is opened and closed again and again: nothing hangs, and nothing of them stays."""
+
+from __future__ import annotations
+
+import gc
+import os
+import threading
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from person import wait
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication, QDialog
+from wizard_rig import RigBackend
+
+from rhot_app.sources.discovery import Search
+from rhot_app.ui.dialogs import dialogs
+from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
+from rhot_app.ui.main_window import MainWindow
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards.framework.plan import WIZARDS, Wizard
+
+ROUNDS, MANY = 3, 100
+MOST_GROWTH = 0.05  # of the memory after a tenth of the rounds
+
+
+class Borrowed:
+    """A client that its backend misses until it is closed."""
+
+    def __init__(self, client: Any, missed: set[Borrowed]) -> None:
+        self._client, self._missed = client, missed
+        missed.add(self)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._client, name)
+
+    def close(self) -> None:
+        self._missed.discard(self)
+        self._client.close()
+
+
+class LendingBackend(RigBackend):
+    """`missed`: the clients that nobody has closed yet."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.missed: set[Borrowed] = set()
+        self.rig_asker.answers = {"refined": {"known": False}, "adapted": {"known": False}}
+
+    def asker(self) -> Any:
+        return Borrowed(super().asker(), self.missed)
+
+    def client(self) -> Any:
+        return Borrowed(super().client(), self.missed)
+
+
+# -- what can be opened ------------------------------------------------------------------------------------------------
+
+@dataclass(frozen=True)
+class Opener:
+    """How something is opened, and where it is found while it is open."""
+
+    name: str
+    open: Callable[[MainWindow], Any]
+    find: Callable[[MainWindow], Any]
+
+
+def wizard(one: Wizard) -> Opener:
+    return Opener(one.module, lambda window: window.wizards.open(one), lambda window: window.wizards.wizard)
+
+
+def dialog(name: str, open_: Callable[[MainWindow], Any]) -> Opener:
+    return Opener(name, open_, lambda window: getattr(window.dialogs, name))
+
+
+def at_top(kind: type) -> Callable[[MainWindow], Any]:
+    """Finds a window of that kind."""
+    return lambda window: next((one for one in QApplication.topLevelWidgets() if isinstance(one, kind)), None)
+
+
+OPENERS = (
+    *map(wizard, WIZARDS),
+    dialog("tracker", lambda window: window.actions_.tracker.trigger()),
+    dialog("outputs", lambda window: window.actions_.outputs.trigger()),
+    dialog("mouse", lambda window: window.actions_.mouse.trigger()),
+    dialog("layers", lambda window: window.actions_.layers.trigger()),
+    dialog("guide", lambda window: window.actions_.guide.trigger()),
+    Opener("versions", lambda window: window.wizards.open_versions(), lambda window: window.wizards.versions),
+    Opener("fit", lambda window: window.wizards.open_fit(), lambda window: window.wizards.fit),
+    Opener("recordings", lambda window: window.replays.list(), lambda window: window.replays.library),
+    Opener("replay", lambda window: window.replays.open(Path("none.rhotlog")), lambda window: window.replays.window),
+    Opener("rig", lambda window: window.show_rig_file("hand"), at_top(dialogs.RigDialog)),
+    dialog("export", lambda window: window.dialogs.export_recording()))
+
+
+# -- rounds ------------------------------------------------------------------------------------------------------------
+
+def open_and_close(window: MainWindow, opener: Opener, *, escape: bool) -> weakref.ref[Any]:
+    """One round; a reference to what was opened."""
+    opener.open(window)
+    wait(lambda: (shown := opener.find(window)) is not None and shown.isVisible(), told=lambda: opener.name)
+    opened = opener.find(window)
+    if escape and isinstance(opened, QDialog):
+        opened.reject()
+    else:
+        opened.close()
+    reference = weakref.ref(opened)
+    del opened
+    wait(lambda: opener.find(window) is None, told=lambda: f"{opener.name} stays")
+    return reference
+
+
+def held(backend: LendingBackend) -> tuple[list[str], int]:
+    """Names of the threads, and how many clients nobody has closed."""
+    return sorted(thread.name for thread in threading.enumerate()), len(backend.missed)
+
+
+def descriptors() -> list[str]:
+    return os.listdir("/proc/self/fd")  # noqa: PTH208
+
+
+def memory_mb() -> float:
+    """Of this process, without the files that it maps."""
+    line = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("RssAnon"))
+    return int(line.split()[1]) / 1024
+
+
+@pytest.fixture(scope="module")
+def lending(make_shared_bench, tmp_path_factory):
+    """The main window on a backend that knows its clients, at rest: nothing is drawn or compiled beside the test."""
+    bench = make_shared_bench(LendingBackend(tmp_path_factory.mktemp("rig") / "desk.json"))
+    bench.track()
+    bench.backend.engine.running = False
+    bench.until(lambda: not bench.controller.running)
+    bench.rest = held(bench.backend)
+    return bench
+
+
+def settle(bench: Any) -> int:
+    """Wait until the window holds no more than it did alone; the number of its descriptors."""
+    wait(lambda: held(bench.backend) == bench.rest, told=lambda: f"{bench.rest} became {held(bench.backend)}")
+    gc.collect()
+    return len(descriptors())
+
+
+@pytest.mark.parametrize("opener", OPENERS, ids=lambda opener: opener.name)
+def test_nothing_stays_of_what_was_closed(lending, opener):
+    open_and_close(lending.window, opener, escape=False)
+    before = settle(lending)
+    for number in range(1, ROUNDS):
+        gone = open_and_close(lending.window, opener, escape=number % 2 == 1)
+    wait(lambda: settle(lending) == before and gone() is None, told=lambda: f"{before} became {descriptors()}")
+
+
+def test_a_dialog_that_is_waited_for_does_not_stay(lending, monkeypatch):
+    made = []
+
+    def make(scheme, parent):
+        dialog = NodesDialog(scheme, parent, lambda progress: Search((), (), ()), lambda addresses: [])
+        QTimer.singleShot(0, dialog.reject)
+        made.append(weakref.ref(dialog))
+        return dialog
+
+    monkeypatch.setattr(dialogs, "NodesDialog", make)
+    assert lending.window.dialogs.connect_nodes(DARK) is None
+    wait(lambda: settle(lending) and made[0]() is None)
+
+
+@pytest.mark.study("rhot_app/ui")
+@pytest.mark.timeout(3600)
+def test_a_hundred_rounds_through_all_windows_leave_nothing(lending):
+    for number in range(1, MANY + 1):
+        for opener in OPENERS:
+            open_and_close(lending.window, opener, escape=number % 2 == 1)
+        if number == MANY // 10:
+            before, before_mb = settle(lending), memory_mb()
+    wait(lambda: settle(lending) == before, told=lambda: f"{before} became {descriptors()}")
+    print(f"{before_mb:.1f} MB after {MANY // 10} rounds, {memory_mb():.1f} MB after {MANY}")
+    assert memory_mb() < (1.0 + MOST_GROWTH) * before_mb
