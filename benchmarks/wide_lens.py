@@ -136,7 +136,7 @@ def main() -> int:
     parser.add_argument("--across", type=float, default=120.0, help="degrees that the lens sees across")
     args = parser.parse_args()
     worst, results = measured(args)
-    (reference, narrow), *wide = results.items()
+    (_, narrow), *wide = results.items()
     ratios = [found[tracker]["tip_visible_mm"] / narrow[tracker]["tip_visible_mm"]  # type: ignore[operator]
               for _, found in wide for tracker in TRACKERS]
     publish(args, {"calibration": worst, "tracking": results},

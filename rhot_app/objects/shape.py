@@ -248,11 +248,13 @@ class _Beside:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
-    def get(self, name: str) -> bytes:
+    def __getitem__(self, name: str) -> bytes:
         """The bytes of a file."""
         if Path(name).name != name:
             raise OSError(f"{printable(name)} is not a file beside it")
         return read_input(self._folder / name, MESH_BYTES_MAX)
+
+    get = __getitem__  # which of the two is asked depends on the release
 
 
 def require_size(size_m: Array, where: str) -> None:

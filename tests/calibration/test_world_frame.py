@@ -84,7 +84,7 @@ def test_a_camera_that_looks_up_is_noticed() -> None:
     twin = over_table(down_deg=15.0)
     upward = np.array([rigid(exp_so3([-np.radians(18.0), 0.0, 0.0]), np.zeros(3)) @ pose
                        for pose in twin.camera_from_world])
-    twin = replace(twin, camera_from_world=upward, lenses=LENSES * [0.6, 0.6, 1, 1, 0, 0, 0, 0, 0])
+    twin = replace(twin, camera_from_world=upward, lenses=LENSES * ([0.6, 0.6, 1, 1] + 8 * [0]))
     frame = place_world(seen(twin), BOARD, as_calibrated(twin), NAMES)
     assert frame.verdict.codes == {"gravity"}
     assert np.degrees(frame.stances[0].down_rad) == pytest.approx(-3.0, abs=0.01)

@@ -67,7 +67,7 @@ def test_a_recording_of_a_motions_name_is_another_motion(tmp_path: Path) -> None
                                    ("--seconds", "1.01"), ("--seed", "-1"),
                                    ("--frames", "somewhere"), ("--detector", "reference"), ("--motions", "flight"),
                                    ("--motions", "rest,"), ("--motion", "rest"), ("--recording", "nowhere.tsv"),
-                                   ("--seconds", "inf"), ("--lamp", "0.1"), ("--background", "clutter"),
+                                   ("--lamp", "0.1"), ("--background", "clutter"),
                                    ("--distance", "0"), ("--logs", __file__), ("--logs", f"{__file__}/logs")])
 def test_what_cannot_be_compared_is_said(wrong: tuple[str, str], tmp_path: Path,
                                          capsys: pytest.CaptureFixture[str]) -> None:

@@ -178,11 +178,12 @@ def test_mistakes_have_a_sentence(recorded: Recorded, tmp_path: Path, monkeypatc
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("rate", ["0", "abc"])
-def test_a_rate_is_a_number_above_0(recorded: Recorded, rate: str, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("rate", "said"), [("0", "0 is not a number above 0"), ("abc", "abc is not a finite number")])
+def test_a_rate_is_a_number_above_0(recorded: Recorded, rate: str, said: str,
+                                    capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
         main(recorded.arguments("--fps", rate))
-    assert f"--fps: {rate} is not a number above 0" in capsys.readouterr().err
+    assert f"--fps: {said}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("content", "says"), [(None, "no such file"), (b"no video", "Is it a video"),
