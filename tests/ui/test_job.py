@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 import threading
+import weakref
 
 import pytest
 import shiboken6
@@ -102,3 +104,24 @@ workers().submit(start)
 assert done.wait(20)
 """
     assert subprocess.check_output([sys.executable, "-c", program], text=True).strip() == "0"
+
+
+def test_a_job_whose_parent_is_deleted_holds_nothing(qtbot):
+    begun, may_end = threading.Event(), threading.Event()
+
+    class Asker(QObject):
+        def done(self, result):
+            raise AssertionError("the window is gone")
+
+    def work(progress):
+        begun.set()
+        may_end.wait(60.0)
+
+    asker = Asker()
+    job = Job(work, asker.done, asker.done, None, asker).start()
+    assert begun.wait(60.0)
+    gone = weakref.ref(asker)
+    asker.deleteLater()
+    del asker, job
+    may_end.set()
+    qtbot.waitUntil(lambda: gc.collect() >= 0 and gone() is None, timeout=60_000)

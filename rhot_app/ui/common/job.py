@@ -83,7 +83,7 @@ class Job(QObject):
     _finished = Signal(object)
     _broke = Signal(str)
     _stopped = Signal()
-    _under_way: ClassVar[set[Job]] = set()  # a job lives until its last word has been heard
+    _under_way: ClassVar[dict[int, Job]] = {}  # a job lives until its last word has been heard, or its parent ends
 
     def __init__(self, op: Callable[[Progress], Any], done: Callable[[Any], None], failed: Callable[[str], None],
                  progress: Callable[[str, float], None] | None = None, parent: QObject | None = None) -> None:
@@ -95,11 +95,12 @@ class Job(QObject):
         self._broke.connect(self._on_failed, queued)
         self._reported.connect(self._on_progress, queued)
         self._stopped.connect(self._on_stopped, queued)
+        self.destroyed.connect(functools.partial(_forget, id(self)))
         self._ended = threading.Event()
 
     def start(self) -> Job:
         """Begin; returns itself."""
-        Job._under_way.add(self)
+        Job._under_way[id(self)] = self
         workers().submit(self._run)
         return self
 
@@ -133,7 +134,7 @@ class Job(QObject):
             _emit(self._stopped)
 
     def _on_stopped(self) -> None:
-        Job._under_way.discard(self)
+        _forget(id(self))
         self.deleteLater()  # or its parent would keep every job that it ever had
 
     def _on_done(self, result: Any) -> None:
@@ -147,6 +148,10 @@ class Job(QObject):
     def _on_progress(self, text: str, fraction: float) -> None:
         if self._show is not None and not self.progress.cancelled:
             self._show(text, fraction)
+
+
+def _forget(number: int, _deleted: QObject | None = None) -> None:
+    Job._under_way.pop(number, None)
 
 
 def _emit(signal: SignalInstance, *values: object) -> None:
