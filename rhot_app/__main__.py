@@ -62,7 +62,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     take_losses()
     with printable_output():
         try:
-            code = _run(arguments)
+            module, parsed = parse(arguments)
+            code = int(module.run(parsed))
             losses = take_losses()
             for sentence in losses:
                 print(f"rhot: {sentence}", file=sys.stderr)
@@ -80,7 +81,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 2
 
 
-def _run(arguments: list[str]) -> int:
+def parse(arguments: list[str]) -> tuple[ModuleType, argparse.Namespace]:
+    """The module that runs a command, and its arguments; what is strange among them ends the program."""
     arguments = _command_first(arguments)
     name = next((argument for argument in arguments if not argument.startswith("-")), None)
     chosen = SUBCOMMANDS.get(name or "")
@@ -113,7 +115,7 @@ def _run(arguments: list[str]) -> int:
     if strange:
         what = "option" if strange[0].startswith("-") else "argument"
         asked.error(f"there is no {what} {strange[0]!r} here{_meant(strange[0].split('=')[0], options)}")
-    return int(module.run(parsed))
+    return module, parsed
 
 
 def _command_first(arguments: list[str]) -> list[str]:

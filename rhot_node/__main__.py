@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 from rhot_node.commands import COMMANDS, HELP, run_command
 from rhot_node.errors import NodeError, system_sentence
-from rhot_node.terminal import printable_output
+from rhot_node.terminal import add_examples, printable_output
 
 if TYPE_CHECKING:
     from rhot_node.config import NodeSettings
@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             if arguments and arguments[0] in COMMANDS:
                 return run_command(arguments[0], arguments[1:])
-            return _serve(_parse(arguments))
+            return _serve(daemon_parser().parse_args(arguments))
         except NodeError as exc:
             print(f"rhot-node: {exc}", file=sys.stderr)
             return 2
@@ -94,10 +94,11 @@ def _hide_scipy() -> None:
     sys.modules["scipy"] = None  # type: ignore[assignment]
 
 
-def _parse(arguments: list[str]) -> argparse.Namespace:
+def daemon_parser() -> argparse.ArgumentParser:
+    """The arguments of the node itself."""
     from rhot_node.capture.open import SPEC_HELP
     parser = argparse.ArgumentParser(
-        prog="rhot-node", formatter_class=argparse.RawDescriptionHelpFormatter,
+        prog="rhot-node",
         description="A camera node: finds the markers in every frame and streams them to the master by UDP.\n\n"
                     f"{HELP}",
         epilog=f"{SPEC_HELP}\n\n{ENDING_HELP}")
@@ -108,7 +109,9 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--exit-with-parent", action="store_true", help="end when the starting process ends")
     parser.add_argument("--log-level", default="info", choices=("debug", "info", "warning", "error"),
                         help="what is written to standard error (default: info)")
-    return parser.parse_args(arguments)
+    add_examples(parser, "rhot-node --settings left.json --camera pi",
+                 "rhot-node --settings left.json --camera hand.mp4?rate=max --loop")
+    return parser
 
 
 def _serve(options: argparse.Namespace) -> int:

@@ -1,7 +1,8 @@
-"""What commands print: safe for a terminal, whatever names and answers of others it repeats."""
+"""What commands print: examples at the end of their help, and text that is safe for a terminal."""
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import re
 import sys
@@ -11,6 +12,20 @@ from typing import Any, TextIO, cast
 _UNSAFE = re.compile(r"[^\n\t\x20-\x7e\xa0-\u2027\u202f-\u2065\u206a-\ud7ff\ue000-\U0010ffff]")
 """Control characters, which may move the cursor or the window's title, those that turn the direction of writing, and
 halves of characters, which no encoding has."""
+
+
+class HelpFormatter(argparse.HelpFormatter):
+    """Wraps a sentence to the terminal's width; text of several lines stays as it is laid out."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return text if "\n" in text else super()._fill_text(text, width, indent)
+
+
+def add_examples(parser: argparse.ArgumentParser, first: str, second: str) -> None:
+    """End what ``--help`` prints with two commands that a person can give, the plain one first."""
+    parser.formatter_class = HelpFormatter
+    examples = f"examples:\n  {first}\n  {second}"
+    parser.epilog = f"{parser.epilog}\n\n{examples}" if parser.epilog else examples
 
 
 class PrintableStream:

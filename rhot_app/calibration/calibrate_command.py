@@ -8,6 +8,7 @@ import sys
 from types import ModuleType
 
 from rhot_node.compiled import announce_compilation
+from rhot_node.terminal import add_examples
 
 KINDS: dict[str, str] = {
     "bones": "the hand's bones and where the markers sit, from a minute of free movement or a ruler",
@@ -21,6 +22,9 @@ KINDS: dict[str, str] = {
 }
 """Name of each calibration, and what it is for."""
 
+ALIASES = {"lens": "intrinsics", "together": "stereo", "tracker": "alignment"}
+"""Other words for a calibration, and its name."""
+
 _ELSEWHERE = {"alignment": "rhot_app.objects.alignment.alignment_command"}
 """Modules of calibrations that do not stand in `commands` under their name."""
 
@@ -29,8 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """One subcommand per calibration."""
     kinds = parser.add_subparsers(dest="kind", metavar="KIND", title="kinds")
     for kind, summary in KINDS.items():
-        room = kinds.add_parser(kind, help=summary, description=f"Calibrate {summary}.")
+        room = kinds.add_parser(kind, help=summary, description=f"Calibrate {summary}.",
+                                aliases=[word for word, meant in ALIASES.items() if meant == kind])
         _module(kind).add_arguments(room)
+    add_examples(parser, "rhot calibrate intrinsics --images 'left*.jpg' --out left.json",
+                 "rhot calibrate stereo --left 'left*.jpg' --right 'right*.jpg' --out desk.json")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -40,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"rhot calibrate KIND, one of:\n{rows}\n`rhot calibrate KIND --help` has its options.", file=sys.stderr)
         return 2
     announce_compilation()
-    return int(_module(args.kind).run(args))
+    return int(_module(ALIASES.get(args.kind, args.kind)).run(args))
 
 
 def _module(kind: str) -> ModuleType:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from rhot_app.errors import CertificateError, finite, input_file, whole
 from rhot_node.compiled import announce_compilation
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.certificate.document import Certificate
@@ -48,6 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--compare", type=Path, nargs=2, default=None, metavar=("OLD", "NEW"),
                         help="two certificates (their folders or JSON files): what changed beyond the intervals")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_examples(parser, "rhot certify --rig desk.json --facing palm --keep recordings",
+                 "rhot certify --simulated --sketched --out certificate")
 
 
 def run(args: argparse.Namespace) -> int:

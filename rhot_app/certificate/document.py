@@ -75,7 +75,7 @@ class Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def not_measured(code: str, title: str, why: str, remedy: str, figures: tuple[Figure, ...] = (),
                  curves: dict[str, list[float | None]] | None = None) -> Line:
     """A line whose step is missing, showed nothing, or too little to agree with anything: then with what it showed."""
-    return Line(code, title, "not measured", f"Not measured: {why}", remedy=remedy, figures=figures,
+    return Line(code, title, "not measured", f"{why[0].upper()}{why[1:]}", remedy=remedy, figures=figures,
                 curves=curves or {})
 
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from rhot_app.engine.directory import default_directory
 from rhot_app.errors import EngineError, RigError, input_file
 from rhot_app.outputs.spec import HELP, WEB_PORT, parse_output, web_settings
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.engine.serve import Serving
@@ -37,6 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_serving_arguments(parser)
     parser.add_argument("--json", action="store_true",
                         help="print one JSON object on standard output when ready: pid, directory, rig")
+    add_examples(parser, "rhot engine --rig desk.json --start --record wave.rhotlog",
+                 "rhot engine --rig desk.json --start --output osc:127.0.0.1:9000 --web")
 
 
 def _require_acceptable(rig: Rig, path: Path) -> None:
@@ -60,7 +63,6 @@ def add_serving_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f"show the hand in browsers, on this computer's port {WEB_PORT} unless told otherwise; "
                              "the address with its secret is printed")
     parser.add_argument("--verbose", action="store_true", help="log what happens on standard error")
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = HELP
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from rhot_app.errors import finite, whole
 from rhot_app.simulator.scene.scene_arguments import SECONDS_MAX, add_scene_arguments, scene_of
 from rhot_node.compiled import announce_compilation
+from rhot_node.terminal import add_examples
 
 _OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs", "baseline")
 _JUDGED_S = 0.1  # shorter is no run
@@ -52,6 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                       help="matched and mismatched hands, lost cameras, random starts, live; takes --seeds (default "
                            "10), --seconds (from 2.5, default 3), --seed, --logs and --json")
     bare.add_argument("--cases", metavar="TEXT", default=None, help="only the cases whose names begin with TEXT")
+    add_examples(parser, "rhot evaluate --motion pinch --seconds 10",
+                 "rhot evaluate --compare --motions rest,pinch --sketched")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import RecordingError, input_file, positive_number
+from rhot_app.errors import RecordingError, add_force_argument, input_file, positive_number
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
@@ -39,8 +40,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--adapt", type=Path, metavar="FILE",
                         help="adapt the rig's hand to the one in the videos and write it as a hand file; what FILE was "
                              "before is kept in FILE.history")
-    parser.add_argument("--again", action="store_true", help="write over files that exist")
+    add_force_argument(parser, "write over files that exist")
     parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
+    add_examples(parser, "rhot bare-hand --rig desk.json --video left=left.mp4 --video right=right.mp4 --out hand.csv",
+                 "rhot bare-hand --rig desk.json --video left=left.mp4 --background-seconds 2 --overlay hand.mp4")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -80,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         foreground = learn_backgrounds(videos, empty_s)
     line = ProgressLine("tracking")
     summary = track_videos(rig, videos, foreground, known_size=not args.unknown_size, empty_s=empty_s, out=args.out,
-                           pictures=args.overlay, again=args.again, hand_file=args.adapt, progress=line.report)
+                           pictures=args.overlay, again=args.force, hand_file=args.adapt, progress=line.report)
     line.finish()
     document = summary.document() | {"out": args.out and str(args.out), "overlay": args.overlay and str(args.overlay),
                                      "hand_file": str(args.adapt) if args.adapt and summary.adapted else None}

@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import whole
+from rhot_app.errors import add_force_argument, whole
 from rhot_app.export.export_command import READ_WITH_LOSSES, add_export_arguments, options_of
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.export.batch import BatchJob, JobOutcome
@@ -28,8 +29,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scheduler", default=None, metavar="ADDRESS",
                         help="let the workers of this Dask scheduler do it, such as tcp://host:8786; they must see the "
                              "same files")
-    parser.add_argument("--again", action="store_true", help="do also what was done before and has not changed")
+    add_force_argument(parser, "write anew also what was done before and has not changed")
     add_export_arguments(parser, "needed with --do export")
+    add_examples(parser, "rhot batch monday.rhotlog tuesday.rhotlog --do track --out results",
+                 "rhot batch monday.rhotlog tuesday.rhotlog --do export --format c3d --out results --workers 4")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -59,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
         ended.append(outcome)
         line(len(ended), len(jobs))
 
-    outcomes = run_batch(jobs, args.out, workers=workers, scheduler=args.scheduler, again=args.again, report=report)
+    outcomes = run_batch(jobs, args.out, workers=workers, scheduler=args.scheduler, again=args.force, report=report)
     line.finish()
     print(table(outcomes))
     if any(outcome.status == "interrupted" for outcome in outcomes):

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rhot_app.errors import ExportError
+from rhot_app.errors import ExportError, refuse_existing
 from rhot_app.export.plan import ExportOptions, Plan, Units, Writer, in_frame
 from rhot_app.export.recording import RATE_AFTER_S, TrackedLog
 from rhot_app.export.resample import Resampler, checked_rate
@@ -115,8 +115,7 @@ def check_place(log: Path, out: Path, again: bool, option: str = "--out") -> Non
         raise ExportError(f"{out}: the folder {out.parent} does not exist; create it first.")
     if out.is_dir():
         raise ExportError(f"{out} is a folder; name a file in it.")
-    if out.exists() and not again:
-        raise ExportError(f"{out} exists already; choose another {option}, or write over it with --again.")
+    refuse_existing(out, ExportError, option, force=again)
 
 
 def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path, ready: Callable[[], None]) -> list[str]:

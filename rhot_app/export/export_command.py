@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import finite, input_file
+from rhot_app.errors import add_force_argument, finite, input_file
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.export.plan import ExportOptions
@@ -23,7 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="FILE",
                         help="file to write (default: named as the log, beside it)")
     add_export_arguments(parser, "default: by the ending of --out")
-    parser.add_argument("--again", action="store_true", help="write over a file that exists")
+    add_force_argument(parser)
+    add_examples(parser, "rhot export wave.rhotlog --out wave.csv",
+                 "rhot export wave.rhotlog --out wave.trc --rate 100 --smooth --tracker estimator")
 
 
 def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -> None:
@@ -57,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or args.path.with_suffix(FORMATS[name].endings[0])
     announce_compilation()
     line = ProgressLine(f"exporting {args.path.name}")
-    done = export_log(args.path, out, format_name=name, rig=args.rig, options=options_of(args), again=args.again,
+    done = export_log(args.path, out, format_name=name, rig=args.rig, options=options_of(args), again=args.force,
                       progress=line.report)
     line.finish()
     for note in done.notes:

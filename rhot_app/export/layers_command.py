@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import RigError, input_file
+from rhot_app.errors import RigError, add_force_argument, input_file, refuse_existing
 from rhot_node.compiled import announce_compilation
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,8 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="where the camera stands, degrees about the vertical and above the object (60,50)")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE",
                         help="the picture (.png, .jpg), or a film of one turn about the object (.avi, .mp4)")
-    parser.add_argument("--again", action="store_true", help="write over a file that exists")
+    add_force_argument(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_examples(parser, "rhot layers --out layers.png", "rhot layers mine.json --from 0,20 --out turn.mp4")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -54,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
 
     bodies, names, angles = _posed(args.file, args.angle)
     azimuth, elevation = _eye(args.eye)
-    film = _is_film(args.out, again=args.again)
+    film = _is_film(args.out, force=args.force)
     announce_compilation("some seconds")
     placed = place(bodies, np.eye(4), angles)
     cameras = [_camera(bodies, placed, azimuth + turn, elevation) for turn in
@@ -139,13 +141,12 @@ def _eye(text: str) -> tuple[float, float]:
     return azimuth, elevation
 
 
-def _is_film(path: Path, *, again: bool) -> bool:
+def _is_film(path: Path, *, force: bool) -> bool:
     if path.suffix not in (".png", ".jpg", ".avi", ".mp4"):
         raise RigError(f"--out {path}: a picture ends in .png or .jpg, a film in .avi or .mp4.")
     if not path.parent.is_dir():
         raise RigError(f"{path}: there is no folder {path.parent}. Make it first, or name another place.")
-    if path.exists() and not again:
-        raise RigError(f"{path} exists already; choose another --out, or write over it with --again.")
+    refuse_existing(path, RigError, force=force)
     return path.suffix in (".avi", ".mp4")
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.errors import RigError, finite, input_file
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.hand.anatomy import HandAnatomy
@@ -29,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rig", type=Path, help="put the hand into this rig file, which keeps its former version")
     parser.add_argument("--draw", type=Path, metavar="FILE.png", help="draw it from two sides")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_examples(parser, "rhot hand --length 185 --out mine.json", "rhot hand mine.json --draw mine.png")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -24,6 +24,7 @@ from rhot_app.errors import (
     positive_number,
     whole,
 )
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.engine.client import EngineClient
@@ -99,6 +100,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pictures", action="store_true",
                         help="let --measure render all images of markers; else only those of the speeds are rendered")
     parser.add_argument("--json", action="store_true", help="print JSON: a line per state, or all measures")
+    add_examples(parser, "rhot mouse --pointer", "rhot mouse --simulated --seconds 20 --osc 127.0.0.1:9000")
 
 
 def run(args: argparse.Namespace) -> int:

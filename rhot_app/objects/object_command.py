@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_node.compiled import announce_compilation
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.objects.object_file import ObjectModel
@@ -24,6 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="one image of each camera, by the camera's name in the rig, taken at the same instant")
     parser.add_argument("--rig", type=Path, metavar="RIG", help="the rig file, for lenses and poses of the cameras")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_examples(parser, "rhot object cube.json",
+                 "rhot object cube.json --rig desk.json --images left=left.png right=right.png")
 
 
 def run(args: argparse.Namespace) -> int:

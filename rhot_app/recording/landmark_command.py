@@ -13,6 +13,7 @@ import numpy as np
 
 from rhot_app.errors import RecordingError, input_file, positive_number
 from rhot_app.hand.landmarks import ANATOMY_SD_M, COMMON_M, LASTING_M, NOISE_M
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
@@ -37,6 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fps", type=positive_number, default=None, metavar="N",
                         help="frames per second of tables without times")
     parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
+    add_examples(parser, "rhot landmarks left.csv right.csv --rig desk.json --out hand.rhotlog",
+                 "rhot landmarks left.csv right.csv --rig desk.json --fps 30 --out hand.rhotlog")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -26,6 +26,7 @@ import numpy as np
 from rhot_app.errors import RecordingError, note_loss
 from rhot_app.project import Rig, parse_rig
 from rhot_node.files import decode_json, open_input
+from rhot_node.terminal import add_examples
 
 MAGIC: Final = b"RHOTLOG\0"
 VERSION: Final = 2
@@ -450,6 +451,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="CLEAN", help="the log to write; a new file")
     parser.add_argument("--rig", type=Path, metavar="FILE",
                         help="the rig that it was recorded with, where the header cannot be read")
+    add_examples(parser, "rhot recover damaged.rhotlog --out clean.rhotlog",
+                 "rhot recover damaged.rhotlog --rig desk.json --out clean.rhotlog")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,6 +6,8 @@ import argparse
 import contextlib
 from pathlib import Path
 
+from rhot_node.terminal import add_examples
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot video``."""
@@ -15,6 +17,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="the rig file that says where the nodes are now (default: the log's own rig)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where the videos go (default: beside the log)")
     parser.add_argument("--keep", action="store_true", help="leave the videos on the nodes as well")
+    add_examples(parser, "rhot video collect wave.rhotlog",
+                 "rhot video collect wave.rhotlog --rig desk.json --out videos --keep")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -17,6 +17,7 @@ from rhot_app.simulator.scene.scene_arguments import (
     show_of,
 )
 from rhot_node.compiled import announce_compilation
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.simulator.film.film import Progress
@@ -46,6 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--hide", action="append", default=[], metavar="ID",
                         help="leave a marker of the hand unpainted; repeatable")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_examples(parser, "rhot simulate --motion pinch --seconds 5 --out pinch",
+                 "rhot simulate --show board --pictures 20 --out board")
 
 
 def run(args: argparse.Namespace) -> int:

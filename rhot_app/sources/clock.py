@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 DRIFT_ALLOWANCE = 100e-6
-"""Two crystals of +-50 ppm each, s/s: what the interval of an offset grows by."""
+"""Two crystals of ±50 ppm each, s/s: what the interval of an offset grows by."""
 
 DRIFT_WANDER = 5e-6
 """How far a drift measured over the history may be from the drift now, s/s; used to choose among samples."""

@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.errors import SourceError, finite
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.sources.discovery import FoundNode, Search
@@ -19,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot nodes``."""
     parser.add_argument("--seconds", type=finite, default=3.0, metavar="S", help="how long to look (default: 3)")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_examples(parser, "rhot nodes", "rhot nodes --seconds 10 --json")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.errors import PairingError, whole
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig, RigNode
@@ -22,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=whole, default=None, metavar="N",
                         help="the node's pairing port (default: the rig's, or 47803)")
     parser.add_argument("--code", metavar="CODE", help="the code that `rhot-node pair` shows; asked for when missing")
+    add_examples(parser, "rhot pair left --rig desk.json", "rhot pair 192.168.0.21 --code 1234-5678")
 
 
 def run(args: argparse.Namespace) -> int:

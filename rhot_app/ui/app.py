@@ -18,6 +18,7 @@ from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
 from rhot_node.files import require_replaceable
 from rhot_node.logs import log_to_stderr
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.ui.common.controller import Controller
@@ -27,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot`` without a command."""
     parser.add_argument("--rig", type=Path, metavar="FILE", help="open this rig file at once")
     add_window_arguments(parser)
+    add_examples(parser, "rhot", "rhot --rig desk.json")
 
 
 def add_window_arguments(parser: argparse.ArgumentParser) -> None:

@@ -9,6 +9,7 @@ from rhot_app.errors import SimulatorError, whole
 from rhot_app.ui.app import add_window_arguments, open_window
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.models.words import shipped_motions
+from rhot_node.terminal import add_examples
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tracker", choices=("classic", "estimator"), default=TwinChoice().tracker,
                         help=f"what makes a hand of the markers (default {TwinChoice().tracker})")
     add_window_arguments(parser)
+    add_examples(parser, "rhot demo", "rhot demo --motion pinch --tracker estimator")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -16,6 +16,7 @@ from rhot_node.detect.image import YuvImage, from_bgr
 from rhot_node.detect.reference import ReferenceDetector
 from rhot_node.errors import CameraError
 from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.terminal import add_examples
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
 NamedImage = tuple[str | None, YuvImage]
@@ -48,6 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                        help="frames have nothing to do with each other: search each as a whole")
     parser.set_defaults(sequence=None)
     parser.epilog = EPILOG
+    add_examples(parser, "rhot-node detect --markers rhot6.json hand.png",
+                 "rhot-node detect --markers rhot6.json --all --json hand.mp4")
 
 
 def run(args: argparse.Namespace) -> int:

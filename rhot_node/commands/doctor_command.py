@@ -28,6 +28,7 @@ from rhot_node.health.checks import (
 from rhot_node.health.machine import Machine
 from rhot_node.keys import NodeTrust, keys_path
 from rhot_node.service.install import NAME, STATE_FOLDER
+from rhot_node.terminal import add_examples
 
 SUMMARY = ("Look at everything that a node needs: power, heat, memory, clock, network, camera, compiled code, pairing "
            "and the service. Exit code 0: all is well; 1: something could be better; 2: something is wrong.")
@@ -41,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--settings", type=Path, metavar="FILE",
                         help=f"settings of the node (default: the service's, {STATE_FOLDER}/node.json, if there)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_examples(parser, "rhot-node doctor", "rhot-node doctor --settings left.json --json")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -10,6 +10,7 @@ from rhot_node.errors import TrustError
 from rhot_node.keys import keys_path, remove_private
 from rhot_node.network.pairing import TRIES, VALID_S, Offer, OfferFile, offer_path, show_code
 from rhot_node.service.install import SETTINGS
+from rhot_node.terminal import add_examples
 
 SUMMARIES = {
     "pair": "Show a fresh one-time code to pair a master with; the code before it is void.",
@@ -17,12 +18,13 @@ SUMMARIES = {
 }
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of both commands."""
+def add_arguments(name: str, parser: argparse.ArgumentParser) -> None:
+    """Arguments of `pair` or `unpair`."""
     installed = SETTINGS if SETTINGS.exists() else None
     parser.add_argument("--settings", type=Path, default=installed, metavar="FILE",
                         help="settings of this node (JSON, see docs/node.md); keys lie beside it. Default: those of "
                              f"the installed service, {SETTINGS}")
+    add_examples(parser, f"rhot-node {name}", f"rhot-node {name} --settings left.json")
 
 
 def run(name: str, args: argparse.Namespace) -> int:

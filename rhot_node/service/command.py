@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from rhot_node.service.install import Host, Wish, install, service_for, uninstall, unit_text
+from rhot_node.terminal import add_examples
 
 SUMMARIES = {
     "install": "Make the node a system service (systemd): started at boot, restarted when it ends or hangs, held in "
@@ -23,6 +24,10 @@ def add_arguments(name: str, parser: argparse.ArgumentParser) -> None:
         parser.add_argument("--settings", type=Path, metavar="FILE", help="settings to take over instead")
         parser.add_argument("--camera", default="pi", metavar="SPEC", help="as of rhot-node --camera (default: pi)")
         parser.add_argument("--dry-run", action="store_true", help="print the unit and change nothing")
+        add_examples(parser, "sudo rhot-node install --node-id 0 --name left",
+                     "rhot-node install --user --settings left.json --camera 0 --dry-run")
+    else:
+        add_examples(parser, "sudo rhot-node uninstall", "rhot-node uninstall --user")
 
 
 def run(name: str, options: argparse.Namespace) -> int:

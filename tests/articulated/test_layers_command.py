@@ -63,8 +63,8 @@ def test_other_endings_and_missing_folders_are_refused(tmp_path, capsys):
     mine = tmp_path / "mine.png"
     mine.write_text("mine")
     assert main(["layers", FINGERS, "--out", str(mine)]) == 2
-    assert "--again" in capsys.readouterr().err and mine.read_text() == "mine"
-    assert main(["layers", FINGERS, "--out", str(mine), "--again"]) == 0 and cv2.imread(str(mine)) is not None
+    assert "--force" in capsys.readouterr().err and mine.read_text() == "mine"
+    assert main(["layers", FINGERS, "--out", str(mine), "--force"]) == 0 and cv2.imread(str(mine)) is not None
     nothing = tmp_path / "nothing.json"
     nothing.write_text(json.dumps({"format": "rhot-articulated", "version": 1, "name": "x", "root": {"name": "a"},
                                    "frames": []}))

@@ -119,5 +119,5 @@ def test_a_report_is_written_over_only_when_that_is_asked_for(tmp_path: Path, ca
     arguments = ["report", "--directory", str(tmp_path / "none"), "--out", str(out)]
     assert main(arguments) == 2
     assert "exists already" in capsys.readouterr().err and out.read_bytes() == b"another one"
-    assert main([*arguments, "--again"]) == 0
+    assert main([*arguments, "--force"]) == 0
     assert "versions.json" in entries(out)

@@ -209,7 +209,7 @@ def test_an_existing_table_stays(recorded: Recorded, tmp_path: Path, capsys: pyt
     out = tmp_path / "hand.csv"
     out.write_text("mine")
     assert main(recorded.arguments("--out", str(out))) == 2
-    assert "--again" in capsys.readouterr().err and out.read_text() == "mine"
+    assert "--force" in capsys.readouterr().err and out.read_text() == "mine"
 
 
 def test_an_existing_film_stays(recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

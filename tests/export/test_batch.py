@@ -73,7 +73,7 @@ def test_only_what_changed_is_done_again(folder: Path, capsys: pytest.CaptureFix
     assert batch(folder, "a", "--frame", "wrist") == 0
     assert results(folder)["a.csv"] > second["a.csv"], "another order"
     third = results(folder)
-    assert batch(folder, "a", "--frame", "wrist", "--again") == 0
+    assert batch(folder, "a", "--frame", "wrist", "--force") == 0
     assert results(folder)["a.csv"] > third["a.csv"]
 
 

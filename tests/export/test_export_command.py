@@ -143,7 +143,7 @@ def test_an_existing_file_is_written_over_only_when_told(log: Path, tmp_path: Pa
     out.write_text("mine")
     assert main(["export", str(log), "--out", str(out)]) == 2
     assert "exists already" in capsys.readouterr().err and out.read_text() == "mine"
-    assert main(["export", str(log), "--out", str(out), "--again"]) == 0
+    assert main(["export", str(log), "--out", str(out), "--force"]) == 0
     assert out.read_text().startswith("time_s,")
 
 
@@ -152,9 +152,9 @@ def test_a_recording_is_never_written_over(log: Path, tmp_path: Path, capsys: py
     path.write_bytes(log.read_bytes())
     (tmp_path / "same.csv").symlink_to(path)
     for out in ("mine.csv", "same.csv"):
-        assert main(["export", str(path), "--out", str(tmp_path / out), "--again"]) == 2
+        assert main(["export", str(path), "--out", str(tmp_path / out), "--force"]) == 2
         assert "is the recording itself" in capsys.readouterr().err
-    assert main(["batch", str(path), "--do", "export", "--format", "csv", "--out", str(tmp_path), "--again"]) == 2
+    assert main(["batch", str(path), "--do", "export", "--format", "csv", "--out", str(tmp_path), "--force"]) == 2
     assert "never written over" in capsys.readouterr().err
     assert path.read_bytes() == log.read_bytes()
 

@@ -7,6 +7,7 @@ import importlib
 import io
 import json
 import re
+import shlex
 import subprocess
 import sys
 from functools import cache
@@ -14,7 +15,11 @@ from pathlib import Path
 
 import pytest
 
-from rhot_app.__main__ import SUBCOMMANDS
+from rhot_app.__main__ import SUBCOMMANDS, parse
+from rhot_app.__main__ import main as rhot
+from rhot_app.calibration.calibrate_command import ALIASES, KINDS
+from rhot_node.__main__ import daemon_parser
+from rhot_node.commands import COMMANDS
 
 ROOT = Path(__file__).parents[2]
 MODULES = {"rhot": "rhot_app", "rhot-node": "rhot_node"}
@@ -27,15 +32,15 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot refine": ("LOG", "--rig", "--out", "--use", "--no-scale", "--json"),
     "rhot report": ("LOG", "--out", "--rig", "--directory"),
     "rhot video": ("collect", "LOG", "--rig", "--out", "--keep"),
-    "rhot layers": ("FILE", "--angle", "--from", "--out", "--again", "--json"),
+    "rhot layers": ("FILE", "--angle", "--from", "--out", "--force", "--json"),
     "rhot fit-hand": ("--rig", "--pictures", "--at", "--hand", "--save", "--settings"),
     "rhot recover": ("LOG", "--out", "--rig"),
     "rhot landmarks": ("CSV", "--rig", "--out", "--fps", "--json"),
     "rhot bare-hand": ("--rig", "--video", "--background", "--background-seconds", "--fps", "--offset-s",
-                       "--unknown-size", "--out", "--overlay", "--again", "--json"),
+                       "--unknown-size", "--out", "--overlay", "--force", "--json"),
     "rhot export": ("LOG", "--out", "--format", "--rig", "--tracker", "--rate", "--frame", "--units", "--hand",
-                    "--smooth", "--again"),
-    "rhot batch": ("LOG", "--do", "--out", "--workers", "--scheduler", "--again", "--format", "--rig", "--tracker"),
+                    "--smooth", "--force"),
+    "rhot batch": ("LOG", "--do", "--out", "--workers", "--scheduler", "--force", "--format", "--rig", "--tracker"),
     "rhot simulate": ("--motion", "--seconds", "--out", "--show", "--pictures", "--points", "--markers", "--lamp",
                       "--kelvin"),
     "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json",
@@ -131,6 +136,74 @@ def test_documented_options_exist(command: str) -> None:
 def test_a_program_starts_as_a_module(module: str) -> None:
     done = subprocess.run([sys.executable, "-m", module, "--help"], capture_output=True, text=True, check=False)
     assert done.returncode == 0 and "usage: " in done.stdout, done.stderr
+
+
+EVERY_COMMAND = ("rhot", *(f"rhot {name}" for name in SUBCOMMANDS), *(f"rhot calibrate {kind}" for kind in KINDS),
+                 "rhot-node", *(f"rhot-node {name}" for name in COMMANDS))
+
+
+def examples_of(command: str) -> list[list[str]]:
+    """The words of the examples at the end of a command's help."""
+    return [shlex.split(line.strip().removeprefix("sudo "))
+            for line in help_of(command).partition("\nexamples:\n")[2].splitlines()]
+
+
+@pytest.mark.parametrize("command", EVERY_COMMAND)
+def test_help_ends_with_two_examples_that_are_valid(command: str, tmp_path: Path,
+                                                    monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    examples = examples_of(command)
+    assert len(examples) == 2 and examples[0] != examples[1]
+    for words in examples:
+        program, *arguments = words
+        for word in arguments:
+            if "." in word and "*" not in word and "/" not in word:
+                Path(word.partition("=")[2] or word).touch()
+        assert words[:len(command.split())] == command.split() or command == "rhot calibrate"
+        if program == "rhot":
+            parse(arguments)
+        elif arguments[0] in COMMANDS:
+            COMMANDS[arguments[0]](arguments[0])[0].parse_args(arguments[1:])
+        else:
+            daemon_parser().parse_args(arguments)
+
+
+@pytest.mark.parametrize(("word", "kind"), ALIASES.items())
+def test_a_calibration_has_one_name_and_its_former_ones_still_run_it(
+        word: str, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each refuses to begin without its input."""
+    told = []
+    for name in (word, kind):
+        with contextlib.suppress(SystemExit):
+            assert rhot(["calibrate", name]) == 2
+        told.append(capsys.readouterr().err.replace(f"calibrate {name}", f"calibrate {kind}"))
+    assert told[0] == told[1] != ""
+
+
+def test_a_file_that_exists_is_only_replaced_by_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The option has one name in all commands that have it; a bare hand's and a batch's have their own tests."""
+    with_force = {name for name in SUBCOMMANDS if "--force" in help_of(f"rhot {name}")}
+    assert with_force == {"report", "layers", "export", "poses", "bare-hand", "batch"}
+    log, mine = tmp_path / "a.rhotlog", {name: tmp_path / f"mine.{name}" for name in ("zip", "png", "csv")}
+    for path in (log, *mine.values()):
+        path.write_text("mine")
+    for arguments in (["report", "--out", str(mine["zip"])], ["layers", "--out", str(mine["png"])],
+                      ["export", str(log), "--out", str(mine["csv"])],
+                      ["poses", "--source", "udp:1", "--out", str(mine["csv"])]):
+        assert rhot(arguments) == 2 and "--force" in capsys.readouterr().err
+    assert {path.read_text() for path in mine.values()} == {"mine"}
+
+
+SIGNS = re.compile(r"\+/?-(?![\]\w])")
+
+
+def test_plus_or_minus_is_one_sign() -> None:
+    """±, on the screen, in what commands print, and in the documents."""
+    pages = [path for folder in ("rhot_app", "rhot_node", "docs") for ending in ("*.py", "*.md", "*.html", "*.js")
+             for path in (ROOT / folder).rglob(ending)] + [ROOT / "README.md", ROOT / "CHANGELOG.md"]
+    found = [f"{path.relative_to(ROOT)}:{number}" for path in pages
+             for number, line in enumerate(path.read_text().splitlines(), 1) if SIGNS.search(line)]
+    assert not found
 
 
 def test_the_list_of_commands_is_whole() -> None:

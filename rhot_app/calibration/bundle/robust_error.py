@@ -65,9 +65,9 @@ def in_words(times: float) -> str:
 
 
 def what_is_reported(times: float) -> str:
-    """What is printed behind +-, in words."""
+    """What is printed behind ±, in words."""
     more = f", {times:.1f} times what the scatter of the corners explains: so far are the pictures apart"
-    return "+- is one standard deviation" + (more if times >= _NOTABLE else "")
+    return "± is one standard deviation" + (more if times >= _NOTABLE else "")
 
 
 def _witness(jacobian: Any, off: Array, scaled: Array, shared: NDArray[np.intp], board: slice) -> tuple[Array, Array]:

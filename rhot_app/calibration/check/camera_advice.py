@@ -209,8 +209,10 @@ def _findings(mains: float | None, depth: float, depths: dict[float, float], ban
               exposures: tuple[float, ...], exposure_s: float) -> list[Finding]:
     if mains is None:
         blind = [f"{hz:.0f} Hz" for hz, one in depths.items() if np.isnan(one)]
-        return [Finding("flicker_unseen", Grade.GOOD, f"Flicker of {' and '.join(blind)} mains would not be seen.",
-                        "The frames come in step with it: its bands stand still, and harm little.")] if blind else []
+        return [Finding("flicker_unseen", Grade.GOOD, "At this frame rate flicker from "
+                        f"{' and '.join(blind)} mains cannot be measured.",
+                        "Every frame meets the lamp at the same point of its swing. Bands would stand still in the "
+                        "picture, and harm little.")] if blind else []
     now = 1e6 * exposure_s
     fitting = " or ".join(f"{1e-3 * one:.2f}" for one in exposures) + " ms"
     if exposures and now > 0.5 * exposures[0]:

@@ -51,7 +51,7 @@ class Lamp:
 SAME = Lamp()
 WARMTH_SPAN, WARMTH_STEP = 0.54, 0.27
 LAMPS = tuple(Lamp(WARMTH_STEP * step, brightness) for step in (-2, -1, 0, 1, 2) for brightness in (0.8, 1.0, 1.2))
-"""+-20 % of light, and every change between 3000 and 6500 K."""
+"""±20 % of light, and every change between 3000 and 6500 K."""
 
 
 def chances(lamps: Sequence[Lamp]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, show
 from rhot_app.errors import CalibrationError, input_file
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.calibration.hand.bones_report import BonesReport
@@ -35,6 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--name", help="what the hand is called (default: after the recording; with --set: as before)")
     parser.add_argument("--out", type=Path, metavar="HAND", help="write the hand file here")
     add_json_argument(parser)
+    add_examples(parser, "rhot calibrate bones --log free.rhotlog --rig desk.json --out mine.json",
+                 "rhot calibrate bones --set index.proximal=41 middle.proximal=46 --out mine.json")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -176,11 +179,11 @@ def _lengths(words: list[str]) -> dict[str, float]:
 
 def _lines(report: BonesReport) -> list[str]:
     """The figures for people."""
-    lines = [f"{'bone':18}{'length':>9}{'+-':>7}  mm"]
+    lines = [f"{'bone':18}{'length':>9}{'±':>7}  mm"]
     lines += [f"{bone.name:18}{bone.length_mm:9.1f}{bone.std_mm:7.1f}  {bone.known.word}" for bone in report.bones]
     lines += [f"{'reach ' + reach.finger:18}{reach.length_mm:9.1f}{reach.std_mm:7.1f}" for reach in report.reaches]
     lines += [f"marker {spot.marker} on {spot.place}: along {spot.along_mm:.1f}, across {spot.across_mm:.1f}, "
               f"above {spot.above_mm:.1f} mm" for spot in report.markers]
-    lines += [f"rigid: {pair.first} - {pair.second} {pair.distance_mm:.2f} +- {pair.std_mm:.2f} mm"
+    lines += [f"rigid: {pair.first} - {pair.second} {pair.distance_mm:.2f} ± {pair.std_mm:.2f} mm"
               for pair in report.rigid]
     return lines

@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, add_rig_argument, rig_of, tell
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.calibration.check.checks import RigReport
@@ -16,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot check``."""
     add_rig_argument(parser)
     add_json_argument(parser)
+    add_examples(parser, "rhot check --rig desk.json", "rhot check --rig desk.json --json")
 
 
 def run(args: argparse.Namespace) -> int:

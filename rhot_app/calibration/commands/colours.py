@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from rhot_app.calibration.commands.output import add_json_argument, show
 from rhot_app.errors import CalibrationError, input_file
 from rhot_node.errors import PictureError
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     import numpy as np
@@ -50,7 +51,6 @@ class BoxArgument:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Define the command's options."""
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
     parser.add_argument("--image", type=Path, action="append", required=True, metavar="PATH",
                         help="a picture as the camera gives it; several are numbered 1, 2, ...")
@@ -61,6 +61,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="a box on bare skin (@2=x,y,w,h: in the second picture)")
     parser.add_argument("--out", type=Path, required=True, metavar="MARKERS", help="marker file to write")
     add_json_argument(parser)
+    add_examples(
+        parser, "rhot calibrate colours --image hand.png --sample thumb=310,204,12,10 --out markers.json",
+        "rhot calibrate colours --image hand.png --sample wrist=90,40,14,14 --markers rhot6.json --out mine.json")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -210,7 +213,7 @@ def _skin(boxes: list[BoxArgument], images: list[YuvImage | PictureError], paths
 
 def _lines(report: ColourReport) -> list[str]:
     """The tables for people: every marker's model, and the separability matrix in percent."""
-    lines = [f"{'marker':<12} {'Cb':>6} {'Cr':>6} {'hue +-':>7} {'chroma >=':>9} {'luma':>8} {'covered %':>9} "
+    lines = [f"{'marker':<12} {'Cb':>6} {'Cr':>6} {'hue ±':>7} {'chroma >=':>9} {'luma':>8} {'covered %':>9} "
              f"{'pictures':>8} {'lost %':>6}"]
     chosen = {marker.id: marker.chroma for marker in report.markers.markers}
     for one, covered, lost in zip(report.samples, report.separability.coverage, report.rehearsal.lost, strict=True):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
 from rhot_app.errors import CalibrationError, finite, input_file
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,6 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--view-angle-deg", type=finite, metavar="A",
                         help="horizontal view angle of both cameras (default: the rig's, or 62.2)")
     add_json_argument(parser)
+    add_examples(parser, "rhot calibrate depth --table distances.csv",
+                 "rhot calibrate depth --table distances.csv --rig desk.json --out desk.json")
 
 
 def run(args: argparse.Namespace) -> int:

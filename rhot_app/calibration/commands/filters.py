@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, show
 from rhot_app.errors import CalibrationError, finite, input_file
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.calibration.filters.meters import FilterTargets, MarkerFigures
@@ -28,6 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--lag-ms", type=finite, default=None, metavar="L",
                         help="lag of fast movement that is allowed, ms (default 1)")
     add_json_argument(parser)
+    add_examples(
+        parser, "rhot calibrate filters --log-still still.rhotlog --log-fast wave.rhotlog --rig desk.json",
+        "rhot calibrate filters --log-still still.rhotlog --log-fast wave.rhotlog --rig desk.json --out desk.json")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rhot_app.calibration.commands.output import add_json_argument, add_rig_argument, rig_of
 from rhot_app.errors import whole
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.rig_history import Version
@@ -19,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--restore", type=whole, metavar="N",
                         help="bring version N of the list back; what is there now becomes a version itself")
     add_json_argument(parser)
+    add_examples(parser, "rhot history --rig desk.json", "rhot history --rig desk.json --restore 2")
 
 
 def run(args: argparse.Namespace) -> int:

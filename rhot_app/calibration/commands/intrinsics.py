@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.calibration.lens.intrinsics import IntrinsicsReport
@@ -23,6 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rig", type=Path, metavar="RIG", help="rig to put them into")
     parser.add_argument("--node", metavar="NAME", help="the rig's camera that took the pictures")
     add_json_argument(parser)
+    add_examples(parser, "rhot calibrate intrinsics --images 'left*.jpg' --square-mm 24.8 --out left.json",
+                 "rhot calibrate intrinsics --images 'left*.jpg' --rig desk.json --node left")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -85,7 +88,7 @@ def lines_of(report: IntrinsicsReport) -> list[str]:
     from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
 
     lines = [f"left out: {each.name}: {each.reason}" for each in report.dropped]
-    lines += [f"{name:<4}{value:12.4f} +- {std:.4f}" + (" px" if name[0] in "fc" else "")
+    lines += [f"{name:<4}{value:12.4f} ± {std:.4f}" + (" px" if name[0] in "fc" else "")
               for name, (value, std) in report.parameters.items()]
     lines.append(what_is_reported(report.error_inflation))
     cover = report.coverage

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
 from rhot_app.errors import CalibrationError, RecordingError, RhotError, input_file
 from rhot_node.compiled import announce_compilation
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
@@ -31,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="write it to --rig; what is there is kept (rhot history)")
     parser.add_argument("--no-scale", action="store_true", help="do not estimate the hand's size, which takes longest")
     add_json_argument(parser)
+    add_examples(parser, "rhot refine wave.rhotlog", "rhot refine wave.rhotlog --rig desk.json --use")
 
 
 def run(args: argparse.Namespace) -> int:

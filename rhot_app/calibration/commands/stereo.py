@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
 from rhot_app.errors import CalibrationError, finite
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.calibration.lens.fit import LensStart
@@ -102,7 +103,6 @@ The rig is written only when the verdict allows it; what was in --out before is 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot calibrate stereo``."""
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
     pictures = parser.add_argument_group("pictures")
     pictures.add_argument("--left", metavar="PATTERN", help="pictures of the camera called left")
@@ -129,6 +129,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                      help="rig to begin with (default: --out, or the shipped one)")
     rig.add_argument("--out", type=Path, metavar="RIG", help="rig to write")
     add_json_argument(parser)
+    add_examples(
+        parser, "rhot calibrate stereo --left 'left*.jpg' --right 'right*.jpg' --square-mm 24.8 --out desk.json",
+        "rhot calibrate stereo --left 'left*.jpg' --right 'right*.jpg' --baseline-mm 75 --out desk.json")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -251,15 +254,15 @@ def lines_of(report: StereoReport, frame: WorldFrame | None) -> list[str]:
     for camera in figures.cameras:
         fx, fy, cx, cy = camera.lens[:4]
         sfx, _, scx, scy = camera.lens_std[:4]
-        lines.append(f"{camera.name}: f {fx:.2f}, {fy:.2f} +- {sfx:.2f} px, centre ({cx:.2f} +- {scx:.2f}, "
-                     f"{cy:.2f} +- {scy:.2f}) px, rms {camera.rms_px:.3f} px")
+        lines.append(f"{camera.name}: f {fx:.2f}, {fy:.2f} ± {sfx:.2f} px, centre ({cx:.2f} ± {scx:.2f}, "
+                     f"{cy:.2f} ± {scy:.2f}) px, rms {camera.rms_px:.3f} px")
     for pair in figures.pairs:
         shift, shift_std = _listed(pair.translation_m * 1e3), _listed(pair.translation_std_m * 1e3)
-        lines.append(f"{pair.first} to {pair.second}: {pair.baseline_m * 1e3:.2f} mm; T ({shift}) +- ({shift_std}) mm, "
+        lines.append(f"{pair.first} to {pair.second}: {pair.baseline_m * 1e3:.2f} mm; T ({shift}) ± ({shift_std}) mm, "
                      f"R ({_listed(pair.rotation_rad, 4)}) rad, epipolar {pair.epipolar_px:.2f} px")
     lines.append(what_is_reported(figures.error_inflation))
     squares = figures.squares
-    lines.append(f"squares as the cameras see them: {squares.mean_m * 1e3:.3f} +- {squares.std_m * 1e3:.3f} mm, board "
+    lines.append(f"squares as the cameras see them: {squares.mean_m * 1e3:.3f} ± {squares.std_m * 1e3:.3f} mm, board "
                  f"flat to {squares.flatness_m * 1e3:.2f} mm")
     if figures.board_errors is not None:
         lines.append(f"the board's corners are {figures.board_errors.in_plane_m * 1e3:.2f} mm off in its plane and "

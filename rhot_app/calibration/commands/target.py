@@ -8,6 +8,7 @@ from pathlib import Path
 from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
 from rhot_app.calibration.commands.output import require_folder
 from rhot_app.errors import finite
+from rhot_node.terminal import add_examples
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--legacy-pattern", action="store_true", help="the ChArUco layout of OpenCV before 4.6")
     parser.add_argument("--paper", default="A4", help="A5, A4 (default), A3, A2, A1, A0, letter, legal or tabloid")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="file to write, .pdf or .svg")
+    add_examples(parser, "rhot target chessboard --out board.pdf",
+                 "rhot target charuco --paper A3 --square-mm 35 --out board.pdf")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, show
 from rhot_app.errors import input_file
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.calibration.time.offset import TimeReport
@@ -22,6 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="the rig, its geometry calibrated")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the rig with corrected times")
     add_json_argument(parser)
+    add_examples(parser, "rhot calibrate time --log wave.rhotlog --rig desk.json",
+                 "rhot calibrate time --log wave.rhotlog --rig desk.json --out desk.json")
 
 
 def run(args: argparse.Namespace) -> int:

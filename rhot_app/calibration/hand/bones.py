@@ -279,6 +279,6 @@ def _judge_length(unknowns: HandUnknowns, lengths_mm: Mapping[str, float], name:
     centimetres = _CENTIMETRES[0] < value < _CENTIMETRES[1] and abs(10.0 * value - usual) < UNUSUAL * scatter
     return Finding(
         "implausible_bone", Grade.POOR if off > IMPOSSIBLE or centimetres else Grade.FAIR,
-        f"{name} is entered as {value:g} mm; {usual:.0f} +- {scatter:.0f} mm is usual with the other lengths.",
+        f"{name} is entered as {value:g} mm; {usual:.0f} ± {scatter:.0f} mm is usual with the other lengths.",
         "It looks like centimetres." if centimetres else "Another bone was measured, or the hand is unusual.",
         f"Enter {10.0 * value:g}." if centimetres else "Measure again, from the middle of one joint to the next.")

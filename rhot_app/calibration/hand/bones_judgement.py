@@ -212,7 +212,7 @@ def plausibility_findings(bones: Sequence[BoneLength], usual_mm: Array) -> list[
         if bone.known is not Known.PRIOR and off > _FAR_FROM_USUAL:
             found.append(Finding(
                 "unusual_bone", Grade.POOR if off > _NO_HAND_HAS else Grade.FAIR,
-                f"{bone.name} is {bone.length_mm:.1f} mm; {usual:.1f} +- "
+                f"{bone.name} is {bone.length_mm:.1f} mm; {usual:.1f} ± "
                 f"{bone.usual_std_mm:.1f} mm is usual in a hand of this size.",
                 "An unusual hand, or a marker on another bone than its role says.", "Measure it with a ruler."))
     return found

@@ -21,7 +21,7 @@ from rhot_app.hand.skeleton import BONES, FINGERS, WRIST_ROLE
 # -- prior of bone lengths ---------------------------------------------------------------------------------------------
 # Means and standard deviations: Buryanov and Kotiuk 2010, Int. J. Morphol. 28(3):755-758, table I (X-rays of 66 adults;
 # the last bone is the distal phalanx and the soft tip). A part of the scatter is size: big hands have all bones longer.
-# Hand length is 194 +- 10 mm for men and 181 +- 10 mm for women (Gordon et al. 1989, ANSUR), 6.3 % over both. What is
+# Hand length is 194 ± 10 mm for men and 181 ± 10 mm for women (Gordon et al. 1989, ANSUR), 6.3 % over both. What is
 # left of each bone's scatter is its proportion.
 
 Array = NDArray[np.float64]

@@ -123,7 +123,7 @@ def _squares(figures: StereoFigures) -> Finding | None:
         return None
     return Finding(
         "squares", Grade.POOR if off > _SQUARE_POOR else Grade.FAIR,
-        f"Seen by the cameras the squares are {squares.mean_m * 1e3:.2f} +- {squares.std_m * 1e3:.2f} mm (said: "
+        f"Seen by the cameras the squares are {squares.mean_m * 1e3:.2f} ± {squares.std_m * 1e3:.2f} mm (said: "
         f"{side * 1e3:g}) and the board is flat to {squares.flatness_m * 1e3:.2f} mm.",
         "The board is bent, or the cameras' geometry is not well determined.",
         "Use a stiff, flat board and take more pictures, also near and tilted.")

@@ -78,7 +78,7 @@ def ruler_finding(result: RulerResult, square_m: float) -> Finding:
     """What the ruler says about the size of the squares."""
     off = abs(result.ratio - 1.0)
     measured = (f"The ruler of {result.said_m * 1e3:.1f} mm measures {result.measured_m * 1e3:.1f} "
-                f"+- {result.std_m * 1e3:.1f} mm")
+                f"± {result.std_m * 1e3:.1f} mm")
     if off > max(_TOLERATED, result.doubt):
         return Finding(
             "square_size", Grade.POOR, f"{measured}, {100 * (1 / result.ratio - 1):+.1f} %.",

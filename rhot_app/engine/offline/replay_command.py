@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from rhot_app.engine.command import add_serving_arguments, asked_outputs, print_addresses
 from rhot_app.errors import RecordingError, input_file
 from rhot_node.compiled import announce_compilation
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.engine.core import MakeTracker
@@ -41,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--keep", action="store_true",
                         help="go on serving after the log's end: an app can look at the last state, or replay again")
     add_serving_arguments(parser)
+    add_examples(parser, "rhot replay wave.rhotlog --web", "rhot replay wave.rhotlog --speed max --smooth --json")
 
 
 def run(args: argparse.Namespace) -> int:

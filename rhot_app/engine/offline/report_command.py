@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.engine.directory import default_directory
+from rhot_app.errors import add_force_argument
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.engine.offline.report import Report
@@ -17,22 +19,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", type=Path, nargs="?", metavar="LOG",
                         help="a raw log that shows the fault, for its last minute (default: what is being recorded)")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.zip", help="zip file to write")
-    parser.add_argument("--again", action="store_true", help="write over a file that exists")
+    add_force_argument(parser)
     parser.add_argument("--rig", type=Path, metavar="FILE",
                         help="the rig file (default: the running engine's, or the log's)")
     parser.add_argument("--directory", type=Path, metavar="DIR",
                         help=f"directory of the engine (default {default_directory()})")
+    add_examples(parser, "rhot report --out fault.zip", "rhot report wave.rhotlog --out fault.zip --force")
 
 
 def run(args: argparse.Namespace) -> int:
     """Collect and write; raises EngineError, RecordingError, RigError."""
     from rhot_app.engine.offline.report import Report
-    from rhot_app.errors import EngineError
+    from rhot_app.errors import EngineError, refuse_existing
     from rhot_app.project import load_rig
     from rhot_node.files import require_replaceable, write_atomically
 
-    if args.out.exists() and not args.again:
-        raise EngineError(f"{args.out} exists already; choose another --out, or write over it with --again.")
+    refuse_existing(args.out, EngineError, force=args.force)
     try:
         require_replaceable(args.out)
         report = Report()

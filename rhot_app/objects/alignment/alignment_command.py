@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
 from rhot_app.errors import CalibrationError, finite, input_file
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.objects.alignment.motion_stream import MotionStream
@@ -33,6 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--check", type=input_file, metavar="FILE",
                         help="solve nothing: say whether the streams still agree with this alignment, or it is stale")
     add_json_argument(parser)
+    add_examples(parser, "rhot calibrate alignment --foreign tracker.csv --rig-points tip.csv --out alignment.json",
+                 "rhot calibrate alignment --foreign tracker.csv --rig-points tip.csv --check alignment.json")
 
 
 def run(args: argparse.Namespace) -> int:

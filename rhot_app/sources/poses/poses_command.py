@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import SourceError, finite
+from rhot_app.errors import SourceError, add_force_argument, finite, refuse_existing
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.sources.poses.source import ForeignPose, PoseSource
@@ -27,7 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seconds", type=finite, default=20.0, metavar="N",
                         help="how long to listen (default: 20); a CSV file is read whole")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the tracked poses as CSV")
+    add_force_argument(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_examples(parser, "rhot poses --source openvr --seconds 60 --out tracker.csv",
+                 "rhot poses --source tcp:192.168.0.5:4000 --tracker LHR-1")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -46,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
             require_replaceable(args.out)
         except OSError as exc:
             raise SourceError(f"{args.out}: cannot be written ({exc.strerror}).") from exc
+        refuse_existing(args.out, SourceError, force=args.force)
     source = open_source(args.source, args.tracker)
     try:
         poses = listen(source, args.seconds)

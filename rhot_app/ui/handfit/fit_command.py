@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.errors import CalibrationError, finite, input_file
+from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.hand.anatomy import HandAnatomy
@@ -29,6 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--save", type=Path, metavar="OUT", help="where Save writes the hand file (default: asked for)")
     parser.add_argument("--settings", type=Path, metavar="FILE",
                         help="remember settings in this file instead of the user's configuration folder")
+    add_examples(parser, "rhot fit-hand --rig desk.json --pictures left.png right.png --save mine.json",
+                 "rhot fit-hand --rig desk.json --pictures left=left.mp4 right=right.mp4 --at 1.5 3")
 
 
 def run(args: argparse.Namespace) -> int:

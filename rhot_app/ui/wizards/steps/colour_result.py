@@ -296,8 +296,8 @@ def propose(report: ColourReport | None, rig: Rig, path: Path | None,
         if node.node_id in node_settings:
             before = node_settings[node.node_id]["markers"]
             changes.append(NodeChange(node.node_id, {"markers": before}, {"markers": markers}))
-            rows.append(Row(f"{node.name}: colours", "as the rig" if before == msgspec.to_builtins(rig.markers)
-                            else "others than the rig", "the new ones, as the rig"))
+            rows.append(Row(f"colours in camera {node.name}", "the rig's" if before == msgspec.to_builtins(rig.markers)
+                            else "not the rig's", "the new ones"))
         elif not node.text_datagrams:
-            rows.append(Row(f"{node.name}: colours", "not known", "not changed: the node does not answer"))
+            rows.append(Row(f"colours in camera {node.name}", "not known", "not changed: the node does not answer"))
     return Proposal(REASON, report.verdict, tuple(rows), tuple(changes))
