@@ -74,7 +74,7 @@ def disk_advice(folder: str, seconds_left: float) -> list[Advice]:
     minutes = int(seconds_left / 60.0)
     when = "in less than a minute" if minutes < 1 else "in about a minute" if minutes == 1 else f"in {minutes} minutes"
     return [Advice("error" if minutes < 1 else "warning", f"The disk of {folder} will be full {when} at the rate of "
-                   "this recording, which then ends. Make room, or stop the recording.")]
+                   "this recording, which then ends. Make room, or stop the recording.", subject="recording")]
 
 
 def node_advice(facts: NodeFacts, marker_ids: Sequence[str], running: bool, *, visibility: bool = True) -> list[Advice]:
@@ -95,7 +95,7 @@ def no_marker_advice(all_facts: Sequence[NodeFacts], running: bool) -> list[Advi
     seconds = min((min(facts.unseen_s) for facts in all_facts), default=0.0)
     if running and seconds > UNSEEN_S and any(facts.recent.accepted for facts in all_facts):
         return [Advice("warning", f"No camera has seen a marker for {seconds:.0f} s. Hold the hand into both pictures; "
-                                  "if the markers are visible there, calibrate their colours.")]
+                                  "if the markers are visible there, calibrate their colours.", subject="sight")]
     return []
 
 
@@ -111,7 +111,7 @@ def hands_advice(rig: Rig) -> list[Advice]:
     if rig.other_hand is None or rig.tracker.kind != "classic":
         return []
     return [Advice("info", "The classic tracker follows the first hand only and takes the markers of the other one "
-                           "for free points. Choose the estimator for two hands at once.")]
+                           "for free points. Choose the estimator for two hands at once.", subject="information")]
 
 
 def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:
@@ -120,34 +120,39 @@ def _state_advice(facts: NodeFacts, running: bool) -> list[Advice]:
     if facts.buffer_bytes is None:
         return []
     if status.state == "ready" and status.text_datagrams:
-        return [Advice("info", f"Node {name}: text datagrams arrive, but tracking is not started: press Start.")]
+        return [Advice("info", f"Node {name}: text datagrams arrive, but tracking is not started: press Start.",
+                       subject="tracking")]
     if status.state == "silent" and status.text_datagrams:
-        return [Advice("info", f"Node {name}: no text datagrams come in; send them to its data port.")]
+        return [Advice("info", f"Node {name}: no text datagrams come in; send them to its data port.",
+                       subject="tracking")]
     if status.turned_away:
         return [Advice("error", f"Node {name} at {facts.address} does not know this computer: it was reset or made "
                                 "open, or never paired with it. Pair it: `rhot-node pair` on the node, "
-                                f"`rhot pair {name} --rig FILE` here.")]
+                                f"`rhot pair {name} --rig FILE` here.", subject="tracking")]
     if status.state == "silent" and status.message:
-        return [Advice("error", f"Node {name} does not answer. {status.message}")]
+        return [Advice("error", f"Node {name} does not answer. {status.message}", subject="tracking")]
     if status.state == "silent":
         return [Advice("error", f"Node {name} does not answer at {facts.address}:{facts.udp_port}. Is it switched on, "
                                 "is rhot-node running there, and on the same network? It is looked for by its id."
                                 + ("" if status.paired else " The rig has no key for it: if it waits to be paired, run "
-                                                            "`rhot-node pair` there and `rhot pair` here."))]
+                                                            "`rhot-node pair` there and `rhot pair` here."),
+                       subject="tracking")]
     if status.state == "fault":
-        return [Advice("error", f"Node {name}: {status.message or 'it reports a fault; look at its log.'}")]
+        return [Advice("error", f"Node {name}: {status.message or 'it reports a fault; look at its log.'}",
+                       subject="tracking")]
     if running and status.state == "ready" and facts.not_started_s > 1.0:
         return [Advice("warning", f"Node {name} is ready but does not follow the start; press Stop and Start. "
-                                  "If that does not help, restart the node.")]
+                                  "If that does not help, restart the node.", subject="tracking")]
     if facts.streams_elsewhere:
         return [Advice("warning", f"Node {name} streams for another master; stop that one, or press Stop and Start "
-                                  "here to take the node back.")]
+                                  "here to take the node back.", subject="tracking")]
     if status.text_datagrams:
         return [Advice("info", f"Node {name} sends text datagrams: untrusted, without times, so fast movements are "
-                               "less exact.")]
+                               "less exact.", subject="information")]
     if not status.paired:
         return [Advice("info", f"Node {name} is open, and what it says is untrusted: anybody on the network may steer "
-                               'it or speak in its place. To change that, set its "trust" to "paired" and pair it.')]
+                               'it or speak in its place. To change that, set its "trust" to "paired" and pair it.',
+                       subject="information")]
     return []
 
 
@@ -168,7 +173,8 @@ def _refusal_advice(facts: NodeFacts) -> list[Advice]:
         if dropped.get(reason, 0) >= _RECENT_MIN:
             size = "{} x {}".format(*facts.sent_size) if facts.sent_size else "another size"
             found.append(Advice(level, sentence.format(  # type: ignore[arg-type]
-                name=facts.status.name, size=size, expected="{} x {}".format(*facts.expected_size))))
+                name=facts.status.name, size=size, expected="{} x {}".format(*facts.expected_size)),
+                subject="tracking" if level == "error" else "equipment"))
     malformed = sum(count for reason, count in dropped.items() if reason in _MALFORMED)
     if malformed >= _RECENT_MIN:
         hint = ("they are not \"x,y;x,y;...\" with one pair per marker" if facts.status.text_datagrams
@@ -195,7 +201,7 @@ def _link_advice(facts: NodeFacts, running: bool) -> list[Advice]:
                                        f"{_BUSY}"))
     if running and not status.text_datagrams:
         if status.clock_bound_s is None:
-            found.append(Advice("info", f"Node {name}: waiting for its clock."))
+            found.append(Advice("info", f"Node {name}: waiting for its clock.", subject="information"))
         elif status.clock_bound_s > WIDE_BOUND_S:
             found.append(Advice("warning", f"Node {name}: its clock is known to ±{1e3 * status.clock_bound_s:.1f} ms "
                                            "only, so fast movements blur. "
@@ -209,7 +215,7 @@ def listening_advice(rig: Rig) -> list[Advice]:
     found += [f"takes poses of {one.model.name} from {one.poses.source}, which any program of this computer may send"
               for one in rig.objects if one.model is not None and one.poses is not None
               and one.poses.source.startswith("udp:")]
-    return [Advice("info", f"This rig {' and '.join(found)}.")] if found else []
+    return [Advice("info", f"This rig {' and '.join(found)}.", subject="information")] if found else []
 
 
 def calibration_advice(rig: Rig) -> list[Advice]:
@@ -218,12 +224,12 @@ def calibration_advice(rig: Rig) -> list[Advice]:
     if found is None:
         return []
     level: Level = "warning" if found.finding.figure == NOT_CALIBRATED else "info"
-    return [Advice(level, found.finding.sentence, found.mender, lasting=True)]
+    return [Advice(level, found.finding.sentence, found.mender, lasting=True, subject="calibration")]
 
 
 def _visibility_advice(facts: NodeFacts, marker_ids: Sequence[str]) -> list[Advice]:
     if facts.black:
-        return [Advice("warning", f"{facts.status.name} is black: is the lens covered?")]
+        return [Advice("warning", f"{facts.status.name} is black: is the lens covered?", subject="sight")]
     unseen = [(seconds, marker) for seconds, marker in zip(facts.unseen_s, marker_ids, strict=True)
               if seconds > UNSEEN_S]
     if not unseen:
@@ -231,7 +237,7 @@ def _visibility_advice(facts: NodeFacts, marker_ids: Sequence[str]) -> list[Advi
     name, seconds = facts.status.name, max(seconds for seconds, _ in unseen)
     if len(unseen) == len(marker_ids):
         return [Advice("warning", f"Camera {name} has seen no marker for {min(s for s, _ in unseen):.0f} s: hold the "
-                                  "hand into its picture, or calibrate the colours.")]
+                                  "hand into its picture, or calibrate the colours.", subject="sight")]
     names = ", ".join(marker for _, marker in unseen[:3]) + (" and others" if len(unseen) > 3 else "")
     return [Advice("warning", f"Camera {name} has not seen {names} for {seconds:.0f} s: hidden, outside its picture, "
-                              "or the light has changed. Turn the hand, or calibrate the colours.")]
+                              "or the light has changed. Turn the hand, or calibrate the colours.", subject="sight")]

@@ -221,15 +221,17 @@ class Engine:
             if self.recorder is not None and self.recorder.failure:
                 self.record_stop()
             self._follow_nodes()
-            extra = [Advice("error", self._notice)] if self._notice else []
+            extra = [Advice("error", self._notice, subject="recording")] if self._notice else []
             if self.recorder is not None:
-                extra += [Advice("warning", self.recorder.notice)] if self.recorder.notice else []
+                if self.recorder.notice:
+                    extra.append(Advice("warning", self.recorder.notice, subject="recording"))
                 extra += disk_advice(str(self.recorder.path.parent), self.recorder.disk.seconds_left)
             extra += moved_advice(self.rig, self._moved) + hands_advice(self.rig)
             since_s = self._preparing_s
             if since_s is not None and time.monotonic() - since_s > PREPARING_S:
-                extra.append(Advice("info", "The new rig is being prepared; the one before is tracked until then."))
-            extra += [Advice("error", f"{text} {_REPORT}") for text in complaints()]
+                extra.append(Advice("info", "The new rig is being prepared; the one before is tracked until then.",
+                                    subject="information"))
+            extra += [Advice("error", f"{text} {_REPORT}", subject="tracking") for text in complaints()]
             outputs = self._outputs
             extra += [] if outputs is None else [Advice("warning", text) for text in outputs.complaints()]
             status = self._observer.status(str(self.rig_path or ""), self.session, self.running, self.recorder,

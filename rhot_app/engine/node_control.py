@@ -143,8 +143,9 @@ class NodeControl:
             for asked in [asked for asked in peer.asked.values() if now_s > asked.deadline_s]:
                 del peer.asked[asked.number]
                 if asked.command == "video":
-                    peer.video_advice = (Advice("warning", f"Node {peer.node.name} cannot be told to record its video: "
-                                                "its control channel does not answer."),) if peer.video else ()
+                    peer.video_advice = (Advice(
+                        "warning", f"Node {peer.node.name} cannot be told to record its video: its control channel "
+                        "does not answer.", subject="recording"),) if peer.video else ()
                 elif asked.client is not None:
                     error = EngineError(f"node {peer.node.name} does not answer on its control channel "
                                         f"{_endpoints(peer.node)[0]}; is rhot-node running "
@@ -292,7 +293,8 @@ def _take_video_answer(peer: _Peer, answer: Answer) -> None:
     if not peer.video:
         return
     if not answer.get("ok"):
-        peer.video_advice = (Advice("warning", f"No video is recorded: {answer.get('error')}"),)
+        peer.video_advice = (Advice("warning", f"No video is recorded: {answer.get('error')}",
+                                    subject="recording"),)
         return
     video = answer.get("answer", {}).get("video")
     if not isinstance(video, dict):
@@ -300,10 +302,10 @@ def _take_video_answer(peer: _Peer, answer: Answer) -> None:
     name, message, dropped = peer.node.name, printable(str(video.get("message", ""))), video.get("dropped")
     peer.video_advice = ()
     if message:
-        peer.video_advice = (Advice("warning", f"The video of node {name} has ended. {message}"),)
+        peer.video_advice = (Advice("warning", f"The video of node {name} has ended. {message}", subject="recording"),)
     elif isinstance(dropped, int) and dropped > peer.video_dropped:
         peer.video_advice = (Advice("warning", f"Node {name} drops frames of its video, {dropped} so far: its "
-                                    "processor or disk is too slow. Detection goes first."),)
+                                    "processor or disk is too slow. Detection goes first.", subject="recording"),)
     if isinstance(dropped, int):
         peer.video_dropped = dropped
 

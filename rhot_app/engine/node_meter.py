@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import Counter, deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -140,14 +140,16 @@ def foreground_advice(name: str, state: Mapping[str, Any]) -> tuple[Advice, ...]
     known = state.get("foreground")
     if not isinstance(known, Mapping):
         return (Advice("error", f"Node {name} cannot search for a bare hand. Does rhot-node have the version of this "
-                                "program there?"),)
+                                "program there?", subject="tracking"),)
     if known.get("problem"):
-        return (Advice("warning", f"Node {name}: {printable(str(known['problem']))[:SENTENCE_MAX]}", "foreground"),)
+        return (Advice("warning", f"Node {name}: {printable(str(known['problem']))[:SENTENCE_MAX]}", "foreground",
+                       subject="tracking"),)
     if known.get("learning_s"):
-        return (Advice("info", f"Node {name} learns the background: keep the hand out of its picture."),)
+        return (Advice("info", f"Node {name} learns the background: keep the hand out of its picture.",
+                       subject="sight"),)
     if not known.get("background") and known.get("skin") == "none":
         return (Advice("warning", f"Node {name} has learnt neither background nor skin, so no bare hand can be found. "
-                                  "Use Calibrate, Background and skin.", "foreground"),)
+                                  "Use Calibrate, Background and skin.", "foreground", subject="tracking"),)
     return ()
 
 
@@ -164,9 +166,3 @@ def _troubles(state: Mapping[str, Any]) -> list[_Trouble]:
         with contextlib.suppress(msgspec.ValidationError):
             found.append(msgspec.convert(item, _Trouble))
     return found
-
-
-def most_urgent_first(advice: Iterable[Advice]) -> tuple[Advice, ...]:
-    """Errors, then warnings, then the rest, otherwise in their order."""
-    order = ("error", "warning", "info")
-    return tuple(sorted(advice, key=lambda one: order.index(one.level)))

@@ -13,10 +13,10 @@ from rhot_app.calibration.check.health import HealthMonitor, HealthSample
 from rhot_app.calibration.verdict import Grade
 from rhot_app.diagnostics import Diagnostic
 from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice
-from rhot_app.engine.node_meter import RECENT_NS, NodeMeter, most_urgent_first
+from rhot_app.engine.node_meter import RECENT_NS, NodeMeter
 from rhot_app.engine.pipeline import Pipeline
 from rhot_app.engine.rig_watch import HandWatch, RigWatch
-from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus
+from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus, most_urgent_first
 from rhot_app.project import Rig
 from rhot_app.recording.recorder import Recorder
 from rhot_app.sources.receiver import RECEIVE_BUFFER
@@ -69,7 +69,8 @@ class Observer:
             t_master_ns=now_ns, pid=os.getpid(), session=session, running=running,
             condition=self._condition(running, nodes, now_ns).value, rig_name=self.rig.name, rig_path=rig_path,
             state_rate_hz=self._pipeline.states.rate_hz(now_ns), nodes=nodes,
-            advice=most_urgent_first((*extra, *self._advice(nodes, running, now_ns, black))), latency=self._latency,
+            advice=tuple(most_urgent_first((*extra, *self._advice(nodes, running, now_ns, black)))),
+            latency=self._latency,
             log_path="" if recorder is None else str(recorder.path),
             log_bytes=0 if recorder is None else recorder.bytes_written,
             log_seconds=0.0 if recorder is None else recorder.seconds, replaying=self._source.log_path)
@@ -104,8 +105,9 @@ class Observer:
             health = self._health.advice(self._pipeline.last_state, self._pipeline.work.tracker, now_ns)
             found += self.hand_watch.advice(self._pipeline.work.tracker, now_ns)
             found += [*stale, *(one for one in health if not (stale and one.mender == "stereo"))]
-        found += [Advice(one.level, one.sentence) for one in self._diagnosed(now_ns)]
-        notices = [Advice("info", text) for text in self._source.notices()]
+        found += [Advice(one.level, one.sentence, subject="tracking" if one.level == "error" else "sight")
+                  for one in self._diagnosed(now_ns)]
+        notices = [Advice("info", text, subject="information") for text in self._source.notices()]
         return [*found, *nowhere, *calibration_advice(self.rig), *notices]
 
     def _facts(self, camera: int, status: NodeStatus, now_ns: int) -> NodeFacts:
@@ -158,7 +160,7 @@ class HealthWatch:
         if now_ns - self._judged_ns >= JUDGE_NS:
             self._judged_ns = now_ns
             self._advice = [Advice("error" if found.finding.grade is Grade.POOR else "warning", found.finding.sentence,
-                                   found.mender)
+                                   found.mender, subject="calibration")
                             for found in self._monitor.findings()]
         return self._advice
 

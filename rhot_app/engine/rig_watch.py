@@ -74,7 +74,8 @@ class RigWatch:
         found = self._newest
         if found is None or found.holds:
             return []
-        return [Advice("warning", stale_sentence(self._rig, found), MENDER if usable(found) else "stereo")]
+        return [Advice("warning", stale_sentence(self._rig, found), MENDER if usable(found) else "stereo",
+                       subject="calibration")]
 
     def wait(self, timeout_s: float | None = None) -> None:
         """Until what is being judged is judged."""
@@ -123,7 +124,7 @@ class HandWatch:
             self._judged_ns = now_ns
             self._enough = _stated(self._rig.hand) is None and bool(_kept(tracker))
         sentence = "The bare hand has shown how long and how thick its fingers are: its file can be adapted to it."
-        return [Advice("info", sentence, HAND_MENDER)] if self._enough else []
+        return [Advice("info", sentence, HAND_MENDER, subject="information")] if self._enough else []
 
     def wait(self, timeout_s: float | None = None) -> None:
         """Until what is being solved is solved."""

@@ -20,9 +20,8 @@ from rhot_app.engine.commands import Answer, Arguments, Commands, parse, refusal
 from rhot_app.engine.core import Engine, MakeSource, MakeTracker
 from rhot_app.engine.directory import EngineDirectory, EngineLock, open_directory
 from rhot_app.engine.node_control import NodeControl
-from rhot_app.engine.node_meter import most_urgent_first
 from rhot_app.engine.output_process import OutputProcess
-from rhot_app.engine.status import TOPIC_CONTOUR, TOPIC_PREVIEW, TOPIC_STATE, TOPIC_STATUS, encode
+from rhot_app.engine.status import TOPIC_CONTOUR, TOPIC_PREVIEW, TOPIC_STATE, TOPIC_STATUS, encode, most_urgent_first
 from rhot_app.errors import EngineError
 from rhot_app.project import OutputSettings, Rig
 from rhot_app.sources.receiver import share_interpreter
@@ -175,7 +174,7 @@ class Server:
             self._status_due_ns = now_ns + STATUS_NS
             status = self._engine.status()
             self._nodes.ask_for_states(status)
-            status = replace(status, advice=most_urgent_first((*status.advice, *self._nodes.advice())))
+            status = replace(status, advice=tuple(most_urgent_first((*status.advice, *self._nodes.advice()))))
             self._publish(TOPIC_STATUS, encode(status))
             cut_log(self._log_file)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, Protocol, TypeVar, get_args
 
 import msgspec
 import numpy as np
@@ -13,6 +14,9 @@ from rhot_app.outputs.spec import OutputStatus
 from rhot_app.state import HandState, SeenContour
 
 Level = Literal["info", "warning", "error"]
+Subject = Literal["recording", "tracking", "sight", "equipment", "calibration", "information"]
+"""What a sentence is about, most urgent first: data are lost; nothing can be tracked; a camera does not see what it
+should; a machine or a connection works badly; a calibration is missing or in doubt; there is nothing to do."""
 NodeWord = Literal["silent", "starting", "ready", "streaming", "fault"]
 
 
@@ -39,13 +43,30 @@ class NodeStatus:
 @dataclass(frozen=True, slots=True)
 class Advice:
     """One sentence for the operator: what is wrong, where, and what to do. `mender` names the calibration that
-    mends it, as the app's wizards are named; empty for none. `lasting`: it stays until the rig is calibrated, so less
-    urgent sentences must not hide it."""
+    mends it, as the app's wizards are named; empty for none. `lasting`: it stays until the rig is calibrated, so it is
+    shown apart from the others."""
 
     level: Level
     text: str
     mender: str = ""
     lasting: bool = False
+    subject: Subject = "equipment"
+
+
+class _Ranked(Protocol):
+    @property
+    def level(self) -> Level: ...
+    @property
+    def subject(self) -> Subject: ...
+
+
+_Sentence = TypeVar("_Sentence", bound=_Ranked)
+
+
+def most_urgent_first(sentences: Iterable[_Sentence]) -> list[_Sentence]:
+    """In the order in which the operator must act: by subject, then errors before warnings; otherwise as they were."""
+    subjects, levels = get_args(Subject), ("error", "warning", "info")
+    return sorted(sentences, key=lambda one: (subjects.index(one.subject), levels.index(one.level)))
 
 
 @dataclass(frozen=True, slots=True)

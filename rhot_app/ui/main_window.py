@@ -227,7 +227,7 @@ class MainWindow(QMainWindow):
         return self.dialogs.guide_page
 
     def tell(self, notice: Notice) -> None:
-        """Show a sentence for a while: something was done, or could not be done."""
+        """Show a sentence first for a while: something was done, or could not be done."""
         self.passing.show(notice, self.controller.clock())
 
     def _act(self, key: str) -> None:
@@ -265,7 +265,7 @@ class MainWindow(QMainWindow):
         rate = status.state_rate_hz if status is not None and not self.controller.engine_gone else None
         self.toolbar.badge.show_look(look_of(self.controller), rate)
         self.toolbar.show_source(*label_of(self.controller))
-        self.advice.show_notices(notices_of(self.controller, self.passing.current(now)))
+        self.advice.show_notices(self.passing.among(notices_of(self.controller), now))
 
     def _recolour_buttons(self) -> None:
         self._buttons_shown = None

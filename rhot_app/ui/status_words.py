@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -29,24 +29,16 @@ def look_of(controller: Controller) -> Look:
     return condition_look(status.condition) if status is not None else STARTING
 
 
-def notices_of(controller: Controller, passing: Sequence[Notice] = ()) -> list[Notice]:
-    """The sentences of the moment: those that pass by, the app's own, then the engine's; a quiet one beside those that
-    last when there is nothing else to say, so that the bar keeps its height."""
-    passing_texts = {notice.text for notice in passing}
-    notices = [*passing, *(notice for notice in _notices(controller) if notice.text not in passing_texts)]
-    if all(notice.lasting for notice in notices):
-        notices.append(Notice("info", _quiet_sentence(controller, in_order=not notices)))
-    return notices
-
-
-def _notices(controller: Controller) -> list[Notice]:
+def notices_of(controller: Controller) -> list[Notice]:
+    """The sentences that hold at the moment; a quiet one beside those that last when there is nothing else to say."""
     notices: list[Notice] = []
     if controller.engine_gone:
         notices.append(_engine_notice(controller))
     elif controller.problem:
-        notices.append(Notice("error", controller.problem))
+        notices.append(Notice("error", controller.problem, subject="tracking"))
     if controller.twin_gone:
-        notices.append(Notice("error", "The simulated cameras have stopped.", "Start them again", RESTART_TWIN))
+        notices.append(Notice("error", "The simulated cameras have stopped.", "Start them again", RESTART_TWIN,
+                              subject="tracking"))
     if controller.opened is not None and not controller.opened.ours:
         notices.append(Notice("info", "This engine was started outside the app; closing the app lets it run on."))
     status = controller.live.status
@@ -58,6 +50,8 @@ def _notices(controller: Controller) -> list[Notice]:
         notices.append(_pace_notice(controller.twin_pace))
     if controller.background and controller.opened is not None:
         notices.append(Notice("info", controller.background))
+    if all(notice.lasting for notice in notices):
+        notices.append(Notice("info", _quiet_sentence(controller, in_order=not notices)))
     return notices
 
 
@@ -83,9 +77,10 @@ def _advice_notice(advice: Advice) -> Notice:
     """The engine's sentence, with the wizard that mends it as a button."""
     wizard = wizard_named(advice.mender)
     if wizard is None:
-        return Notice(advice.level, advice.text, lasting=advice.lasting)
+        return Notice(advice.level, advice.text, lasting=advice.lasting, subject=advice.subject)
     action = "Calibrate …" if advice.lasting else f"{wizard.title} …"
-    return Notice(advice.level, advice.text, action, f"{OPEN_WIZARD}{wizard.module}", advice.lasting)
+    return Notice(advice.level, advice.text, action, f"{OPEN_WIZARD}{wizard.module}", advice.lasting,
+                  advice.subject)
 
 
 def _pace_notice(pace: TwinPace) -> Notice:
@@ -95,9 +90,11 @@ def _pace_notice(pace: TwinPace) -> Notice:
 
 def _engine_notice(controller: Controller) -> Notice:
     if controller.working:
-        return Notice("error", "The engine stopped. The app is starting it again; the nodes re-join by themselves.")
+        return Notice("error", "The engine stopped. The app is starting it again; the nodes re-join by themselves.",
+                      subject="tracking")
     reason = f" {controller.problem}" if controller.problem else ""
-    return Notice("error", f"The engine stopped and could not be started again.{reason}", "Try again", RESTART_ENGINE)
+    return Notice("error", f"The engine stopped and could not be started again.{reason}", "Try again", RESTART_ENGINE,
+                  subject="tracking")
 
 
 def _quiet_sentence(controller: Controller, *, in_order: bool) -> str:

@@ -8,7 +8,7 @@ import pytest
 from rhot_app.calibration.check.checks import check_rig
 from rhot_app.engine.advice import NodeFacts, calibration_advice, disk_advice, no_marker_advice, node_advice
 from rhot_app.engine.node_meter import Recent
-from rhot_app.engine.status import NodeStatus
+from rhot_app.engine.status import Advice, NodeStatus, most_urgent_first
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, load_rig, with_tracker
 from rhot_node.files import resource_path
 
@@ -99,6 +99,24 @@ def test_one_sentence_when_nobody_sees_anything() -> None:
     assert "No camera has seen a marker for 8 s" in advice.text
     assert node_advice(blind, IDS, True, visibility=False) == []
     assert no_marker_advice([blind, WELL], running=True) == []
+
+
+def test_what_must_be_done_now_comes_before_graver_words_about_less() -> None:
+    blind = replace(WELL, unseen_s=(9.0, 8.0, 10.0))
+    lossy = replace(WELL, recent=Recent(100, 40, {}, 0))
+    gone = replace(WELL, status=replace(STATUS, state="silent"))
+    stale = Advice("error", "The stereo calibration is stale.", "stereo", subject="calibration")
+    said = [stale, *calibration_advice(load_rig(resource_path("rigs", "two_pis.json"))),
+            *node_advice(lossy, IDS, True), *no_marker_advice([blind], running=True), *node_advice(gone, IDS, True),
+            *disk_advice("/data", 300.0)]
+    assert [one.subject for one in most_urgent_first(said)] == ["recording", "tracking", "sight", "equipment",
+                                                               "calibration", "calibration"]
+    assert most_urgent_first(said)[-2] is stale
+
+
+def test_of_one_subject_errors_come_first_and_the_rest_stays_as_it_was() -> None:
+    advice = [Advice("info", "a"), Advice("warning", "b"), Advice("error", "c"), Advice("warning", "d")]
+    assert [one.text for one in most_urgent_first(advice)] == ["c", "b", "d", "a"]
 
 
 def test_lenses_that_nobody_calibrated_are_said_once_and_as_rhot_check_says_it() -> None:

@@ -62,6 +62,7 @@ def test_a_camera_that_was_turned_is_told_until_a_new_run_begins(grasp: Trajecto
         state, now_ns = tracker.solve() or state, frame.t_receive_ns
         found += watch.advice(state, tracker, now_ns)
     assert found and all("stereo calibration is stale" in advice.text for advice in found)
+    assert {advice.subject for advice in found} == {"calibration"}
     watch.restart()
     assert watch.advice(state, tracker, now_ns + STEP_NS) == []
 

@@ -7,8 +7,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from rhot_app.engine.node_meter import SENTENCE_MAX, health_advice, most_urgent_first, sees_black
-from rhot_app.engine.status import Advice
+from rhot_app.engine.node_meter import SENTENCE_MAX, health_advice, sees_black
 from rhot_node.health.checks import BLACK_PICTURE, check_heat, check_power
 from rhot_node.health.machine import Throttled
 
@@ -43,8 +42,3 @@ def test_a_talkative_node_is_cut_short() -> None:
 def test_a_node_does_not_steer_the_terminal() -> None:
     (advice,) = health_advice("left", {"health": [{"level": "error", "text": "\x1b[2Jhot\n", "remedy": "\x9bcool"}]})
     assert advice.text.isprintable()
-
-
-def test_errors_come_first() -> None:
-    advice = [Advice("info", "a"), Advice("warning", "b"), Advice("error", "c"), Advice("warning", "d")]
-    assert [one.text for one in most_urgent_first(advice)] == ["c", "b", "d", "a"]

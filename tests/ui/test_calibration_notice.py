@@ -10,8 +10,7 @@ from test_tracker_dialog import FLOATING
 from rhot_app.calibration.check.camera_calibration import calibration_error
 from rhot_app.engine.status import Advice
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, load_rig
-from rhot_app.ui.models.notice import Notice
-from rhot_app.ui.panels.advice_bar import SHOWN, chosen_of
+from rhot_app.ui.panels.advice_bar import RESERVED
 from rhot_app.ui.scene.hands import spots
 from rhot_app.ui.wizards.framework.plan import wizard_named
 from rhot_node.files import resource_path
@@ -81,7 +80,7 @@ def test_the_notice_stays_where_it_is_while_other_sentences_come_and_go(tracked)
     bench.backend.engine.advice = (Advice("error", "Node left does not answer."), Advice("warning", "It is dark."),
                                    Advice("warning", "Camera right has seen no marker for 5 s."))
     bench.until(lambda: bench.said("left does not answer"))
-    assert len(advice.texts) == SHOWN and HEADLINE in advice.texts[-1]
+    assert len(advice.texts) == RESERVED + 1 and HEADLINE in advice.texts[-1]
     bench.until(lambda: laid_out(bench) and place_of_button(bench) == place)
 
 
@@ -126,10 +125,3 @@ def test_the_hand_and_the_scene_state_no_precision_that_nobody_knows(tracked):
     spot = spots(bench.backend.engine.state(1.0))[0]
     assert "±" not in spot.text(calibration_error(rig)) and "not calibrated" in spot.text(calibration_error(rig))
     assert "±" in spot.text(calibration_error(synthetic_rig()))
-
-
-def test_a_lasting_notice_gives_way_to_none_and_takes_one_line_only():
-    lasting = Notice("info", "lasting", lasting=True)
-    errors = [Notice("error", f"error {number}") for number in range(5)]
-    assert chosen_of([lasting, *errors]) == [*errors[:2], lasting]
-    assert chosen_of(errors) == errors[:SHOWN]

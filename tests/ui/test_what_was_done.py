@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from fake_engine import synthetic_rig
@@ -111,14 +112,26 @@ def test_a_long_sentence_takes_both_lines_and_the_others_wait_in_the_menu(bench)
     bench.window.tell(Notice("error", "The simulated cameras did not start. " * 5))
     bench.until(lambda: label.height() > 30)
     assert label.height() >= label.heightForWidth(label.width()) and advice.height() == height
-    assert [entry.text() for entry in advice.more.menu().actions()] == ["Something was done."]
+    assert advice.waiting[0] == "Something was done."
 
 
-def test_a_sentence_passes_by():
+def test_what_was_done_comes_first_then_yields_then_goes():
     passing, done, failed = TransientNotices(), Notice("info", "done"), Notice("error", "failed")
+    alarm = Notice("error", "alarm", subject="recording")
     passing.show(done, 100.0)
     passing.show(failed, 101.0)
-    assert passing.current(109.9) == [failed, done]
-    passing.show(done, 109.0)
-    assert passing.current(115.9) == [done, failed] and passing.current(116.1) == [done]
-    assert passing.current(120.0) == []
+    assert passing.among([alarm], 109.9) == [failed, done, alarm]
+    assert passing.among([alarm], 110.0) == [failed, alarm, done]
+    passing.show(done, 111.0)
+    assert passing.among([alarm], 115.9) == [done, failed, alarm]
+    assert passing.among([alarm], 116.1) == [done, alarm, failed]
+    assert passing.among([alarm], 130.0) == [alarm, done, failed]
+    assert passing.among([alarm], 161.0) == [alarm, done] and passing.among([alarm], 171.0) == [alarm]
+
+
+def test_a_sentence_stands_once_where_it_is_most_urgent():
+    passing, failed = TransientNotices(), Notice("error", "It is gone.")
+    passing.show(failed, 100.0)
+    standing = [Notice("warning", "It is dark.", subject="sight"), replace(failed, subject="tracking")]
+    assert [notice.text for notice in passing.among(standing, 101.0)] == ["It is gone.", "It is dark."]
+    assert [notice.text for notice in passing.among(standing[:1], 120.0)] == ["It is dark.", "It is gone."]

@@ -11,8 +11,9 @@ from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QInputDialog, QWidget
 
+from rhot_app.engine.status import Level
 from rhot_app.ui.common.controller import Controller
-from rhot_app.ui.models.notice import Level, Notice
+from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
 
 # -- Bookmarks of a recording ------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The sentences at the bottom: what is wrong and what to do; gone when it is mended."""
+"""The sentences at the bottom: what was just done, what is wrong and what to do; gone when it is mended."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QToolButton,
     QVBoxLayout,
     QWidget,
+    QWidgetAction,
 )
 
 from rhot_app.ui.common.shapes import ShapeMark
@@ -24,21 +25,81 @@ from rhot_app.ui.models.palette import Scheme
 
 LOOKS: dict[str, tuple[str, str]] = {"info": ("info", "accent"), "warning": ("half", "caution"),
                                      "error": ("octagon", "fault")}
-SHOWN = 3
 RESERVED = 2
 """Lines of text that are kept free, so that a sentence that comes or goes moves nothing above it."""
 
 _GAP_PX = 4
+_SPACING_PX = 10
 _MARGINS_PX = (12, 5, 12, 5)
 _WRAPPED = 100  # px; narrower than this the bar is not laid out yet
+_LIST_PX = 760
+_SHORTER = 0.95  # of a text that is still too long
 
-_Line = tuple[QWidget, ShapeMark, QLabel, QPushButton]
+
+class NoticeLine(QWidget):
+    """One notice: a mark, its sentence, the next step as a button. It takes its height from `fit`."""
+
+    acted = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.notice: Notice | None = None
+        self.mark, self.label, self.button = ShapeMark(18), QLabel(), QPushButton()
+        self.label.setWordWrap(True)
+        self.label.setTextFormat(Qt.TextFormat.PlainText)
+        self.label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(_SPACING_PX)
+        row.addWidget(self.mark)
+        row.addWidget(self.label, 1)
+        row.addWidget(self.button)
+        self.button.clicked.connect(self.act)
+
+    @property
+    def least_px(self) -> int:
+        """Height of one line: of text, or of a button beside it."""
+        return max(self.fontMetrics().height(), self.button.fontMetrics().height() + 6)
+
+    def show_notice(self, notice: Notice | None, scheme: Scheme) -> None:
+        """Another notice, or none."""
+        self.notice = notice
+        if notice is not None:
+            shape, tone = LOOKS[notice.level]
+            self.mark.set_shape(shape, scheme.tone(tone))
+            self.label.setToolTip(notice.text)
+            self.setAccessibleName(notice.text)
+            self.button.setText(notice.action.replace("&", "&&"))
+            self.button.setVisible(bool(notice.action))
+
+    def fit(self, width: int, room_px: int | None = None) -> tuple[int, bool]:
+        """Show the sentence `width` px wide, in no more than `room_px` of height; the height, and whether it is
+        whole."""
+        text = "" if self.notice is None else self.notice.text
+        self.label.setText(text)
+        if width <= _WRAPPED:
+            return self.least_px, True
+        taken = self.mark.sizeHint().width() + _SPACING_PX
+        if self.notice is not None and self.notice.action:
+            taken += self.button.sizeHint().width() + _SPACING_PX
+        wide = max(width - taken, _WRAPPED)
+        length = len(text)
+        while room_px is not None and length and self.label.heightForWidth(wide) > max(room_px, self.least_px):
+            length = int(_SHORTER * length)
+            self.label.setText(f"{text[:length].rpartition(' ')[0]} …")
+        self.updateGeometry()
+        return max(self.label.heightForWidth(wide), self.least_px), length == len(text)
+
+    def act(self) -> None:
+        """Take the next step, if there is one."""
+        if self.notice is not None and self.notice.key:
+            self.acted.emit(self.notice.key)
 
 
 class AdviceBar(QWidget):
-    """The gravest sentences in two lines that are always there; below them one that lasts, in lines of its own.
+    """The first notices in two lines that are always there; below them one that lasts, in lines of its own.
 
-    What does not fit stands in the menu of `more`.
+    What does not fit, or not wholly, stands in the list of `more`, which Alt+M opens.
     """
 
     acted = Signal(str)
@@ -51,123 +112,107 @@ class AdviceBar(QWidget):
         self.setProperty("guide", "troubles")
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
         self._scheme = scheme
-        self._shown: list[Notice] | None = None
-        self._all: list[Notice] = []
-        self._lines: list[_Line] = []
-        self._on_line: list[Notice | None] = [None] * (SHOWN + 1)
+        self._all: list[Notice] | None = None
+        self._waiting: list[Notice] = []
         self._upper = QWidget()
+        self._lines, self._lasting = [NoticeLine() for _ in range(RESERVED)], NoticeLine()
         column = QVBoxLayout(self._upper)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(_GAP_PX)
-        for _ in range(SHOWN):
-            column.addWidget(self._make_line())
+        for line in self._lines:
+            column.addWidget(line)
         column.addStretch(1)
-        self.more = QToolButton()
-        self.more.setToolTip("Sentences for which there is no room here.")
-        self.more.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        self.more.setMenu(QMenu(self.more))
-        policy = self.more.sizePolicy()
-        policy.setRetainSizeWhenHidden(True)  # or sentences would wrap elsewhere when it comes
-        self.more.setSizePolicy(policy)
-        self.more.setText("0 more")
-        self.more.hide()
+        for line in (*self._lines, self._lasting):
+            line.acted.connect(self.acted)
+            line.hide()
+        self.more = self._make_more()
         upper = QHBoxLayout()
-        upper.setSpacing(10)
+        upper.setSpacing(_SPACING_PX)
         upper.addWidget(self._upper, 1)
         upper.addWidget(self.more, alignment=Qt.AlignmentFlag.AlignBottom)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(*_MARGINS_PX)
         layout.setSpacing(_GAP_PX)
         layout.addLayout(upper)
-        layout.addWidget(self._make_line())
+        layout.addWidget(self._lasting)
         self._fit_height()
 
-    def _make_line(self) -> QWidget:
-        line, mark, label, button = QWidget(), ShapeMark(18), QLabel(), QPushButton()
-        label.setWordWrap(True)
-        label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        row = QHBoxLayout(line)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(10)
-        row.addWidget(mark)
-        row.addWidget(label, 1)
-        row.addWidget(button)
-        index = len(self._lines)
-        button.clicked.connect(lambda: self._act(index))
-        line.hide()
-        self._lines.append((line, mark, label, button))
-        return line
+    def _make_more(self) -> QToolButton:
+        more = QToolButton()
+        more.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        more.setMenu(QMenu(more))
+        more.menu().aboutToShow.connect(self._list_waiting)
+        policy = more.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)  # or sentences would wrap elsewhere when it comes
+        more.setSizePolicy(policy)
+        more.setText("0 &more")
+        more.hide()
+        return more
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours."""
         self._scheme = scheme
-        self._shown = None
-        self.show_notices(self._all)
+        notices, self._all = self._all or [], None
+        self.show_notices(notices)
 
-    def show_notices(self, notices: list[Notice]) -> None:
-        """Show these sentences instead of the last ones."""
-        if notices == self._all and self._shown is not None:
+    def show_notices(self, notices: Sequence[Notice]) -> None:
+        """Show these instead of the last ones, in this order; the first that lasts keeps a line of its own."""
+        if notices == self._all:
             return
-        self._all, self._shown = list(notices), chosen_of(notices)
-        passing = [notice for notice in self._shown if not notice.lasting]
-        self._on_line = [*passing, *[None] * (SHOWN - len(passing)),
-                         next((notice for notice in self._shown if notice.lasting), None)]
-        for (_, mark, label, button), notice in zip(self._lines, self._on_line, strict=True):
-            if notice is not None:
-                shape, tone = LOOKS[notice.level]
-                mark.set_shape(shape, self._scheme.tone(tone))
-                label.setText(notice.text)
-                label.setToolTip(notice.text)
-                button.setText(notice.action)
-                button.setVisible(bool(notice.action))
+        self._all = list(notices)
+        lasting = next((notice for notice in notices if notice.lasting), None)
+        others = [notice for notice in notices if notice is not lasting]
+        for k, line in enumerate(self._lines):
+            line.show_notice(others[k] if k < len(others) else None, self._scheme)
+        self._lasting.show_notice(lasting, self._scheme)
         self._fit_height()
-
-    @property
-    def line_px(self) -> int:
-        """Height of one line: of text, or of a button beside it."""
-        button = self._lines[0][3]
-        return max(self.fontMetrics().height(), button.fontMetrics().height() + 6)
 
     def _fit_height(self) -> None:
         """Show as many sentences as the reserved lines hold; toolbars do not ask how tall wrapped text gets."""
-        room = RESERVED * self.line_px + (RESERVED - 1) * _GAP_PX
+        least = self._lasting.least_px
+        room = left = RESERVED * least + (RESERVED - 1) * _GAP_PX
         self._upper.setFixedHeight(room)
-        width, left, full = self._upper.width(), room, False
-        hidden: list[Notice] = [notice for notice in self._all if notice not in (self._shown or [])]
-        for k, ((line, *_), notice) in enumerate(zip(self._lines[:-1], self._on_line, strict=False)):
-            needed = self._height_of(k, width)
-            full = full or (notice is not None and k > 0 and needed > left)
-            line.setVisible(notice is not None and not full)
-            if notice is not None and full:
-                hidden.append(notice)
-            left -= needed + _GAP_PX
-        lasting = self._on_line[-1] is not None
-        self._lines[-1][0].setVisible(lasting)
-        self._offer(hidden)
+        whole = []
+        for line in self._lines:
+            shown = line.notice is not None and left >= least
+            line.setVisible(shown)
+            if shown:
+                height, complete = line.fit(self._upper.width(), left)
+                left -= height + _GAP_PX
+                whole += [line.notice] if complete else []
         height = room + _MARGINS_PX[1] + _MARGINS_PX[3]
-        if lasting:
-            height += _GAP_PX + self._height_of(SHOWN, self.width() - _MARGINS_PX[0] - _MARGINS_PX[2])
+        self._lasting.setVisible(self._lasting.notice is not None)
+        if self._lasting.notice is not None:
+            whole.append(self._lasting.notice)
+            height += _GAP_PX + self._lasting.fit(self.width() - _MARGINS_PX[0] - _MARGINS_PX[2])[0]
+        self._waiting = [notice for notice in self._all or () if notice not in whole]
+        self.more.setText(f"{len(self._waiting)} &more")
+        self.more.setToolTip("\n".join(self.waiting))
+        self.more.setVisible(bool(self._waiting))
         self.setFixedHeight(height)
 
-    def _height_of(self, index: int, width: int) -> int:
-        """Height of a line's sentence when it is `width` px wide."""
-        line, _, label, _ = self._lines[index]
-        layout = line.layout()
-        assert layout is not None
-        label.updateGeometry()
-        layout.invalidate()  # it would tell the height of the sentence before
-        return max(layout.heightForWidth(width), self.line_px) if width > _WRAPPED else self.line_px
-
-    def _offer(self, hidden: list[Notice]) -> None:
+    def _list_waiting(self) -> None:
+        """The list as it is when it is opened: nothing moves in it under the mouse."""
         menu = self.more.menu()
-        if menu.isVisible():
-            return
         menu.clear()
-        for notice in hidden:
-            entry = menu.addAction(f"{notice.text}  {notice.action}".rstrip())
-            entry.triggered.connect(lambda checked=False, key=notice.key: self.acted.emit(key) if key else None)
-        self.more.setText(f"{len(hidden)} more")
-        self.more.setVisible(bool(hidden))
+        for notice in self._waiting:
+            line = NoticeLine()
+            line.setObjectName("advice")
+            line.show_notice(notice, self._scheme)
+            line.setContentsMargins(*_MARGINS_PX)
+            width = min(_LIST_PX, self.width())
+            height = line.fit(width - _MARGINS_PX[0] - _MARGINS_PX[2])[0]
+            line.setFixedSize(width, height + _MARGINS_PX[1] + _MARGINS_PX[3])
+            line.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+            if notice.action:
+                line.setFocusProxy(line.button)
+            line.acted.connect(self.acted)
+            line.button.clicked.connect(menu.close)
+            entry = QWidgetAction(menu)
+            entry.setText(notice.text)
+            entry.setDefaultWidget(line)
+            entry.triggered.connect(line.act)
+            menu.addAction(entry)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Another width wraps elsewhere."""
@@ -179,26 +224,20 @@ class AdviceBar(QWidget):
 
     @property
     def texts(self) -> list[str]:
-        """The sentences shown."""
-        return [notice.text for notice in self._shown or []]
+        """The sentences shown, if only their beginning; in the order in which they stand."""
+        return [line.notice.text for line in (*self._lines, self._lasting)
+                if line.notice is not None and not line.isHidden()]
+
+    @property
+    def waiting(self) -> list[str]:
+        """The sentences that are not shown, or not wholly: those of the list."""
+        return [notice.text for notice in self._waiting]
 
     @property
     def buttons(self) -> dict[str, QPushButton]:
         """The buttons beside the sentences, by their words."""
-        return {button.text(): button for *_, button in self._lines if button.isVisible()}
-
-    def _act(self, index: int) -> None:
-        notice = self._on_line[index]
-        if notice is not None:
-            self.acted.emit(notice.key)
-
-
-def chosen_of(notices: Sequence[Notice]) -> list[Notice]:
-    """Those that are shown, the gravest first; a lasting one comes last and keeps a line of its own."""
-    order = {"error": 0, "warning": 1, "info": 2}
-    ordered = sorted(notices, key=lambda notice: order[notice.level])
-    lasting = [notice for notice in ordered if notice.lasting][:1]
-    return [*[notice for notice in ordered if not notice.lasting][:SHOWN - len(lasting)], *lasting]
+        return {line.button.text(): line.button for line in (*self._lines, self._lasting)
+                if line.button.isVisible()}
 
 
 def toolbar_of(advice: AdviceBar, parent: QWidget) -> QToolBar:

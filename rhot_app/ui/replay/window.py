@@ -19,12 +19,13 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.engine.observer import condition_of
+from rhot_app.engine.status import Level
 from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.recordings import LOG_FILTER, recordings_folder
-from rhot_app.ui.models.notice import Level, Notice, TransientNotices
+from rhot_app.ui.models.notice import Notice, TransientNotices
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import Look, condition_look
 from rhot_app.ui.panels.advice_bar import AdviceBar
@@ -258,7 +259,7 @@ class ReplayWindow(QMainWindow):
     def tick(self) -> None:
         """Play on, and show what is due."""
         now = self._clock()
-        self.advice.show_notices(self._notices(now))
+        self.advice.show_notices(self.passing.among(lasting_notices(self.replay, working=self.work.running), now))
         if self.replay is None:
             return
         self.replay.player.advance(now)
@@ -271,9 +272,6 @@ class ReplayWindow(QMainWindow):
     def tell(self, level: Level, sentence: str) -> None:
         """Show a sentence for a while."""
         self.passing.show(Notice(level, sentence), self._clock())
-
-    def _notices(self, now: float) -> list[Notice]:
-        return [*self.passing.current(now), *lasting_notices(self.replay, working=self.work.running)]
 
     def open_guide(self) -> None:
         """The guide's page about recordings."""
@@ -297,7 +295,7 @@ def lasting_notices(replay: Replay | None, *, working: bool) -> list[Notice]:
     if replay is None:
         return [Notice("info", "One moment. Cancel leaves nothing behind." if working else
                        "Open a recording (Ctrl+O). F1 opens the guide.")]
-    said = [Notice("warning", replay.run.tracked.note)] if replay.run.tracked.note else []
+    said = [Notice("warning", replay.run.tracked.note, subject="equipment")] if replay.run.tracked.note else []
     if replay.second is not None:
         said.append(Notice("info", f"Solid: {replay.choice.text}. Blue and translucent: {replay.second_choice.text}."))
     return said or [Notice("info", f"Tracked {replay.choice.text}. Space plays, the arrow keys go from state to "
