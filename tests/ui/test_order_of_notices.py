@@ -6,6 +6,7 @@ import pytest
 from PySide6.QtCore import Qt, QTimer
 
 from rhot_app.engine.status import Advice
+from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.panels.advice_bar import NoticeLine
 
 STALE = Advice("error", "The right camera has moved: " + "its rays miss those of the left one by 1.4 px. " * 4,
@@ -67,12 +68,20 @@ def test_a_finished_recording_is_said_before_all_alarms_and_then_yields(desk):
     desk.press(Qt.Key.Key_R)
     desk.until(lambda: bar.texts[0].startswith("Recorded ") and "Show in folder" in bar.buttons)
     recorded = bar.texts[0]
-    assert bar.texts == [recorded, BLIND.text] and bar.waiting == [LOSSY.text, STALE.text]
+    assert bar.texts == [recorded, BLIND.text] and bar.waiting[-2:] == [LOSSY.text, STALE.text]
     desk.let_pass(10.0)
     desk.until(lambda: bar.texts == [BLIND.text, LOSSY.text])
     assert bar.waiting == [STALE.text, recorded]
     desk.let_pass(60.0)
     desk.until(lambda: bar.waiting == [STALE.text])
+
+
+def test_a_long_confirmation_takes_one_line_while_others_wait(desk):
+    bar = desk.window.advice
+    say(desk, BLIND)
+    desk.window.tell(Notice("info", "Recorded to a folder with a long name. " * 8))
+    desk.until(lambda: bar.texts[0].startswith("Recorded"))
+    assert bar.texts[1:] == [BLIND.text] and bar.waiting == bar.texts[:1]
 
 
 def test_the_list_opens_by_key_and_by_mouse_and_holds_whole_sentences(desk):

@@ -54,7 +54,7 @@ class NoticeLine(QWidget):
         row.addWidget(self.mark)
         row.addWidget(self.label, 1)
         row.addWidget(self.button)
-        self.button.clicked.connect(self.act)
+        self.button.clicked.connect(self._act)
 
     @property
     def least_px(self) -> int:
@@ -90,8 +90,7 @@ class NoticeLine(QWidget):
         self.updateGeometry()
         return max(self.label.heightForWidth(wide), self.least_px), length == len(text)
 
-    def act(self) -> None:
-        """Take the next step, if there is one."""
+    def _act(self) -> None:
         if self.notice is not None and self.notice.key:
             self.acted.emit(self.notice.key)
 
@@ -168,18 +167,20 @@ class AdviceBar(QWidget):
         self._fit_height()
 
     def _fit_height(self) -> None:
-        """Show as many sentences as the reserved lines hold; toolbars do not ask how tall wrapped text gets."""
+        """Show as many sentences as the reserved lines hold; toolbars do not ask how tall wrapped text gets. One that
+        asks for nothing takes one line while others wait."""
         least = self._lasting.least_px
         room = left = RESERVED * least + (RESERVED - 1) * _GAP_PX
         self._upper.setFixedHeight(room)
         whole = []
-        for line in self._lines:
-            shown = line.notice is not None and left >= least
-            line.setVisible(shown)
-            if shown:
-                height, complete = line.fit(self._upper.width(), left)
+        for line, following in zip(self._lines, (*self._lines[1:], None), strict=True):
+            notice = line.notice
+            line.setVisible(notice is not None and left >= least)
+            if notice is not None and left >= least:
+                others = following is not None and following.notice is not None
+                height, complete = line.fit(self._upper.width(), least if notice.level == "info" and others else left)
                 left -= height + _GAP_PX
-                whole += [line.notice] if complete else []
+                whole += [notice] if complete else []
         height = room + _MARGINS_PX[1] + _MARGINS_PX[3]
         self._lasting.setVisible(self._lasting.notice is not None)
         if self._lasting.notice is not None:
@@ -211,7 +212,7 @@ class AdviceBar(QWidget):
             entry = QWidgetAction(menu)
             entry.setText(notice.text)
             entry.setDefaultWidget(line)
-            entry.triggered.connect(line.act)
+            entry.triggered.connect(line.button.click)
             menu.addAction(entry)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
