@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.engine.directory import default_directory
+from rhot_app.engine.directory import default_directory, open_directory
 from rhot_app.errors import EngineError, RigError, input_file
 from rhot_app.outputs.spec import HELP, WEB_PORT, parse_output, web_settings
 from rhot_node.terminal import add_examples
@@ -35,6 +35,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--unchecked", action="store_true",
                         help="serve also a rig that `rhot check` refuses, to calibrate it")
     parser.add_argument("--start", action="store_true", help="tell the nodes to stream at once")
+    parser.add_argument("--resume", action="store_true",
+                        help="continue what the engine in this directory did before it crashed: its rig, outputs and "
+                             "tracking, and its recording in a new part beside it")
+    parser.add_argument("--end-unused", action="store_true",
+                        help="end when for half a minute nothing was recorded and no client was connected; the app "
+                             "starts its engine so")
     add_serving_arguments(parser)
     parser.add_argument("--json", action="store_true",
                         help="print one JSON object on standard output when ready: pid, directory, rig")
@@ -81,6 +87,7 @@ def print_addresses(serve: Serving) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the engine until SIGTERM, SIGINT or the command ``quit``."""
+    from rhot_app.engine.activity import read_activity
     from rhot_app.engine.advice import calibration_advice, listening_advice
     from rhot_app.engine.serve import serving
     from rhot_app.keys import load_master_keys
@@ -91,22 +98,28 @@ def run(args: argparse.Namespace) -> int:
     if args.video and args.log is None:
         raise EngineError("--video needs --log FILE: the videos belong to a recording.")
     log_to_stderr(logging.INFO if args.verbose else logging.WARNING)
-    rig = load_rig(args.rig)
+    before = read_activity(open_directory(args.directory)) if args.resume else None
+    rig = load_rig(args.rig) if before is None else before.rig
+    rig_path = args.rig.absolute() if before is None or not before.rig_path else Path(before.rig_path)
+    outputs = dict.fromkeys((*asked_outputs(args), *(() if before is None else before.outputs)))
+    start = args.start or (before is not None and before.running)
     if not args.unchecked:
         _require_acceptable(rig, args.rig)
     own = load_master_keys().own
     source = functools.partial(UdpNodes, own=own)
-    with serving(rig, args.rig.absolute(), source, args.directory, own, asked_outputs(args)) as serve:
-        if args.log is not None:
+    with serving(rig, rig_path, source, args.directory, own, outputs, end_unused=args.end_unused) as serve:
+        if before is not None and before.log_path:
+            serve.engine.record_on(Path(before.log_path), video=before.video)
+        elif args.log is not None:
             serve.engine.record(args.log.absolute(), video=args.video)
-        if args.start:
+        if start:
             serve.engine.start()
         if args.json:
             urls = {output.spec: output.url for output in serve.engine.status().outputs if output.url}
             print(json.dumps({"pid": os.getpid(), "directory": str(serve.directory.path), "rig": rig.name}
                              | ({"outputs": urls} if urls else {})), flush=True)
         else:
-            told = "nodes are told to stream" if args.start else "nodes stream once a client says start"
+            told = "nodes are told to stream" if start else "nodes stream once a client says start"
             print(f"rhot: the engine of {rig.name} serves clients in {serve.directory.path}; {told}. Ctrl+C ends it.",
                   file=sys.stderr, flush=True)
         for advice in (*calibration_advice(rig), *listening_advice(rig)):

@@ -23,10 +23,10 @@ from rhot_app.engine.observer import NodeBlack, NodeMessage, Observer
 from rhot_app.engine.output_process import OutputProcess
 from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work, warm_up
 from rhot_app.engine.status import Advice, EngineStatus
-from rhot_app.errors import EngineError
+from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import Rig, is_rig_file
 from rhot_app.recording.bookmarks import Bookmark, bookmark_record
-from rhot_app.recording.raw_log import begun_now
+from rhot_app.recording.raw_log import CONTINUES, begun_now, next_part
 from rhot_app.recording.recorder import Recorder
 from rhot_app.rig_history import accept
 from rhot_app.sources.links import new_session
@@ -67,6 +67,7 @@ class Engine:
         self._node_message = node_message
         self._node_black = node_black
         self._notice = ""  # why the last recording ended
+        self._continued = ""  # that this recording continues one of before a crash
         self._moved: dict[int, str] = {}  # where nodes were that have moved since the rig was read or saved
         self._shown: dict[str, int] = {}  # times of the contours that were published last
         self._lock = threading.RLock()
@@ -109,8 +110,14 @@ class Engine:
         """Name of the video that every node is to record now; empty for none."""
         return self._video if self.recorder is not None else ""
 
-    def record(self, path: Path, *, video: bool = False) -> None:
+    @property
+    def live(self) -> bool:
+        """Whether its observations come from nodes, not from a recording."""
+        return self._source.live
+
+    def record(self, path: Path, *, video: bool = False, continues: Path | None = None) -> None:
         """Write the raw log to `path` from now on, and have every node record its frames if `video`; a replay has none.
+        `continues`: the log of the part before.
 
         Raises RecordingError, EngineError when something is recorded already.
         """
@@ -121,6 +128,9 @@ class Engine:
             video = video and self._source.live
             name = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(4)}" if video else ""
             about = begun_now(time.monotonic_ns()) | ({"video": name} if video else {})
+            if continues is not None:
+                about[CONTINUES] = continues.name
+            self._continued = ""
             recorder = Recorder(path, self.rig, about)
             try:
                 self._source.record_to(recorder)
@@ -128,6 +138,19 @@ class Engine:
                 recorder.discard()
                 raise
             self._video, self.recorder = name, recorder
+
+    def record_on(self, path: Path, *, video: bool = False) -> None:
+        """Continue in a new part the recording that an engine was writing to `path` when it died. The status says so,
+        or why it could not be."""
+        part = next_part(path)
+        try:
+            self.record(part, video=video, continues=path)
+        except RhotError as exc:
+            self._notice = (f"The engine stopped and was started again. The recording was not continued: {exc} What "
+                            f"came before is in {path}.")
+            return
+        self._continued = (f"The engine stopped and was started again. The recording continues in {part.name}; what "
+                           f"came before is in {path.name}.")
 
     def record_stop(self) -> Path | None:
         """Finish the log; returns its path, or None when nothing was recorded."""
@@ -225,6 +248,8 @@ class Engine:
             if self.recorder is not None:
                 if self.recorder.notice:
                     extra.append(Advice("warning", self.recorder.notice, subject="recording"))
+                if self._continued:
+                    extra.append(Advice("info", self._continued, subject="recording"))
                 extra += disk_advice(str(self.recorder.path.parent), self.recorder.disk.seconds_left)
             extra += moved_advice(self.rig, self._moved) + hands_advice(self.rig)
             since_s = self._preparing_s

@@ -67,6 +67,11 @@ class EngineDirectory:
         return self.path / "twin.log"
 
     @property
+    def activity_file(self) -> Path:
+        """What the engine does, see `rhot_app.engine.activity`."""
+        return self.path / "engine.json"
+
+    @property
     def session_file(self) -> Path:
         """Processes that an app has started, see `rhot_app.engine.process`."""
         return self.path / "session.json"

@@ -70,11 +70,12 @@ def remember_process(directory: EngineDirectory, pid: int, role: str) -> Started
     return process
 
 
-def end_started(directory: EngineDirectory, roles: Sequence[str] | None = None) -> None:
+def end_started(directory: EngineDirectory, roles: Sequence[str] | None = None,
+                timeout_s: float = _END_TIMEOUT_S) -> None:
     """End every process that apps have started here (or those of `roles`), asking first, and forget them."""
     processes = started_processes(directory)
     chosen = [process for process in processes if roles is None or process.role in roles]
-    end_processes(chosen)
+    end_processes(chosen, timeout_s)
     kept = [process for process in processes if process not in chosen]
     if kept:
         write_document(directory.session_file, _Session(kept))
@@ -125,17 +126,18 @@ def running_engine(directory: Path | None = None) -> int | None:
     return lock_holder(open_directory(directory))
 
 
-def ensure_engine(rig_path: Path, directory: Path | None = None, *, start: bool = False,
+def ensure_engine(rig_path: Path, directory: Path | None = None, *, start: bool = False, resume: bool = False,
                   timeout_s: float = START_TIMEOUT_S) -> int:
     """Find the engine in `directory`, or start one on `rig_path` in the background; returns its process id.
 
-    An engine that runs already keeps its own rig. `start` has a new one tell the nodes to stream at once. Raises
-    EngineError with the engine's own words when it does not come up.
+    An engine that runs already keeps its own rig. `start` has a new one tell the nodes to stream at once; with
+    `resume` it continues what the one before did. It ends when nobody uses it. Raises EngineError with the engine's
+    own words when it does not come up.
     """
     place = open_directory(directory)
     pid = lock_holder(place)
     if pid is None:
-        pid = _spawn(rig_path, place, start)
+        pid = _spawn(rig_path, place, start, resume)
     deadline = time.monotonic() + timeout_s
     with EngineClient(place.path, states=False) as client:
         while time.monotonic() < deadline:
@@ -155,9 +157,10 @@ def stop_engine(directory: Path | None = None) -> None:
         end_processes([StartedProcess(pid, ticks, "engine")])
 
 
-def _spawn(rig_path: Path, place: EngineDirectory, start: bool) -> int:
-    command = [sys.executable, "-m", "rhot_app", "engine", "--rig", str(rig_path.absolute()),
-               "--unchecked", "--directory", str(place.path), *(["--start"] if start else [])]
+def _spawn(rig_path: Path, place: EngineDirectory, start: bool, resume: bool) -> int:
+    command = [sys.executable, "-m", "rhot_app", "engine", "--rig", str(rig_path.absolute()), "--unchecked",
+               "--end-unused", "--directory", str(place.path), *(["--start"] if start else []),
+               *(["--resume"] if resume else [])]
     with contextlib.suppress(OSError):
         place.log_file.replace(before(place.log_file))
     with place.log_file.open("ab") as log:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import gc
+import logging
 import os
 import signal
 import time
@@ -16,12 +17,21 @@ from pathlib import Path
 import msgspec
 import zmq
 
+from rhot_app.engine.activity import ActivityNote
 from rhot_app.engine.commands import Answer, Arguments, Commands, parse, refusal
 from rhot_app.engine.core import Engine, MakeSource, MakeTracker
 from rhot_app.engine.directory import EngineDirectory, EngineLock, open_directory
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.output_process import OutputProcess
-from rhot_app.engine.status import TOPIC_CONTOUR, TOPIC_PREVIEW, TOPIC_STATE, TOPIC_STATUS, encode, most_urgent_first
+from rhot_app.engine.status import (
+    TOPIC_CONTOUR,
+    TOPIC_PREVIEW,
+    TOPIC_STATE,
+    TOPIC_STATUS,
+    EngineStatus,
+    encode,
+    most_urgent_first,
+)
 from rhot_app.errors import EngineError
 from rhot_app.project import OutputSettings, Rig
 from rhot_app.sources.receiver import share_interpreter
@@ -34,6 +44,8 @@ from rhot_node.network.context import Context
 from rhot_node.threads import OneShotThread
 
 _COLLECT_S = 5.0
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,15 +61,17 @@ class Serving:
 @contextlib.contextmanager
 def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource, directory: Path | None,
             own: KeyPair | None = None, outputs: Iterable[OutputSettings] = (),
-            rig_outputs: bool = True, trackers: MakeTracker = make_tracker) -> Iterator[Serving]:
+            rig_outputs: bool = True, trackers: MakeTracker = make_tracker,
+            end_unused: bool = False) -> Iterator[Serving]:
     """An engine in its directory, warmed up, frames passing; the caller runs the server. `own`: the master's keys.
     `outputs`: opened besides those of the rig; these are left out without `rig_outputs`. `trackers`: makes
-    the tracker of a rig.
+    the tracker of a rig. `end_unused`: the server ends when the engine has been unused for `UNUSED_S`.
 
     Raises EngineError when another engine holds the directory, SourceError when a port is taken, OutputError for an
     output that cannot be.
     """
     announce_compilation()
+    outputs = tuple(outputs)
     place = open_directory(directory)
     lock = EngineLock(place)
     context = Context()
@@ -71,7 +85,7 @@ def serving(rig: Rig, rig_path: Path | None, make_source: MakeSource, directory:
         engine = Engine(rig, rig_path, make_source, trackers, publish, nodes.message, GarbageMan(), streams,
                         nodes.black)
         stack.callback(engine.close)
-        server = Server(context, place, engine, nodes)
+        server = Server(context, place, engine, nodes, ActivityNote(place, engine, outputs), end_unused=end_unused)
         stack.callback(server.close)
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: server.end())
@@ -108,6 +122,10 @@ class GarbageMan:
 STATUS_NS = 100_000_000
 """Status is published ten times a second, so that a client misses an engine within one."""
 
+UNUSED_S = 30.0
+"""An engine in the background ends after this long without recording, clients and commands: a window that crashed is
+opened again within it, and finds the rig as it was."""
+
 SLOW = frozenset({"set_rig"})
 """Commands that may compile for a minute."""
 
@@ -136,12 +154,18 @@ class StatePublisher:
 class Server:
     """Answers commands, publishes status and previews. `step` belongs to one thread."""
 
-    def __init__(self, context: Context, directory: EngineDirectory, engine: Engine,
-                 nodes: NodeControl) -> None:
+    def __init__(self, context: Context, directory: EngineDirectory, engine: Engine, nodes: NodeControl,
+                 note: ActivityNote | None = None, *, end_unused: bool = False, unused_s: float = UNUSED_S) -> None:
+        """`note`: written at every change. With `end_unused` it ends when for `unused_s` nothing is recorded, no client
+        listens to the events or is connected to an output, and no command has come."""
         self.ending = False
+        self._note = note
+        self._end_unused, self._unused_s = end_unused, unused_s
+        self._used_s = time.monotonic()
+        self._listened: set[bytes] = set()  # topics of the events to which somebody listens
         self._engine = engine
         self._nodes = nodes
-        self._events = _bind(context, zmq.PUB, directory.events)
+        self._events = _bind(context, zmq.XPUB, directory.events)
         self._commands_socket = _bind(context, zmq.ROUTER, directory.commands)
         self._commands = Commands(engine, quit_=self.end, preview=nodes.set_preview)
         self._poller = zmq.Poller()
@@ -177,6 +201,9 @@ class Server:
             status = replace(status, advice=tuple(most_urgent_first((*status.advice, *self._nodes.advice()))))
             self._publish(TOPIC_STATUS, encode(status))
             cut_log(self._log_file)
+            self._note_use(status)
+            if self._note is not None:
+                self._note.step()
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Serve until `end`, or until `until` is true."""
@@ -185,9 +212,24 @@ class Server:
 
     def close(self) -> None:
         """Close all sockets; what was answered last still reaches the client."""
+        if self._note is not None:
+            self._note.step(ended=self.ending)
         self._nodes.close()
         self._events.close()
         self._commands_socket.close(linger=200)
+
+    def _note_use(self, status: EngineStatus) -> None:
+        """Note whether somebody uses the engine, and end when nobody has for long."""
+        with contextlib.suppress(zmq.Again):
+            while True:
+                change = self._events.recv(zmq.DONTWAIT)
+                (self._listened.add if change[:1] == b"\x01" else self._listened.discard)(change[1:])
+        now_s = time.monotonic()
+        if self._listened or status.log_path or any(output.clients for output in status.outputs):
+            self._used_s = now_s
+        if self._end_unused and now_s - self._used_s > self._unused_s:
+            log.warning("Nothing was recorded and no client was connected for %g s: the engine ends.", self._unused_s)
+            self.end()
 
     def _publish(self, topic: bytes, payload: bytes) -> None:
         self._events.send_multipart((topic, payload), zmq.DONTWAIT)
@@ -198,6 +240,7 @@ class Server:
                 client, *frames = self._commands_socket.recv_multipart(zmq.DONTWAIT)
             except zmq.Again:
                 return
+            self._used_s = time.monotonic()
             if len(frames) == 2 and frames[0] == b"":  # as REQ sends them; anything else cannot be answered
                 self._answer(client, frames[1])
 

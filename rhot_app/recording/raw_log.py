@@ -12,6 +12,7 @@ import enum
 import io
 import json
 import os
+import re
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
@@ -60,6 +61,10 @@ class RecordKind(enum.IntEnum):
 
 
 _KINDS = frozenset(int(kind) for kind in RecordKind) - {RecordKind.LANDMARKS, RecordKind.END}
+CONTINUES: Final = "continues"
+"""In the header of a part: name of the log of the part before, which a crash of the engine had ended."""
+
+_PART = re.compile(r"-part(\d{1,6})\Z")
 _MARKS_END = "end_mark"  # in the header: whoever writes this log ends it with a record END
 
 
@@ -113,6 +118,15 @@ class Losses:
         if self.torn_bytes:
             return f"its last {self.torn_bytes} bytes are torn: it was cut off while it was written or copied"
         return "its end is missing: it is still being written, or was cut off" if self.end_missing else ""
+
+
+def next_part(log: Path) -> Path:
+    """A new name beside a log for the part after it: ``NAME-part2.rhotlog``, then ``NAME-part3.rhotlog``."""
+    found = _PART.search(log.stem)
+    number = int(found[1]) if found else 1
+    while (part := log.with_stem(f"{_PART.sub('', log.stem)}-part{number + 1}")).exists():
+        number += 1
+    return part
 
 
 def begun_now(t_master_ns: int) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from rhot_app.engine import client as engine_client
 from rhot_app.engine import core, node_control
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.core import Engine
-from rhot_app.engine.directory import open_directory
+from rhot_app.engine.directory import EngineDirectory, open_directory
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.serve import Server, StatePublisher
 from rhot_app.engine.status import EngineStatus, Preview
@@ -84,9 +84,13 @@ class Bench:
         nodes = NodeControl(self.context)
         publisher = StatePublisher(self.context, place)
         self.engine = Engine(rig, None, UdpNodes, tracker, publisher, nodes.message)
-        self.server = Server(self.context, place, self.engine, nodes)
+        self.server = self.make_server(self.context, place, self.engine, nodes)
         self.thread = threading.Thread(target=self.server.run)
         self.thread.start()
+
+    def make_server(self, context: zmq.Context[zmq.Socket[bytes]], place: EngineDirectory, engine: Engine,
+                    nodes: NodeControl) -> Server:
+        return Server(context, place, engine, nodes)
 
     def close(self) -> None:
         self.server.end()

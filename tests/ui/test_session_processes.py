@@ -82,6 +82,28 @@ def test_an_engine_that_records_is_not_replaced(session, rig_path, tmp_path):
     assert running_engine(session.directory) not in (None, engine)
 
 
+def test_an_engine_that_hangs_is_replaced_and_its_recording_continued(session, rig_path, tmp_path, monkeypatch):
+    session.open_rig(rig_path, quiet)
+    hung = running_engine(session.directory)
+    with session.asker() as client:
+        client.command("record", path=str(tmp_path / "r.rhotlog"))
+        eventually(lambda: "r.rhotlog" in (session.directory / "engine.json").read_text())
+        os.kill(hung, signal.SIGSTOP)
+        monkeypatch.setattr(session_module, "ANSWER_S", 0.3)
+        with pytest.raises(RecordingError, match=rf"r\.rhotlog.*kill {hung}"):
+            session.open_rig(rig_path, quiet)
+        assert running_engine(session.directory) == hung, "an engine that records is not replaced by another rig"
+        monkeypatch.setattr(session_module, "ANSWER_S", PATIENCE_S)
+        os.kill(hung, signal.SIGCONT)
+        with pytest.raises(RecordingError, match="Stop that recording"):
+            session.open_rig(rig_path, quiet)
+        os.kill(hung, signal.SIGSTOP)
+        monkeypatch.setattr(session_module, "ANSWER_S", 0.3)
+        session.restart_engine(str(rig_path), False, quiet)
+        assert running_engine(session.directory) not in (None, hung)
+        assert client.command("status", timeout_s=PATIENCE_S)["status"]["log_path"] == str(tmp_path / "r-part2.rhotlog")
+
+
 def test_a_missing_rig_starts_nothing(session, tmp_path):
     with pytest.raises(RigError, match="no such file"):
         session.open_rig(tmp_path / "none.json", quiet)

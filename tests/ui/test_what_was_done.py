@@ -32,6 +32,18 @@ def test_r_records_and_says_where_the_file_is(tracking, tmp_path, monkeypatch):
     tracking.until(lambda: tracking.said(f"in {path.parent}"))
 
 
+def test_a_recording_that_continues_in_another_part_is_not_called_finished(tracking, tmp_path):
+    tracking.press(Qt.Key.Key_R)
+    tracking.until(lambda: tracking.controller.recording)
+    part = Path(tracking.backend.engine.log_path).with_name("part2.rhotlog")
+    part.write_bytes(bytes(1000))
+    tracking.backend.engine.log_path = str(part)
+    tracking.until(lambda: tracking.said("Recording to", str(part)))
+    assert not tracking.said("Recorded")
+    tracking.press(Qt.Key.Key_R)
+    tracking.until(lambda: tracking.said("Recorded 1.0 kB", str(part)))
+
+
 def test_video_is_recorded_when_it_is_switched_on_and_the_switch_is_remembered(tracking):
     commands, switch = tracking.backend.engine.commands, tracking.window.actions_.video
 

@@ -2,13 +2,15 @@
 
 ``python -m rhot_app.simulator.nodes.live --directory DIR --rig OUT.json``. It writes a rig file with the daemons' real
 ports and prints one JSON line when all is ready, later others about its pace. It shows what its clients ask for
-(docs/twin.md), starts a daemon again that has died, and ends on SIGTERM with both.
+(docs/twin.md), starts a daemon again that has died, and ends on SIGTERM with both. With ``--while-locked`` it also ends
+when the program that started it and the engine have ended.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import fcntl
 import json
 import os
 import signal
@@ -148,14 +150,50 @@ def socket_path(directory: Path, name: str) -> Path:
     return directory / f"{name}.frames"
 
 
+# -- whether somebody uses it -----------------------------------------------------------------------------------------
+
+UNUSED_S = 30.0
+"""As long as an engine without clients goes on; one that crashed has been started again by then."""
+
+_LOOK_S = 1.0
+
+
+class Use:
+    """Whether the program that started this one still runs, or an engine that has locked `lock_file`."""
+
+    def __init__(self, lock_file: Path, unused_s: float = UNUSED_S) -> None:
+        self._lock_file, self._unused_s = lock_file, unused_s
+        self._parent = os.getppid()
+        self._used_s = self._looked_s = time.monotonic()
+
+    def over(self) -> bool:
+        """Whether neither has run for `unused_s`; looks once a second."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s >= _LOOK_S:
+            self._looked_s = now_s
+            if os.getppid() == self._parent or self._is_locked():
+                self._used_s = now_s
+        return now_s - self._used_s > self._unused_s
+
+    def _is_locked(self) -> bool:
+        try:
+            with self._lock_file.open("rb") as file:
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+        return False
+
+
 # -- the live twin -----------------------------------------------------------------------------------------------------
 
 _NICE = 5
 LOG_NAME = "twin.log"  # where the app has it write (`EngineDirectory.twin_log_file`)
 
 
-def run(scene: Scene, show: Show, directory: Path, rig_path: Path) -> None:
-    """Run until interrupted (KeyboardInterrupt). Raises RhotError, NodeError."""
+def run(scene: Scene, show: Show, directory: Path, rig_path: Path, over: Callable[[], bool] = lambda: False) -> None:
+    """Run until `over` or interrupted (KeyboardInterrupt). Raises RhotError, NodeError."""
     directory.mkdir(parents=True, exist_ok=True)
     stage = LiveScene(scene, show)
     with contextlib.ExitStack() as stack:
@@ -171,7 +209,7 @@ def run(scene: Scene, show: Show, directory: Path, rig_path: Path) -> None:
         door.start()
         print(json.dumps({"event": "ready", "rig": str(rig_path), "pid": os.getpid()}), flush=True)
         pace = Pace(scene.preset.fps)
-        while True:
+        while not over():
             cameras.step()
             supervisor.step()
             cut_log(directory / LOG_NAME)
@@ -189,13 +227,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add_show_arguments(parser)
     parser.add_argument("--directory", type=Path, required=True, help="folder for sockets, settings and logs")
     parser.add_argument("--rig", type=Path, required=True, help="rig file to write when the nodes are ready")
+    parser.add_argument("--while-locked", type=Path, metavar="FILE",
+                        help="end when the program that started this one has ended and for half a minute no engine has "
+                             "locked FILE")
     args = parser.parse_args(arguments)
     log_to_stderr()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with contextlib.suppress(OSError):
         os.nice(_NICE)
     try:
-        run(scene_of(args), show_of(args), args.directory.absolute(), args.rig.absolute())
+        directory = args.directory.absolute()
+        over = (lambda: False) if args.while_locked is None else Use(args.while_locked).over
+        run(scene_of(args), show_of(args), directory, args.rig.absolute(), over)
     except (RhotError, NodeError) as exc:
         print(f"rhot: {exc}", file=sys.stderr)
         return 2

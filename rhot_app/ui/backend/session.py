@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from rhot_app.engine.activity import read_activity
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.compilation import compile_part, part_of
 from rhot_app.engine.directory import EngineDirectory, open_directory
@@ -41,6 +42,12 @@ TWIN_ROLE = "simulated nodes"
 COMPILER_ROLE = "compiler"
 START_TIMEOUT_S = 360.0
 """A slow or busy machine takes long, above all where compiled code cannot be kept."""
+
+ANSWER_S = 5.0
+"""An engine answers within a fraction of this on a busy computer; one that does not hangs."""
+
+HUNG_S = 0.5
+"""Between asking a process that hangs to end and killing it."""
 
 TWIN_COMMAND: tuple[str, ...] = (sys.executable, "-m", "rhot_app.simulator.nodes.live")
 TWIN_RIG = "simulated.rig.json"
@@ -110,11 +117,15 @@ class Session:
         return self._start_engine(rig_path, report)
 
     def restart_engine(self, path: str, start: bool, report: Report) -> Opened:
-        """Start the engine again on the same rig; `start` has it tell the nodes to stream at once."""
+        """Start the engine again after it died or hangs: on the same rig, and it continues what it recorded. `start`
+        has it tell the nodes to stream at once."""
         if not path:
             raise EngineError("The engine had no rig file, so it cannot be started again. Open a rig.")
         report("Starting the engine again …", 0.3)
-        ensure_engine(Path(path), self._place.path, start=start, timeout_s=START_TIMEOUT_S)
+        if self.found() and self._recorded_log() is None:
+            self._require_ours()
+            end_started(self._place, [ENGINE_ROLE], HUNG_S)
+        ensure_engine(Path(path), self._place.path, start=start, resume=True, timeout_s=START_TIMEOUT_S)
         return self.attach(report)
 
     def twin_alive(self) -> bool:
@@ -168,23 +179,36 @@ class Session:
         return any(process.pid == pid for process in started_processes(self._place))
 
     def _clear(self, report: Report) -> None:
-        if self.found() and not self._engine_is_ours():
-            raise EngineError(f"An engine that was started by hand runs in {self._place.path}. Stop it first, or start "
-                              "the app with another --directory.")
-        self._require_not_recording()
+        if self.found():
+            self._require_ours()
+            self._require_not_recording()
         report("Ending what ran before …", 0.12)
         self._twin_started = False
         end_started(self._place)
 
     def _require_not_recording(self) -> None:
-        """Raises EngineError when the engine that is to be replaced records."""
-        if not self.found():
-            return
-        with contextlib.suppress(EngineError), EngineClient(self._place.path, states=False, events=False) as client:
-            log_path = client.command("status", timeout_s=1.0)["status"]["log_path"]
-            if log_path:
-                raise RecordingError(f"The engine in {self._place.path} records to {log_path}. Stop that recording "
-                                     "first, or start with another --directory.")
+        """Raises RecordingError when the engine that is to be replaced records, or did when it fell silent."""
+        log_path = self._recorded_log()
+        if log_path:
+            raise RecordingError(f"The engine in {self._place.path} records to {log_path}. Stop that recording "
+                                 "first, or start with another --directory.")
+        activity = read_activity(self._place) if log_path is None else None
+        if activity is not None and activity.log_path:
+            pid = running_engine(self._place.path)
+            raise RecordingError(f"The engine in {self._place.path} records to {activity.log_path} and gives no answer "
+                                 f"in {ANSWER_S:g} s. Try again, or end it with `kill {pid}`; what it has recorded is "
+                                 "kept.")
+
+    def _recorded_log(self) -> str | None:
+        """What the running engine records, "" for nothing; None when it gives no answer."""
+        with contextlib.suppress(EngineError), self.asker() as client:
+            return str(client.command("status", timeout_s=ANSWER_S)["status"]["log_path"])
+        return None
+
+    def _require_ours(self) -> None:
+        if not self._engine_is_ours():
+            raise EngineError(f"An engine that was started by hand runs in {self._place.path}. Stop it first, or start "
+                              "the app with another --directory.")
 
     def _compile(self, part: str, report: Report) -> None:
         compile_part(part, report, lambda pid: remember_process(self._place, pid, COMPILER_ROLE))
@@ -201,7 +225,8 @@ class Session:
         errors = self._place.twin_log_file
         command = [*TWIN_COMMAND, "--motion", choice.motion,
                    "--seed", str(choice.seed), "--preset", choice.preset,
-                   "--directory", str(self._place.path), "--rig", str(rig_path)]
+                   "--directory", str(self._place.path), "--rig", str(rig_path),
+                   "--while-locked", str(self._place.lock_file)]
         with contextlib.suppress(OSError):
             errors.replace(before(errors))
         with output.open("wb") as out, errors.open("ab") as log:

@@ -97,7 +97,7 @@ class Recordings:
         if status is None or status.log_path == self._log_path:
             return
         finished, self._log_path = self._log_path, status.log_path
-        if finished:
+        if finished and not status.log_path:  # else it continues in a new part, as the status says
             self._confirm(Path(finished))
 
     def _confirm(self, path: Path) -> None:

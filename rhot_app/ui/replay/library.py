@@ -18,13 +18,13 @@ from rhot_app.errors import RecordingError, RhotError
 from rhot_app.progress import Progress, silent
 from rhot_app.project import with_tracker
 from rhot_app.recording.bookmarks import bookmarks_of
-from rhot_app.recording.raw_log import LogReader
+from rhot_app.recording.raw_log import CONTINUES, LogReader
 from rhot_app.recording.video import videos_of
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.trackers import make_tracker
 from rhot_app.ui.dialogs.recordings import LOG_SUFFIX
 from rhot_app.ui.replay.run import CODES, LOST, ReadableLog, being_recorded, condition_bins
-from rhot_node.errors import NodeError
+from rhot_node.errors import NodeError, printable
 from rhot_node.files import write_document
 
 TRASH = ".trash"
@@ -38,7 +38,7 @@ _FORMAT = 1
 @dataclass(frozen=True, slots=True)
 class Entry:
     """One recording in the list. `problem` says why it cannot be read, "" when it can. `video`: its nodes
-    recorded their frames, too."""
+    recorded their frames, too. `continues`: the recording whose next part it is, "" for none."""
 
     path: Path
     created: datetime
@@ -46,6 +46,7 @@ class Entry:
     rig_name: str
     problem: str = ""
     video: bool = False
+    continues: str = ""
 
 
 class Summary(msgspec.Struct, frozen=True):
@@ -182,7 +183,8 @@ def _entry(path: Path) -> Entry:
     reader.close()
     with contextlib.suppress(ValueError, TypeError):
         written = datetime.fromisoformat(reader.about.get("created", "")).astimezone()
-    return Entry(path, written, facts.st_size, reader.rig.name, video="video" in reader.about)
+    continues = Path(str(reader.about.get(CONTINUES, ""))).stem
+    return Entry(path, written, facts.st_size, reader.rig.name, "", "video" in reader.about, printable(continues))
 
 
 def _refuse_while_recorded(path: Path) -> None:

@@ -165,6 +165,8 @@ class LibraryWindow(QDialog):
                 ] if undoable else []
         if entry is not None and entry.problem:
             said.append(entry.problem)
+        elif entry is not None and entry.continues:
+            said.append(f"{entry.path.stem} continues {entry.continues}: the engine had stopped and was started again.")
         self.sentence.setText("\n".join(said))
 
     # -- what the buttons do ---------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QLineEdit, QWidget
 
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
-from rhot_app.recording.raw_log import LogReader, RecordKind, encode_header, encode_record
+from rhot_app.recording.raw_log import CONTINUES, LogReader, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
 from rhot_app.recording.video import Collected
 from rhot_app.ui.models.palette import DARK
@@ -204,6 +204,17 @@ def test_what_is_being_recorded_is_left_alone(shelf, folder, log):
             shelf.window.library.rename(recorder.path, "then")
     finally:
         recorder.close()
+
+
+def test_a_part_is_shown_as_what_it_is(make_shelf, folder, log, tmp_path):
+    reader = LogReader(log)
+    reader.close()
+    (folder / f"{GRASP}-part2.rhotlog").write_bytes(encode_header(reader.rig, {CONTINUES: log.name}))
+    shelf = make_shelf(folder, tmp_path / "cache")
+    shelf.choose(GRASP)
+    assert not shelf.window.sentence.text()
+    shelf.choose(f"{GRASP}-part2")
+    assert "continues" in shelf.window.sentence.text() and GRASP in shelf.window.sentence.text()
 
 
 def test_the_folder_is_opened_or_named(shelf, folder, monkeypatch):
