@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+from packaging.version import Version
 
 ROOT = Path(__file__).parents[2]
 SYSTEMS = ("bookworm", "trixie")
@@ -40,6 +41,13 @@ def test_every_dependency_of_the_node_is_constrained_to_a_version_it_allows(syst
 
 def test_bookworms_numpy_is_that_of_its_picamera2() -> None:
     assert pinned("bookworm")["numpy"].startswith("1.")
+
+
+def test_opencv_is_later_than_its_hole_wherever_numpy_lets_it_be() -> None:
+    """CVE-2025-53644 is in 4.10 and 4.11; from 4.12 on OpenCV needs numpy 2."""
+    versions = {system: Version(pinned(system)["opencv-python-headless"]) for system in SYSTEMS}
+    assert Version("4.12") <= versions["trixie"] < Version("5")
+    assert Version("4.11") <= versions["bookworm"] < Version("4.12"), "only what numpy 1 holds back"
 
 
 def link_dependencies(folder: Path) -> None:

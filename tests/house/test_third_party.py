@@ -1,9 +1,8 @@
-"""THIRD_PARTY.md names every package that is asked for, and every file of others that ships."""
+"""THIRD_PARTY.md names every package that is locked, and every file of others that ships."""
 
 from __future__ import annotations
 
 import re
-import tomllib
 from pathlib import Path
 
 from packaging.requirements import Requirement
@@ -12,12 +11,18 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "THIRD_PARTY.md").read_text()
 
 
-def test_every_dependency_has_a_licence() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = sum(project["optional-dependencies"].values(), project["dependencies"])
-    named = set(re.split(r"[|,\s]+", PAGE))
-    missing = [name for name in (Requirement(text).name for text in wanted) if name not in named]
-    assert not missing, f"THIRD_PARTY.md does not name {', '.join(missing)}"
+def test_every_locked_package_is_listed_with_version_licence_and_address() -> None:
+    locked: dict[str, list[str]] = {}
+    for line in (ROOT / "requirements" / "app.lock").read_text().splitlines():
+        if line and line[0].isalnum():
+            requirement = Requirement(line.rstrip(" \\"))
+            locked.setdefault(requirement.name, []).append(str(requirement.specifier).removeprefix("=="))
+    table = PAGE.partition("<!-- packages -->")[2].partition("<!-- end -->")[0].strip().splitlines()[2:]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
+    assert {name: versions.split(", ") for name, versions, *_ in rows} == locked, (
+        "renew it: python requirements/third_party.py")
+    for name, _, use, licence, address in rows:
+        assert use and licence and address.startswith("http"), name
 
 
 def test_files_of_others_are_as_they_were_published() -> None:
