@@ -28,7 +28,7 @@ STATED = {
     "bvh": "MIT", "colorama": "BSD-3-Clause", "eclipse-zenoh": "EPL-2.0 OR Apache-2.0", "ezc3d": "MIT",
     "jinja2": "BSD-3-Clause", "lz4": "BSD-3-Clause", "numba": "BSD-2-Clause", "openvr": "BSD-3-Clause",
     "partd": "BSD-3-Clause", "pyopengl": "BSD-3-Clause", "python-osc": "Unlicense", "pyvirtualdisplay": "BSD-2-Clause",
-    "scipy": "BSD-3-Clause", "zict": "BSD-3-Clause"}
+    "scipy": "BSD-3-Clause", "tqdm": "MPL-2.0 AND MIT", "zict": "BSD-3-Clause"}
 """Licences of packages whose metadata say less, by the licence that they carry."""
 
 ELSEWHERE = {"cffi": ("MIT-0", "https://cffi.readthedocs.io/"),

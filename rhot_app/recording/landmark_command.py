@@ -1,4 +1,5 @@
-"""``rhot landmarks``: landmark tables of a bare hand as a raw log, tracked once, with a summary."""
+"""``rhot landmarks``: landmark tables of a bare hand as a raw log, tracked once, with a summary; or the installation of
+the networks that find landmarks."""
 
 from __future__ import annotations
 
@@ -13,12 +14,18 @@ import numpy as np
 
 from rhot_app.errors import RecordingError, input_file, positive_number
 from rhot_app.hand.landmarks import ANATOMY_SD_M, COMMON_M, LASTING_M, NOISE_M
+from rhot_app.progress import ProgressLine
+from rhot_node.landmarks import install_command
+from rhot_node.landmarks.install import LICENCE, PACKAGE
+from rhot_node.landmarks.install_command import add_wheel
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
     from rhot_app.state import HandState
 
+
+INSTALL = "install"
 
 MEDIAN_M = math.sqrt(2.0 * math.log(2.0) * (ANATOMY_SD_M**2 + LASTING_M**2 + COMMON_M**2 + NOISE_M**2))
 """m: median distance of a landmark from its joint (`hand.landmarks`): a Rayleigh distribution's."""
@@ -30,20 +37,43 @@ recorded hand in docs/landmarks.md with the shipped bones, and 1.8 with a wrong 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot landmarks``."""
-    parser.add_argument("tables", type=input_file, nargs="+", metavar="CSV",
-                        help="a landmark table for each camera, in the rig's order (docs/landmarks.md)")
-    parser.add_argument("--rig", type=input_file, required=True, metavar="FILE",
+    parser.usage = ("%(prog)s [-h] CSV [CSV ...] --rig FILE --out LOG [--fps N] [--json]\n"
+                    "       %(prog)s install [--wheel FILE]")
+    parser.add_argument("tables", type=_table_or_install, nargs="+", metavar="CSV",
+                        help="a landmark table for each camera, in the rig's order (docs/landmarks.md); or the word "
+                             f"install: place the hand networks on this machine (of {PACKAGE}, {LICENCE})")
+    parser.add_argument("--rig", type=input_file, metavar="FILE",
                         help="the calibrated rig, with the marker set landmarks21")
-    parser.add_argument("--out", type=Path, required=True, metavar="LOG", help="the raw log to write; a new file")
+    parser.add_argument("--out", type=Path, metavar="LOG", help="the raw log to write; a new file")
     parser.add_argument("--fps", type=positive_number, default=None, metavar="N",
                         help="frames per second of tables without times")
     parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
-    add_examples(parser, "rhot landmarks left.csv right.csv --rig desk.json --out hand.rhotlog",
-                 "rhot landmarks left.csv right.csv --rig desk.json --fps 30 --out hand.rhotlog")
+    add_examples(parser, "rhot landmarks left.csv right.csv --rig desk.json --fps 30 --out hand.rhotlog",
+                 "rhot landmarks install")
+    add_wheel(parser)
+    parser.set_defaults(refuse=parser.error)
+
+
+def _table_or_install(text: str) -> Path | None:
+    """A table; None for the word install. A table of that name is ./install."""
+    return None if text == INSTALL else input_file(text)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the log, track it, print the summary. Raises RecordingError and RigError."""
+    """Write the log, track it, print the summary. Raises RecordingError and RigError; KeypointError when networks
+    cannot be installed."""
+    if None in args.tables:
+        if len(args.tables) > 1 or args.rig is not None or args.out is not None:
+            args.refuse("install stands alone, or with --wheel FILE")
+        progress = ProgressLine("Installing the hand networks")
+        return install_command.install(args.wheel, False, progress.report)
+    missing = [option for option, value in (("--rig", args.rig), ("--out", args.out)) if value is None]
+    if missing or args.wheel is not None:
+        args.refuse(f"a log of landmarks needs {' and '.join(missing)}" if missing else "--wheel belongs to install")
+    return _write_log(args)
+
+
+def _write_log(args: argparse.Namespace) -> int:
     from rhot_app.project import load_rig, with_tracker
     from rhot_app.recording.landmark_log import landmark_order, read_landmark_table, write_landmark_log
     from rhot_node.compiled import announce_compilation

@@ -44,14 +44,23 @@ def _doctor(name: str) -> Command:
     return parser, doctor_command.run
 
 
+def _landmarks(name: str) -> Command:
+    from rhot_node.landmarks import install_command
+    parser = _parser(name, install_command.SUMMARY)
+    install_command.add_arguments(parser)
+    return parser, install_command.run
+
+
 def _parser(name: str, description: str) -> argparse.ArgumentParser:
     return argparse.ArgumentParser(prog=f"rhot-node {name}", description=description)
 
 
 COMMANDS: dict[str, Callable[[str], Command]] = {
-    "detect": _detect, "doctor": _doctor, "install": _service, "uninstall": _service, "pair": _trust, "unpair": _trust}
+    "detect": _detect, "doctor": _doctor, "install": _service, "landmarks": _landmarks, "pair": _trust,
+    "uninstall": _service, "unpair": _trust}
 HELP = """rhot-node detect   finds markers in files instead
 rhot-node doctor   looks at power, heat, memory, clock, network, camera and says what to do
 rhot-node install, rhot-node uninstall   make the node a system service
+rhot-node landmarks install   install the networks that find a bare hand's landmarks
 rhot-node pair, rhot-node unpair   who may use this node
 (each with --help)"""

@@ -35,7 +35,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot layers": ("FILE", "--angle", "--from", "--out", "--force", "--json"),
     "rhot fit-hand": ("--rig", "--pictures", "--at", "--hand", "--save", "--settings"),
     "rhot recover": ("LOG", "--out", "--rig"),
-    "rhot landmarks": ("CSV", "--rig", "--out", "--fps", "--json"),
+    "rhot landmarks": ("CSV", "--rig", "--out", "--fps", "--json", "install", "--wheel"),
     "rhot bare-hand": ("--rig", "--video", "--background", "--background-seconds", "--fps", "--offset-s",
                        "--unknown-size", "--out", "--overlay", "--force", "--json"),
     "rhot export": ("LOG", "--out", "--format", "--rig", "--tracker", "--rate", "--frame", "--units", "--hand",
@@ -80,6 +80,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot-node doctor": ("--settings", "--json"),
     "rhot-node install": ("--node-id", "--name", "--settings", "--camera", "--user", "--dry-run"),
     "rhot-node uninstall": ("--user",),
+    "rhot-node landmarks": ("install", "--wheel", "--service"),
     "rhot-node detect": ("--markers", "--detector", "--all", "--json"),
 }
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 ROOT = Path(__file__).parents[2]
@@ -20,9 +21,10 @@ MASTERS_IMPORTS = {"scipy", "PySide6", "pyqtgraph", "OpenGL", "rhot_app"}
 MASTERS_ONLY = {"scipy", "pyside6-essentials", "pyqtgraph", "pyopengl"}
 
 
-def node_dependencies() -> dict[str, Requirement]:
+def node_dependencies(*extras: str) -> dict[str, Requirement]:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    return {requirement.name: requirement for requirement in map(Requirement, project["dependencies"])}
+    wanted = sum((project["optional-dependencies"][extra] for extra in extras), project["dependencies"])
+    return {requirement.name: requirement for requirement in map(Requirement, wanted)}
 
 
 def pinned(system: str) -> dict[str, str]:
@@ -33,7 +35,7 @@ def pinned(system: str) -> dict[str, str]:
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_every_dependency_of_the_node_is_constrained_to_a_version_it_allows(system: str) -> None:
     pins = pinned(system)
-    for name, requirement in node_dependencies().items():
+    for name, requirement in node_dependencies("landmarks").items():
         assert name in pins, f"{name} is missing in requirements/node-{system}.txt; renew it (CONTRIBUTING.md)"
         assert requirement.specifier.contains(pins[name]), f"{requirement}, but {system} has {pins[name]}"
     assert not MASTERS_ONLY & set(pins)
@@ -100,5 +102,6 @@ def test_pip_finds_all_of_it_for_a_pi() -> None:
     lines = done.stdout.splitlines()
     assert [line.split(",")[0] for line in lines] == list(SYSTEMS)
     for system, line in zip(SYSTEMS, lines, strict=True):
-        found = dict(item.split(" ") for item in line.split(": ")[1].split(", "))
+        found = {canonicalize_name(name): version
+                 for name, version in (item.split(" ") for item in line.split(": ")[1].split(", "))}
         assert found == pinned(system), "the constraints name exactly what is installed"

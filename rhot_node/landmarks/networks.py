@@ -1,0 +1,259 @@
+"""Hands of a picture by two networks: one finds palms in the whole picture, one 21 landmarks in a region about a hand.
+
+The next picture's region follows from the landmarks, so that palms are searched for only where a hand is missing.
+Source of the geometry: MediaPipe Hands (Zhang et al. 2020), graphs `palm_detection` and `hand_landmark` of the version
+that `install` names. Its pixels are kept: a region is sampled without half a pixel.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_node.errors import KeypointError
+from rhot_node.landmarks.install import installed_folder, read_network
+from rhot_node.landmarks.runtime import Network, Tensor, best_runtime, open_network
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+MODELS: Final = ("full", "lite")
+PALM_PX: Final = 192
+HAND_PX: Final = 224
+"""Sides of the networks' inputs."""
+
+LEAST_PROBABILITY: Final = 0.5
+"""Of a palm, and of a hand's presence: less is none."""
+
+SEARCH_EVERY: Final = 10
+"""Pictures from one search for a further hand to the next. A search costs about as much as the landmarks of a hand, so
+that it takes a tenth of the time."""
+
+OVERLAP: Final = 0.3
+"""Intersection over union from which two boxes are of one palm (MediaPipe's `min_suppression_threshold`)."""
+
+SAME: Final = 0.125
+"""Part of a region's side: two palms that are less apart are one hand. It is a quarter of a hand's extent."""
+
+HAND_SIGMA: Final = 0.004
+"""Standard deviation of a landmark's own error, per axis, as a part of its region's side
+(`python benchmarks/hand_networks.py`)."""
+
+PALM_LANDMARKS: Final = (0, 5, 9, 13, 17, 1, 2)
+"""The landmarks that the palm detector finds, too, in its order."""
+
+_STEADY = (0, 1, 2, 3, 5, 6, 9, 10, 13, 14, 17, 18)  # the landmarks of the next region: no fingertips
+_SAMPLED_PX = 4.0  # a region of more px of the picture per px of the network is averaged before it is sampled
+_SMALLEST_PX = 8.0  # a region of less shows nothing
+
+
+class Region(NamedTuple):
+    """A square region of a picture. `centre` (2,) px, (0, 0) at the centre of the first pixel; `side` px; `turn` rad:
+    clockwise, how the hand's upright stands in the picture."""
+
+    centre: Array
+    side: float
+    turn: float
+
+    def from_input(self, size: int) -> Array:
+        """(2, 3): px of a network's input of `size` px, counted from its corner, to px of the picture."""
+        c, s = self.side / size * math.cos(self.turn), self.side / size * math.sin(self.turn)
+        into = np.array([[c, -s], [s, c]])
+        return np.column_stack([into, self.centre - into @ np.full(2, 0.5 * size)])
+
+
+@dataclass(frozen=True, slots=True)
+class DetectedHand:
+    """A hand in a picture. `landmarks` (21, 2) px, (0, 0) at the centre of the first pixel, in the order of
+    docs/landmarks.md. `world` (21, 3) m: about the hand's centre, along the picture's axes, of a hand of usual size.
+    `presence`: probability that the region shows a hand; `right`: that it is a right one. `region`: where it was
+    looked for."""
+
+    landmarks: Array
+    world: Array
+    presence: float
+    right: float
+    region: Region
+
+
+class _Palm(NamedTuple):
+    points: Array  # (7, 2) px: PALM_LANDMARKS
+    region: Region
+
+
+class HandNetworks:
+    """Hands of pictures that follow each other. One thread at a time."""
+
+    def __init__(self, palm: Network, hand: Network, hands: int = 2) -> None:
+        """`palm`, `hand`: the networks. `hands`: so many are looked for at most."""
+        self._palm, self._hand, self._most = palm, hand, hands
+        self._anchors = _anchors()
+        self._regions: list[Region] = []
+        self._unsearched = SEARCH_EVERY  # pictures since the last search
+
+    def reset(self) -> None:
+        """The next picture does not follow the last one."""
+        self._regions, self._unsearched = [], SEARCH_EVERY
+
+    def find(self, picture: Picture) -> tuple[DetectedHand, ...]:
+        """The hands in a picture (H, W, 3) BGR, or (H, W) grey, uint8. Raises ValueError for any other array."""
+        if picture.dtype != np.uint8 or picture.ndim not in (2, 3) or picture.shape[2:] not in ((), (3,)):
+            raise ValueError(f"a picture is (H, W, 3) or (H, W) of uint8, not {picture.shape} of {picture.dtype}")
+        hands: list[DetectedHand] = []
+        for region in self._regions if picture.size else []:
+            self._add(hands, picture, region)
+        self._unsearched += 1
+        missing = len(hands) < self._most
+        if picture.size and missing and (not hands or len(hands) < len(self._regions)
+                                         or self._unsearched >= SEARCH_EVERY):
+            self._unsearched = 0
+            for palm in self._palms(picture):
+                if len(hands) < self._most and not any(_same(palm.points, palm.region, hand) for hand in hands):
+                    self._add(hands, picture, palm.region)
+        self._regions = [next_region(hand.landmarks) for hand in hands]
+        return tuple(hands)
+
+    def _add(self, hands: list[DetectedHand], picture: Picture, region: Region) -> None:
+        """Add the hand of a region, if there is one, and if it is another one than those before."""
+        if not _usable(region, picture):
+            return
+        pixels, presence, right, world = landmarks_in(self._hand, picture, region)
+        found = DetectedHand(pixels, world, presence, right, region)
+        if not (found.presence >= LEAST_PROBABILITY and np.isfinite(pixels).all()):
+            return
+        if not any(_same(pixels[list(PALM_LANDMARKS)], region, hand) for hand in hands):
+            hands.append(found)
+
+    def _palms(self, picture: Picture) -> list[_Palm]:
+        """The palms of a picture, the likeliest first: by weighted non-maximum suppression."""
+        height, width = picture.shape[:2]
+        whole = Region(np.array([0.5 * (width - 1), 0.5 * (height - 1)]), float(max(width, height)), 0.0)
+        boxes, logits = self._palm(_sampled(picture, whole, PALM_PX))[:2]
+        probability = 1.0 / (1.0 + np.exp(-np.clip(logits.reshape(-1).astype(np.float64), -100.0, 100.0)))
+        likely = np.flatnonzero(probability >= LEAST_PROBABILITY)
+        likely = likely[np.argsort(-probability[likely], kind="stable")]
+        # rows of centre, size and seven points, px of the input about the anchor
+        points = boxes.reshape(-1, 9, 2)[likely].astype(np.float64)
+        points[:, [0, *range(2, 9)]] += PALM_PX * self._anchors[likely][:, None]
+        into, palms = whole.from_input(PALM_PX), []
+        while len(likely):
+            one = _overlaps(points[:, 0], points[:, 1]) > OVERLAP
+            one[0] = True
+            mean = np.average(points[one], axis=0, weights=probability[likely[one]])
+            palms.append(_palm_region(mean[1] * whole.side / PALM_PX,
+                                      mean[[0, *range(2, 9)]] @ into[:, :2].T + into[:, 2]))
+            points, likely = points[~one], likely[~one]
+        return palms
+
+
+def open_hand_networks(folder: Path | None = None, *, model: str = "full", runtime: str | None = None,
+                       threads: int = 1, hands: int = 2) -> HandNetworks:
+    """The installed networks. `model`: one of MODELS; `runtime`: `litert` or `opencv`, None the best that is there.
+    Raises KeypointError."""
+    folder = installed_folder() if folder is None else folder
+    if folder is None:
+        raise KeypointError("the hand networks are not installed. Run `rhot-node landmarks install`, for the node's "
+                            "service `sudo rhot-node landmarks install --service`.")
+    runtime = best_runtime() if runtime is None else runtime
+    palm, hand = (open_network(read_network(folder, f"{name}_{model}.tflite"), runtime, threads)
+                  for name in ("palm_detection", "hand_landmark"))
+    return HandNetworks(palm, hand, hands)
+
+
+def landmarks_in(hand: Network, picture: Picture, region: Region) -> tuple[Array, float, float, Array]:
+    """What the landmark network finds in a region: landmarks (21, 2) px of the picture, the probabilities that a hand
+    is there and that it is a right one, and `world` (21, 3) as of `DetectedHand`."""
+    landmarks, presence, right, world = hand(_sampled(picture, region, HAND_PX))[:4]
+    into = region.from_input(HAND_PX)
+    pixels = landmarks.reshape(21, 3)[:, :2].astype(np.float64) @ into[:, :2].T + into[:, 2]
+    return pixels, float(presence.item()), float(right.item()), world.reshape(21, 3).astype(np.float64)
+
+
+def next_region(landmarks: Array) -> Region:
+    """The region in which the next picture shows the hand of these landmarks (21, 2) px."""
+    knuckles = 0.25 * (landmarks[5] + landmarks[13]) + 0.5 * landmarks[9]
+    x, y = knuckles - landmarks[0]
+    turn = math.atan2(x, -y)
+    c, s = math.cos(turn), math.sin(turn)
+    upright = landmarks[list(_STEADY)] @ np.array([[c, -s], [s, c]])
+    low, high = upright.min(axis=0), upright.max(axis=0)
+    centre = np.array([[c, -s], [s, c]]) @ (0.5 * (low + high))
+    return _region(centre, high - low, turn, 2.0, 0.1)
+
+
+def _palm_region(size: Array, points: Array) -> _Palm:
+    """`size` (2,) px of a palm's box; `points` (8, 2): its centre and seven points."""
+    x, y = points[3] - points[1]  # from the wrist to the middle finger
+    return _Palm(points[1:], _region(points[0], size, math.atan2(x, -y), 2.6, 0.5))
+
+
+def _region(centre: Array, size: Array, turn: float, scale: float, up: float) -> Region:
+    """A box's region: `scale` times its longer side, moved up by the part `up` of its height."""
+    shift = up * size[1] * np.array([math.sin(turn), -math.cos(turn)])
+    return Region(centre + shift, scale * float(size.max()), turn)
+
+
+def _same(palm: Array, region: Region, hand: DetectedHand) -> bool:
+    """Whether the points of a palm are those of a hand."""
+    apart = np.linalg.norm(palm - hand.landmarks[list(PALM_LANDMARKS)], axis=1).mean()
+    return bool(apart < SAME * max(region.side, hand.region.side))
+
+
+def _overlaps(centres: Array, sizes: Array) -> Array:
+    """Intersection over union of boxes (N, 2) with the first of them."""
+    low, high = centres - 0.5 * sizes, centres + 0.5 * sizes
+    both = np.prod(np.maximum(np.minimum(high, high[0]) - np.maximum(low, low[0]), 0.0), axis=1)
+    areas = np.prod(np.maximum(sizes, 0.0), axis=1)
+    return both / np.maximum(areas + areas[0] - both, 1e-12)
+
+
+def _usable(region: Region, picture: Picture) -> bool:
+    """Whether a region is one of the picture."""
+    height, width = picture.shape[:2]
+    return bool(np.isfinite([*region.centre, region.side, region.turn]).all()
+                and _SMALLEST_PX <= region.side <= 4.0 * max(width, height)
+                and -0.5 <= region.centre[0] <= width - 0.5 and -0.5 <= region.centre[1] <= height - 0.5)
+
+
+def _sampled(picture: Picture, region: Region, size: int) -> Tensor:
+    """A region (size, size, 3) RGB, 0..1; black outside the picture."""
+    into = region.from_input(size)
+    into[:, 2] += 0.5  # MediaPipe's pixels
+    corners = np.array([[0, 0], [size, 0], [0, size], [size, size]]) @ into[:, :2].T + into[:, 2]
+    height, width = picture.shape[:2]
+    low = np.clip(np.floor(corners.min(axis=0)).astype(int) - 2, 0, [width, height])
+    high = np.clip(np.ceil(corners.max(axis=0)).astype(int) + 3, 0, [width, height])
+    part = picture[low[1]:high[1], low[0]:high[0]]
+    if not part.size:
+        return np.zeros((size, size, 3), np.float32)
+    step = region.side / size
+    if step > _SAMPLED_PX:
+        reduced = max(int(0.5 * step), 1)
+        shape = part.shape[1] // reduced, part.shape[0] // reduced
+        if min(shape) == 0:
+            return np.zeros((size, size, 3), np.float32)
+        part = np.asarray(cv2.resize(part[:shape[1] * reduced, :shape[0] * reduced], shape,
+                                     interpolation=cv2.INTER_AREA), np.uint8)
+        into[:, 2] = (into[:, 2] - low - 0.5 * (reduced - 1)) / reduced
+        into[:, :2] /= reduced
+    else:
+        into[:, 2] -= low
+    crop = cv2.warpAffine(part, into, (size, size), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+    rgb = cv2.cvtColor(crop, cv2.COLOR_GRAY2RGB if picture.ndim == 2 else cv2.COLOR_BGR2RGB)
+    return np.asarray(rgb, np.float32) / np.float32(255)
+
+
+def _anchors() -> Array:
+    """(2016, 2): centres of the palm detector's anchors, as a part of its input: two on a grid of 24 x 24, and six on
+    one of 12 x 12."""
+    grids = []
+    for size, count in ((24, 2), (12, 6)):
+        y, x = (np.mgrid[:size, :size] + 0.5) / size
+        grids.append(np.repeat(np.stack([x, y], -1).reshape(-1, 2), count, axis=0))
+    return np.concatenate(grids)
