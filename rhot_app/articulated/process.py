@@ -86,10 +86,6 @@ class ConstantVelocity:
         out[np.arange(self.pose), np.arange(self.pose, self.size)] = dt_s
         return out
 
-    def observable_projection(self, state: Array) -> Array:
-        """See `Process`."""
-        return np.eye(self.size)
-
 
 def free_of(model: ArticulatedModel) -> NDArray[np.bool_]:
     """(6 + A,) what the object's file sets free."""

@@ -202,6 +202,10 @@ CHUNK_S, AHEAD_S = 3.0, 1.0
 """s: estimates that are smoothed at once, and those after them that only help: some correlation times of a hand. At
 80 per second, filtered and smoothed covariances of 100 numbers take 45 MB."""
 
+CONTRADICTION = 3.0
+"""Standard deviations of a filtered estimate, rms over its numbers, by which smoothing may change it. If models and
+covariances hold, the mean square is below 1; the greatest of recorded hands are 1.0, of drawn ones 1.6."""
+
 JITTER = 1e-9
 """Of the variances, added before a factorisation: the rounding errors of a filtered covariance are smaller."""
 
@@ -210,8 +214,10 @@ JITTER = 1e-9
 class FilteredState:
     """One instant, s: a state with its covariance (n, n).
 
-    `process`: leads on from here. `label`: the caller's own. A covariance may be inflated after its update: the
-    estimates before it were as wrong, and are corrected as much.
+    `process`: leads on from here. `label`: the caller's own. `inflated` (n, n): the covariance with which it led on, if
+    that was larger than the update's. What is added is noise of this instant: a later estimate corrects what follows
+    it, and what came before by no more than its own covariance allows. `contradicted`: smoothing has led farther from
+    it than is possible, so it is as it was filtered, and the pass has begun anew from it.
     """
 
     t_s: float
@@ -219,6 +225,8 @@ class FilteredState:
     covariance: Array
     process: Process
     label: Any = None
+    inflated: Array | None = None
+    contradicted: bool = False
 
 
 def smooth(filtered: Sequence[FilteredState], count: int | None = None) -> list[FilteredState]:
@@ -229,30 +237,56 @@ def smooth(filtered: Sequence[FilteredState], count: int | None = None) -> list[
     for number in range(len(filtered) - 1, -1, -1):
         here = filtered[number]
         if number == len(filtered) - 1:
-            state, covariance = here.state, here.covariance
+            state, covariance = here.state, here.covariance if here.inflated is None else here.inflated
         else:
             state, covariance = _step_back(here, filtered[number + 1], state, covariance)
+        contradicted = _deviations(here, state) > CONTRADICTION
+        if contradicted:
+            state, covariance = here.state, here.covariance if here.inflated is None else here.inflated
         if number < count:
-            found.append(replace(here, state=state, covariance=covariance))
+            found.append(replace(here, state=state, covariance=covariance, contradicted=contradicted))
+        if here.inflated is not None:
+            state, covariance = _before_inflation(here, here.inflated, state, covariance)
     return found[::-1]
+
+
+def _before_inflation(here: FilteredState, inflated: Array, state: Array, covariance: Array) -> tuple[Array, Array]:
+    """Smoothed state and covariance at `here` before its covariance was `inflated`, from those after."""
+    values, axes = np.linalg.eigh(inflated - here.covariance)
+    noise = (axes * np.maximum(values, 0.0)) @ axes.T  # numbers that are inflated by factors lose correlation too
+    gain = _divide(here.covariance, here.covariance + noise)
+    left = np.eye(len(gain)) - gain
+    smoothed = left @ here.covariance @ left.T + gain @ (noise + covariance) @ gain.T
+    return here.process.retract(here.state, gain @ here.process.difference(state, here.state)), smoothed
+
+
+def _deviations(here: FilteredState, state: Array) -> float:
+    """Root mean square of what smoothing has changed, in standard deviations of the filtered estimate; infinite where
+    it is not finite."""
+    step = here.process.difference(state, here.state)
+    if not np.isfinite(step).all():
+        return np.inf
+    covariance = here.covariance if here.inflated is None else here.inflated
+    return float(np.sqrt(max(_divide(step[None], covariance)[0] @ step, 0.0) / len(step)))
 
 
 def _step_back(here: FilteredState, after: FilteredState, state: Array, covariance: Array) -> tuple[Array, Array]:
     """Smoothed state and covariance at `here`; `state` and `covariance` are those at `after`.
 
-    A later estimate holds no information on what a prediction resets, but a linearised gain would correct it all the
-    same. So the gain is projected onto the rest, and the covariance is in Joseph's form, for any gain.
+    The covariance is in Joseph's form. No part of the gain may be left out: only the whole one shortens a step, by the
+    covariances, so that going back over many steps is stable.
     """
     process, dt_s = here.process, after.t_s - here.t_s
+    begun = here.covariance if here.inflated is None else here.inflated
     if dt_s <= 0.0:  # two frames of one instant: the same state
         return state, covariance
-    predicted, predicted_covariance = process.predict(here.state, here.covariance, dt_s)
+    predicted, predicted_covariance = process.predict(here.state, begun, dt_s)
     move = process.transition(here.state, dt_s)
-    noise = predicted_covariance - move @ here.covariance @ move.T
+    noise = predicted_covariance - move @ begun @ move.T
     step = process.difference(state, predicted)
-    gain = process.observable_projection(here.state) @ _divide(here.covariance @ move.T, predicted_covariance)
+    gain = _divide(begun @ move.T, predicted_covariance)
     left = np.eye(process.size) - gain @ move
-    smoothed = left @ here.covariance @ left.T + gain @ (noise + covariance) @ gain.T
+    smoothed = left @ begun @ left.T + gain @ (noise + covariance) @ gain.T
     return process.retract(here.state, gain @ step), 0.5 * (smoothed + smoothed.T)
 
 

@@ -102,11 +102,6 @@ class Process(Protocol):
         """(n, n) Jacobian of `predict`'s state by `state`."""
         ...
 
-    def observable_projection(self, state: Array) -> Array:
-        """(n, n) projection of a deviation from `state` onto the part that `predict` propagates: 1, unless `predict`
-        resets a null space."""
-        ...
-
 
 @njit(cache=True)
 def compressed(information, pull, cost, ridge):

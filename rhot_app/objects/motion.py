@@ -113,10 +113,6 @@ class ObjectProcess:
         move[3:6, 9:12] = dt_s * left
         return move
 
-    def observable_projection(self, state: Array) -> Array:
-        """(12, 12): everything is propagated."""
-        return np.eye(SIZE)
-
 
 class PointResidual:
     """Image points of an object in one camera; implements `estimation.residual.Residual`.

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rhot_app.diagnostics import diagnostics_of
 from rhot_app.estimation.filter import ChunkedSmoother, FilteredState, Knot
@@ -32,11 +33,15 @@ from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import require_estimator
 from rhot_app.tracking.two_hands import TwoHands
 
+Array = NDArray[np.float64]
 Kept = TypeVar("Kept")
 
 NOT_SMOOTHED = ("only the estimator smooths, and only markers and landmarks. Choose it (tracker.kind, or --tracker "
                 "estimator), or do not smooth.")
 """Why states of another tracker are not smoothed, and what to do."""
+
+CONTRADICTED = "Smoothing contradicts what was tracked. The states there are filtered, not smoothed."
+"""What is said of a frame whose state could not be smoothed."""
 
 _RECENT = 16  # frames: those that an estimator weighs again when it starts are fewer
 _STEP_BACK_NS = 1_000_000_000  # times that are farther back are of another session
@@ -170,16 +175,15 @@ class RecordingEstimator(Estimator):
             instant.recent, instant.process = _copied(self._observations), _copied(self._process)
         before, knots = self._buffered, list(self._filter.knots)
         if before and not knots[0].residuals and knots[0] is not before[0]:  # begun anew from the newest one
-            before[-1] = replace(before[-1], state=knots[0].state, covariance=knots[0].covariance)
-            self._smooth_buffered()
+            self._smooth_buffered(knots[0].covariance)
         elif before and len(knots) <= len(before) and [knot.t_s for knot in knots] != [knot.t_s for knot in before]:
             self._smooth(before[0])
         self._buffered = knots
 
     # -- smoothed states -----------------------------------------------------------------------------------------------
 
-    def _smooth(self, knot: Knot) -> None:
-        """Take a knot that no late frame can change any more."""
+    def _smooth(self, knot: Knot, inflated: Array | None = None) -> None:
+        """Take a knot that no late frame can change any more; `inflated`: see `FilteredState`."""
         frame = next((residual for residual in knot.residuals if isinstance(residual, MarkerFrame)), None)
         if frame is None or self._smoother is None:
             return
@@ -188,17 +192,20 @@ class RecordingEstimator(Estimator):
         if instant is not None:
             instant.filtered, instant.t_ns = knot, self._time_ns(knot.t_s)
         self._conclude(self._smoother.add(FilteredState(
-            knot.t_s, knot.state, knot.covariance, _copied(self._process) if process is None else process, instant)))
+            knot.t_s, knot.state, knot.covariance, _copied(self._process) if process is None else process, instant,
+            inflated)))
 
-    def _smooth_buffered(self) -> None:
+    def _smooth_buffered(self, inflated: Array | None = None) -> None:
         for knot in self._buffered:
-            self._smooth(knot)
+            self._smooth(knot, inflated if knot is self._buffered[-1] else None)
         self._buffered = []
 
     def _conclude(self, estimates: list[FilteredState]) -> None:
         for estimate in estimates:
             if isinstance(estimate.label, Instant):
                 estimate.label.estimate = replace(estimate, label=None)
+                if estimate.contradicted:
+                    self.diagnostics.warn(CONTRADICTED)
                 self._final.append(estimate.label)
                 self._instants.pop(_key(estimate.label.observations), None)
 

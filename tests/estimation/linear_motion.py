@@ -30,9 +30,6 @@ class ConstantVelocity:
     def transition(self, state, dt_s):
         return np.array([[1.0, dt_s], [0.0, 1.0]])
 
-    def observable_projection(self, state):
-        return np.eye(2)
-
     def noise(self, dt_s):
         return self.density * np.array([[dt_s**3 / 3.0, dt_s**2 / 2.0], [dt_s**2 / 2.0, dt_s]])
 

@@ -7,6 +7,7 @@ from linear_motion import ConstantVelocity, kalman_update, place
 from rhot_app.engine.offline.replay_summary import replay_states, smoothed_states
 from rhot_app.estimation.filter import ChunkedSmoother, FilteredState, IteratedFilter, smooth
 from rhot_app.evaluation import fault_injection as alter
+from rhot_app.evaluation.compare import MOTIONS
 from rhot_app.evaluation.data_sets import Order, data_set
 from rhot_app.project import with_tracker
 from rhot_app.simulator.film.node_log import T0_MASTER_NS
@@ -174,3 +175,53 @@ def test_a_lost_hand_ends_a_segment(grasp):
         if state.t_master_ns in first and state.condition in HERE:
             np.testing.assert_allclose(first[state.t_master_ns].fingertip_positions, state.fingertip_positions,
                                        atol=1e-3)
+
+
+# -- what would make it worse than the filter --------------------------------------------------------------------------
+
+def test_noise_that_is_added_between_knots_is_passed_over_by_the_pass_back():
+    """By one more knot without a measurement: the textbook's step for noise that is added at one instant."""
+    knots = filtered(20)
+    jump = np.array([[4.0, 0.3], [0.3, 2.0]])
+    for k in (5, 11):
+        knots[k].inflated = knots[k].covariance + jump
+    state, covariance = knots[-1].state, knots[-1].covariance
+    for k in range(18, -1, -1):
+        here = knots[k]
+        begun = here.covariance if here.inflated is None else here.inflated
+        move = PROCESS.transition(here.state, knots[k + 1].t_s - here.t_s)
+        predicted = move @ begun @ move.T + PROCESS.noise(knots[k + 1].t_s - here.t_s)
+        gain = begun @ move.T @ np.linalg.inv(predicted)
+        state, covariance = (here.state + gain @ (state - move @ here.state),
+                             begun + gain @ (covariance - predicted) @ gain.T)
+        np.testing.assert_allclose(smooth(knots)[k].state, state, atol=1e-6)
+        np.testing.assert_allclose(smooth(knots)[k].covariance, covariance, atol=1e-6)
+        gain = here.covariance @ np.linalg.inv(begun)
+        state, covariance = (here.state + gain @ (state - here.state),
+                             here.covariance + gain @ (covariance - begun) @ gain.T)
+
+
+class Liar(ConstantVelocity):
+    """Says of its predictions that they are a thousand times better than they are."""
+
+    def predict(self, state, covariance, dt_s):
+        state, covariance = super().predict(state, covariance, dt_s)
+        return state, 1e-6 * covariance
+
+
+def test_a_pass_that_contradicts_its_filter_falls_back_to_it():
+    knots = filtered(30)
+    knots[12].process = Liar()
+    found = smooth(knots)
+    assert [one.label for one in found if one.contradicted] == [12]
+    np.testing.assert_array_equal(found[12].state, knots[12].state)
+    np.testing.assert_array_equal(found[12].covariance, knots[12].covariance)
+    for got, (state, _) in zip(found[:12], textbook(knots[:13]), strict=False):
+        np.testing.assert_allclose(got.state, state, atol=1e-6)
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_smoothed_is_no_worse_than_filtered(motion, tmp_path):
+    one = data_set(Order(make_scene(twin_defaults(), 3), motion, SECONDS, sketched=True), tmp_path)
+    error, better = (tips(one, states)[0][80:] for states in both(one, one.records()))
+    assert np.median(better) < np.median(error) and np.percentile(better, 95) < np.percentile(error, 95)

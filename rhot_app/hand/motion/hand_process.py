@@ -127,13 +127,6 @@ class HandProcess:
                         self._bias_s)
         return out
 
-    def observable_projection(self, state: Array) -> Array:
-        """See `Process`: the part that moves markers."""
-        out = np.eye(self.size)
-        if self._marked:
-            _project(_reset_null_space(state.copy(), self.dh, self._limits, self.mean, self._information)[0], out)
-        return out
-
     def advance(self, state: Array, dt_s: float) -> Array:
         """The mean of `state` after `dt_s`, without a null-space reset; its paint biases may be left out."""
         after = state.copy()

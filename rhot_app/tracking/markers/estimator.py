@@ -196,10 +196,11 @@ class Estimator:
         inliers = self._observations.accept(frame, knot.state, knot.weights)
         self._weighed(frame)
         wrong = self._rejections.wrong(frame, inliers, distances, self._observations.periods_s[frame.camera])
-        for part, factor in wrong:
-            self._process.inflate(knot.covariance, part, factor)
         if wrong:
-            self._filter.start(knot.t_s, knot.state, knot.covariance)  # so that no late frame undoes it
+            inflated = knot.covariance.copy()
+            for part, factor in wrong:
+                self._process.inflate(inflated, part, factor)
+            self._filter.start(knot.t_s, knot.state, inflated)  # so that no late frame undoes it
         accepted = np.count_nonzero(inliers)
         if accepted:
             self._accepted_ns = max(self._accepted_ns, frame.t_ns)
