@@ -191,15 +191,15 @@ class NodeDaemon:
         markers = self._detector.detect(frame.image)
         self._frames.what = _SENDS
         late = self._count_frame(frame)
-        stream = self.sessions.current
+        stream, searched = self.sessions.current, True
         if stream is not None and frame.t_node_ns >= stream.t_start_node_ns:
             if late and self._settings.late_frames == "drop":
                 self.counters.late_dropped += 1
             else:
                 self._send(frame, markers, stream, sender)
-            self.slices.offer(frame, stream, sender)
+            searched = self.slices.offer(frame, stream, sender)
             self._tags.offer(frame, stream, sender)
-        pictures.offer(frame)
+        pictures.offer(frame, searched=searched)
         if self._video is not None:
             self._video(frame)
         return True

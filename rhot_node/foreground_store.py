@@ -27,7 +27,7 @@ from rhot_node.detect.foreground import (
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import NodeError
 from rhot_node.files import open_archive, write_atomically
-from rhot_node.network.pictures import PictureBox
+from rhot_node.network.pictures import Encoded, Picture, PictureBox
 from rhot_node.threads import OneShotThread
 
 log = logging.getLogger(__name__)
@@ -168,14 +168,15 @@ class ForegroundStore:
             raise NodeError(f"{self.path}: cannot be removed ({exc.strerror}).") from exc
         self.current, self._failure = _FLAT, ""
 
-    def mask(self, pictures: PictureBox) -> tuple[bytes, int, int]:
-        """(PNG, width, height) of the next picture's foreground probabilities, 0 to 255, of every MASK_STEP-th pixel.
-        Raises NodeError without a picture."""
-        image = self._picture(pictures)
+    def mask(self, pictures: PictureBox) -> tuple[Encoded, Picture]:
+        """The foreground probabilities, 0 to 255, of every MASK_STEP-th pixel of the next picture, as PNG, and this
+        picture. Raises NodeError without a picture."""
+        picture = self._next(pictures)
+        image = rgb_of(picture.image)
         probability = foreground_map(image, self.of_size(image.shape[1], image.shape[0]), MASK_STEP)
         _, data = cv2.imencode(".png", np.round(255.0 * probability).astype(np.uint8),
                                [cv2.IMWRITE_PNG_COMPRESSION, 1])
-        return data.tobytes(), probability.shape[1], probability.shape[0]
+        return Encoded(data.tobytes(), probability.shape[1], probability.shape[0]), picture
 
     def close(self) -> None:
         """End what is being learnt."""
@@ -201,10 +202,13 @@ class ForegroundStore:
                 log.error("%s", self._failure)
 
     def _picture(self, pictures: PictureBox) -> NDArray[np.uint8]:
+        return rgb_of(self._next(pictures).image)
+
+    def _next(self, pictures: PictureBox) -> Picture:
         picture = pictures.next_still(PICTURE_S)
         if picture is None:
             raise NodeError(f"no frame came within {PICTURE_S:.0f} s; ask for the state to see what the camera does.")
-        return rgb_of(picture.image)
+        return picture
 
     def _use(self, model: Foreground, *, save: bool) -> None:
         """Keep the model if `save`, then use it as it is read. Raises NodeError when the file cannot be written."""

@@ -118,20 +118,22 @@ class SliceSearch:
                              time.monotonic() + VALID_S)
         return ""
 
-    def offer(self, frame: Frame, stream: Stream, sender: EdgeSender) -> None:
-        """Have a frame searched if slices are asked for and nothing else is being searched; costs a copy of it."""
+    def offer(self, frame: Frame, stream: Stream, sender: EdgeSender) -> bool:
+        """Have a frame searched if slices are asked for and nothing else is being searched; costs a copy of it. False
+        when it was asked for and is not done."""
         order = self._order
         if (order is None or order.session != stream.session or time.monotonic() > order.until_s
                 or order.size != frame.image.size):
-            return
+            return True
         with self._changed:
             if self._busy or self._waiting is not None:
                 self.skipped += 1
-                return
+                return False
         waiting = _Waiting(frame, order, stream, sender)
         with self._changed:
             self._waiting = waiting
             self._changed.notify()
+        return True
 
     def step(self) -> bool:
         """Search the frame that waits; False when there is none."""

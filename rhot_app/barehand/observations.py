@@ -38,6 +38,7 @@ class EdgeFrame:
     network_s: float
     request: SliceRequest
     edges: Edges
+    t_row0_node_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from rhot_app.engine.advice import disk_advice, hands_advice, moved_advice
 from rhot_app.engine.observer import NodeBlack, NodeMessage, Observer
 from rhot_app.engine.output_process import OutputProcess
 from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work, warm_up
-from rhot_app.engine.status import Advice, EngineStatus
+from rhot_app.engine.status import Advice, EngineStatus, Preview
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import Rig, is_rig_file
 from rhot_app.recording.bookmarks import Bookmark, bookmark_record
@@ -69,7 +69,7 @@ class Engine:
         self._notice = ""  # why the last recording ended
         self._continued = ""  # that this recording continues one of before a crash
         self._moved: dict[int, str] = {}  # where nodes were that have moved since the rig was read or saved
-        self._shown: dict[str, int] = {}  # times of the contours that were published last
+        self._shown: dict[tuple[str, int], int] = {}  # times of the contours that were published last
         self._lock = threading.RLock()
         self._changing = threading.Lock()  # of the rig: one change after the other, while everything else goes on
         self._preparing_s: float | None = None  # since when a new rig's tracker is made
@@ -267,9 +267,16 @@ class Engine:
         """What the tracker has seen of a bare hand since this was asked last."""
         tracker = self._pipeline.work.tracker
         found = tracker.seen() if isinstance(tracker, ShowsContours) else []
-        fresh = [one for one in found if self._shown.get(one.camera) != one.t_master_ns]
-        self._shown |= {one.camera: one.t_master_ns for one in fresh}
+        fresh = [one for one in found if self._shown.get((one.camera, one.hand)) != one.t_master_ns]
+        self._shown |= {(one.camera, one.hand): one.t_master_ns for one in fresh}
         return fresh
+
+    def annotated(self, preview: Preview) -> Preview:
+        """A node's preview with what was observed in its very frame; as it is while that is not known."""
+        camera = next((k for k, node in enumerate(self.rig.nodes) if node.name == preview.camera), None)
+        frame = None if camera is None else self._pipeline.frame(camera, preview.t_node_ns)
+        return preview if frame is None else replace(preview, t_master_ns=frame.t_row0_master_ns, pixels=frame.pixels,
+                                                     flags=frame.flags)
 
     def refined(self) -> dict[str, Any]:
         """What a moving hand says of the cameras (`RigWatch.refined`)."""

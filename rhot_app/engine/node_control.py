@@ -170,7 +170,7 @@ class NodeControl:
         return self._preview
 
     def previews(self) -> list[Preview]:
-        """The pictures that came since the last call."""
+        """The pictures that came since the last call, without what was found in them."""
         found = []
         for peer in self._peers.values():
             while peer.previews is not None:
@@ -334,7 +334,7 @@ def _still_request(arguments: Arguments) -> dict[str, Any]:
 def _read_preview(name: str, parts: list[bytes]) -> Preview | None:
     try:
         header = decode_message(parts[0], dict[str, Any])
-        return Preview(name, time.monotonic_ns(), int(header["width"]), int(header["height"]), parts[1])
+        return Preview(name, 0, int(header["width"]), int(header["height"]), parts[1], int(header["t_node_ns"]))
     except (msgspec.MsgspecError, KeyError, TypeError, ValueError, IndexError):
         return None
 

@@ -66,6 +66,7 @@ class Pipeline:
         self.last_state: HandState | None = None
         self.frame_count = 0
         self.recent: deque[CameraObservations] = deque(maxlen=RECENT)
+        self._last: deque[CameraObservations] = deque(maxlen=RECENT)
         self.diagnostics = diagnostics_of(work.tracker)
         self._work = work
         self._publish = publish
@@ -139,7 +140,13 @@ class Pipeline:
         for frame in observations:  # once the state is out: nobody waits for this
             work.last_seen_ns[frame.camera, ~np.isnan(frame.pixels[:, 0])] = now_ns
         self.recent.extend(observations)
+        self._last.extend(observations)
         return state
+
+    def frame(self, camera: int, t_node_ns: int) -> CameraObservations | None:
+        """What was observed in the frame that the camera's node stamped so, if that was not long ago."""
+        return next((one for one in reversed(self._last.copy())
+                     if one.camera == camera and one.t_row0_node_ns == t_node_ns != 0), None)
 
     def _send(self, state: HandState, live: bool) -> None:
         begun_ns = time.monotonic_ns()

@@ -29,6 +29,7 @@ from rhot_app.engine.status import (
     TOPIC_STATE,
     TOPIC_STATUS,
     EngineStatus,
+    Preview,
     encode,
     most_urgent_first,
 )
@@ -132,6 +133,8 @@ SLOW = frozenset({"set_rig"})
 _COMMAND_MAX = 2 * JSON_BYTES_MAX  # a longer one is cut off, with its client's connection
 _SEND_QUEUE = 1000  # messages kept for a slow client before it misses some
 _POLL_MS = 20
+OBSERVED_NS = 100_000_000
+"""So long a preview waits for the datagram of its frame, which was sent before it."""
 
 
 class StatePublisher:
@@ -171,6 +174,7 @@ class Server:
         self._poller = zmq.Poller()
         self._poller.register(self._commands_socket, zmq.POLLIN)
         self._status_due_ns = 0
+        self._previews: list[tuple[Preview, int]] = []  # until when each waits for its observations
         self._slow: deque[tuple[bytes, str, Arguments]] = deque()  # commands that wait for the one before
         self._change: _Change | None = None
         self._log_file = directory.log_file
@@ -188,8 +192,7 @@ class Server:
         self._follow_slow_commands()
         for client, node_answer in self._nodes.answers():
             self._send(client, *node_answer)
-        for preview in self._nodes.previews():
-            self._publish(TOPIC_PREVIEW, encode(preview))
+        self._publish_previews()
         if self._nodes.previewing:
             for contour in self._engine.contours():
                 self._publish(TOPIC_CONTOUR, encode(contour))
@@ -204,6 +207,19 @@ class Server:
             self._note_use(status)
             if self._note is not None:
                 self._note.step()
+
+    def _publish_previews(self) -> None:
+        """A preview is published with what was found in it: datagrams are sent first, but may be taken in later."""
+        now_ns = time.monotonic_ns()
+        self._previews += [(preview, now_ns + OBSERVED_NS) for preview in self._nodes.previews()]
+        waiting = []
+        for preview, until_ns in self._previews:
+            annotated = self._engine.annotated(preview)
+            if annotated is preview and self._engine.running and now_ns < until_ns:
+                waiting.append((preview, until_ns))
+            else:
+                self._publish(TOPIC_PREVIEW, encode(annotated))
+        self._previews = waiting
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Serve until `end`, or until `until` is true."""

@@ -8,6 +8,7 @@ from typing import Any, Literal, Protocol, TypeVar, get_args
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from rhot_app.errors import EngineError
 from rhot_app.outputs.spec import OutputStatus
@@ -99,15 +100,23 @@ class EngineStatus:
     replaying: str = ""  # the log that is replayed; empty when nodes are live
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Preview:
-    """A small picture of one camera for people: JPEG bytes, with the frame's full size in px."""
+    """A small picture of one camera for people, JPEG bytes, and what its node found in this very frame.
+
+    `width`, `height`: of the frame, px. `pixels` (M, 2) px of the frame, NaN when lost, and `flags` (M,): without rows
+    while nothing is known of the frame. `t_node_ns`: its stamp by the node's clock; `t_master_ns`: the same in master
+    time, 0 while nothing is known of it.
+    """
 
     camera: str
     t_master_ns: int
     width: int
     height: int
     jpeg: bytes
+    t_node_ns: int = 0
+    pixels: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    flags: NDArray[np.uint16] = field(default_factory=lambda: np.empty(0, np.uint16))
 
 
 # -- encoding in msgpack -----------------------------------------------------------------------------------------------
@@ -139,7 +148,7 @@ _encoder = msgspec.msgpack.Encoder(enc_hook=_encode_array)
 _decoders: dict[bytes, msgspec.msgpack.Decoder[Any]] = {
     TOPIC_STATE: msgspec.msgpack.Decoder(HandState, dec_hook=_decode_array),
     TOPIC_STATUS: msgspec.msgpack.Decoder(EngineStatus),
-    TOPIC_PREVIEW: msgspec.msgpack.Decoder(Preview),
+    TOPIC_PREVIEW: msgspec.msgpack.Decoder(Preview, dec_hook=_decode_array),
     TOPIC_CONTOUR: msgspec.msgpack.Decoder(SeenContour, dec_hook=_decode_array),
 }
 

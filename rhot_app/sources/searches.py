@@ -93,7 +93,8 @@ class NodeSearches:
         indices = np.concatenate([one for one, _ in columns])
         values = np.concatenate([one for _, one in columns])
         return EdgeFrame(camera, t_row0_ns, last.row_time_ns, t_receive_ns, 1e-9 * last.processing_ns,
-                         1e-9 * (t_receive_ns - t_send_ns), request, edges_of(len(request.slices), indices, values))
+                         1e-9 * (t_receive_ns - t_send_ns), request, edges_of(len(request.slices), indices, values),
+                         last.t_frame_node_ns)
 
     def _remember(self, number: int, request: SliceRequest) -> None:
         self._requests[number] = request

@@ -234,7 +234,8 @@ class DatagramValidator:
             clock_bound_s=bound_s, t_receive_ns=t_receive_ns,
             detect_s=1e-9 * message.processing_ns, network_s=1e-9 * (t_receive_ns - t_send_ns),
             pixels=pixels[:count], covariances=covariances[:count], diameters=diameters[:count],
-            qualities=qualities[:count], flags=flags[:count], further=further)
+            qualities=qualities[:count], flags=flags[:count], further=further,
+            t_row0_node_ns=message.t_frame_node_ns)
 
 
 # -- text datagrams (RHOT 6.4) -----------------------------------------------------------------------------------------

@@ -50,6 +50,7 @@ class CameraObservations:
 
     `camera`: index into the rig's nodes. `t_row0_master_ns`: mid-exposure of row 0; a marker at raw pixel row y was
     seen at `t_row0_master_ns + y * row_time_ns`. `clock_bound_s`: half-width of the clock offset's error.
+    `t_row0_node_ns`: the node's own stamp of the frame, 0 when it gives none.
     """
 
     camera: int
@@ -65,6 +66,7 @@ class CameraObservations:
     qualities: Array  # (M,)
     flags: NDArray[np.uint16]  # (M,) MarkerFlag
     further: Candidates | None = None  # other candidates than those above
+    t_row0_node_ns: int = 0
 
 
 class Tracker(Protocol):
@@ -92,7 +94,7 @@ class ShowsContours(Protocol):
     """A tracker that can say what it has seen of a bare hand."""
 
     def seen(self) -> list[SeenContour]:
-        """The newest image of each camera; none while there is no hand. Any thread may ask."""
+        """The newest image of each camera and hand; none while there is no hand. Any thread may ask."""
         ...
 
 

@@ -53,10 +53,12 @@ class PictureBox:
         self._waiting = 0  # requests that wait for a still
         self._still: Picture | None = None
 
-    def offer(self, frame: Frame) -> None:
-        """Copy the frame if a still is asked for or a preview is due; else cost nothing."""
+    def offer(self, frame: Frame, *, searched: bool = True) -> None:
+        """Copy the frame if a still is asked for or a preview is due; else cost nothing. A preview waits up to its
+        period for a frame that is `searched`, so that there is something to draw over it."""
         now_s = time.monotonic()
-        preview_due = self.wanted and now_s >= self._due_s
+        wait_s = 0.0 if searched else 1.0 / self.preview_hz
+        preview_due = self.wanted and now_s >= self._due_s + wait_s
         if not preview_due and not self._waiting:
             return
         picture = _copy(frame)

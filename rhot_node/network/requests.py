@@ -142,7 +142,8 @@ class ForgetForegroundRequest(_Request, frozen=True, tag="forget_foreground"):
 
 
 class ForegroundMaskRequest(_Request, frozen=True, tag="foreground_mask"):
-    """The foreground of the next picture, a grey PNG in a second message part: 255 is the hand."""
+    """The foreground of the next picture in a second message part: a grey PNG of `mask_bytes`, 255 is the hand, then
+    this very picture as JPEG."""
 
 
 ForegroundRequest = (LearnBackgroundRequest | LearnSkinRequest | SaveForegroundRequest | RevertForegroundRequest
@@ -267,8 +268,10 @@ class Responder:
                 store.forget()
                 return {"ok": True}, b""
             case ForegroundMaskRequest():
-                data, width, height = store.mask(self._pictures)
-                return {"ok": True, "format": "png", "width": width, "height": height}, data
+                mask, picture = store.mask(self._pictures)
+                return {"ok": True, "format": "png", "width": mask.width, "height": mask.height,
+                        "mask_bytes": len(mask.data), "number": picture.number, "t_node_ns": picture.t_node_ns
+                        }, mask.data + encode_still(picture, "jpeg").data
 
     def _video(self, request: VideoRequest) -> tuple[dict[str, Any], bytes]:
         videos = self._videos

@@ -87,7 +87,9 @@ def test_both_hands_are_found_and_one_leaves_and_returns(still: list[np.ndarray]
     assert all(error_mm(one, side, HOME[side]) < limit_mm for side, one in states_of(nodes.states[-1]).items())
     assert nodes.states[-1].other.t_master_ns == nodes.states[-1].t_master_ns
     assert all(len(request.slices) > 300 for request in nodes.asked)
-    assert len(nodes.tracker.seen()) == len(CAMERAS)
+    seen = nodes.tracker.seen()
+    assert sorted((one.hand, one.camera) for one in seen) == sorted(
+        (hand, node.name) for hand in (0, 1) for node in rig_of(CAMERAS).nodes)
     for _ in range(20):
         nodes.show(shown({"right": HOME["right"]}, 1))
         right = nodes.states[-1]

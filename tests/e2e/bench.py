@@ -19,7 +19,7 @@ from shipped_markers import RHOT6
 from shipped_rig import RIGHT_HAND
 
 from rhot_app.engine.client import EngineClient
-from rhot_app.engine.status import NodeStatus
+from rhot_app.engine.status import NodeStatus, Published
 from rhot_app.keys import load_master_keys
 from rhot_app.project import Broadcast, CameraPose, Intrinsics, Rig, RigNode, save_rig
 from rhot_app.state import HandState
@@ -189,13 +189,18 @@ def tracks(client: EngineClient) -> bool:
             and time.monotonic_ns() - client.state.t_master_ns < 300_000_000)
 
 
-def states_of(client: EngineClient, seconds: float) -> list[HandState]:
-    """All hand states that arrive within this time."""
-    states: list[HandState] = []
+def messages_of(client: EngineClient, seconds: float) -> list[Published]:
+    """Everything that arrives within this time."""
+    messages: list[Published] = []
     end = time.monotonic() + seconds
     while (left := end - time.monotonic()) > 0:
-        states += [message for message in client.poll(min(left, 0.05)) if isinstance(message, HandState)]
-    return states
+        messages += client.poll(min(left, 0.05))
+    return messages
+
+
+def states_of(client: EngineClient, seconds: float) -> list[HandState]:
+    """All hand states that arrive within this time."""
+    return [message for message in messages_of(client, seconds) if isinstance(message, HandState)]
 
 
 def kill_hard(process: subprocess.Popen[bytes]) -> None:

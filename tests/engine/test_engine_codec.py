@@ -58,8 +58,11 @@ def test_status_and_preview_round_trip() -> None:
     sent = EngineStatus(1, 2, 3, True, "TRACKING", "rig", "/rig.json", 118.0, (node,), (Advice("info", "ok"),),
                         {"solve": LatencySummary(1e-4, 2e-4)})
     assert status.decode(status.TOPIC_STATUS, status.encode(sent)) == sent
-    preview = Preview("left", 5, 640, 480, b"\xff\xd8")
-    assert status.decode(status.TOPIC_PREVIEW, status.encode(preview)) == preview
+    preview = Preview("left", 5, 640, 480, b"\xff\xd8", 7, np.array([[1.5, np.nan]]), np.array([1], np.uint16))
+    came = status.decode(status.TOPIC_PREVIEW, status.encode(preview))
+    assert isinstance(came, Preview)
+    for name in ("camera", "t_master_ns", "width", "height", "jpeg", "t_node_ns", "pixels", "flags"):
+        np.testing.assert_array_equal(getattr(came, name), getattr(preview, name))
 
 
 @pytest.mark.parametrize(("topic", "payload"), [

@@ -3,6 +3,7 @@
 import resource
 from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from logging import LogRecord
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +17,7 @@ from patience import eventually, settled
 from rhot_app.engine import status
 from rhot_app.engine.core import Engine
 from rhot_app.engine.offline.replay_summary import replay_states, summarise
-from rhot_app.engine.status import EngineStatus
+from rhot_app.engine.status import EngineStatus, Preview
 from rhot_app.errors import EngineError, RecordingError, RhotError, RigError
 from rhot_app.project import OneEuroSettings, OutputSettings, Rig, load_rig
 from rhot_app.recording.raw_log import LogReader, RecordKind
@@ -110,6 +111,20 @@ def test_silent_node_is_named_and_forgotten_when_it_answers(rig: Rig, bench: Ben
     said = [advice.text for advice in bench.engine.status().advice]
     node.close()
     assert not any("Node left does not" in text for text in said)
+
+
+def test_a_preview_carries_what_was_found_in_its_very_frame(bench: Bench, nodes: list[SyntheticNode]) -> None:
+    bench.engine.start()
+    bench.run_until(lambda: min(Counter(one.camera for one in bench.trackers[-1].ingested).values(), default=0) > 20)
+    frames = [one for one in bench.trackers[-1].ingested if one.camera == 1]
+    before, frame = frames[-12], frames[-11]
+    preview = Preview("right", 0, 640, 480, b"jpeg", frame.t_row0_node_ns)
+    annotated = bench.engine.annotated(preview)
+    assert np.array_equal(annotated.pixels, frame.pixels) and not np.array_equal(annotated.pixels, before.pixels)
+    assert np.array_equal(annotated.flags, frame.flags) and annotated.t_master_ns == frame.t_row0_master_ns
+    for other in (replace(preview, t_node_ns=frame.t_row0_node_ns + 1), replace(preview, camera="left"),
+                  replace(preview, camera="unknown"), replace(preview, t_node_ns=0)):
+        assert bench.engine.annotated(other) is other, "what belongs to another frame is not drawn"
 
 
 def test_a_broken_tracker_is_reported_once_begins_anew_and_is_no_fault_any_more_once_it_works(

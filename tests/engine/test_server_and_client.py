@@ -58,7 +58,8 @@ class ControlPeer:
             if self.previews.poll(0):
                 self.subscribed = self.previews.recv()[:1] == b"\x01"
             if self.subscribed:
-                self.previews.send_multipart([b'{"node_id": 1, "width": 640, "height": 480}', b"\xff\xd8jpeg"])
+                self.previews.send_multipart([b'{"node_id": 1, "number": 7, "t_node_ns": 70, "width": 640, '
+                                              b'"height": 480}', b"\xff\xd8jpeg"])
 
     def answer(self, request: dict[str, object]) -> list[bytes]:
         if request["request"] == "still":
@@ -362,7 +363,8 @@ def test_previews_only_when_asked(client: EngineClient, peer: ControlPeer) -> No
     preview = collect(client, Preview)
     assert isinstance(preview, Preview)
     assert (preview.camera, preview.width, preview.height) == ("left", 640, 480)
-    assert preview.jpeg.startswith(b"\xff\xd8")
+    assert preview.jpeg.startswith(b"\xff\xd8") and preview.t_node_ns == 70
+    assert len(preview.pixels) == 0 and preview.t_master_ns == 0, "nothing is known of this frame"
     client.command("preview", on=False)
     eventually(lambda: not peer.subscribed)
 

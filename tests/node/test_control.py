@@ -204,6 +204,25 @@ def test_nothing_is_copied_when_nobody_looks() -> None:
     assert box.take_preview() is None
 
 
+def test_a_preview_waits_for_a_frame_that_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [1000.0]
+    monkeypatch.setattr("rhot_node.network.pictures.time.monotonic", lambda: now[0])
+    box = PictureBox(4.0)
+    box.wanted = True
+
+    def offered(number: int, searched: bool) -> int | None:
+        now[0] += 0.03
+        box.offer(Frame(grey_image(), number, 0, 0, 0, 0), searched=searched)
+        preview = box.take_preview()
+        return None if preview is None else preview.number
+
+    assert [offered(1, True), offered(2, True)] == [1, None]
+    now[0] += 0.25
+    assert [offered(3, False), offered(4, False), offered(5, True)] == [None, None, 5]
+    now[0] += 0.55
+    assert offered(6, False) == 6, "a node that searches nothing shows its picture all the same"
+
+
 def test_previews_keep_their_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [1000.0]
     monkeypatch.setattr("rhot_node.network.pictures.time.monotonic", lambda: now[0])
@@ -257,8 +276,14 @@ def test_background_and_skin_are_learnt_over_the_channel(served: Served) -> None
         assert served.foreground.report(640, 480)["background"]
         assert served.ask(request="learn_skin") == {"ok": True, "found": False}
         answer, png = served.ask_raw(b'{"request": "foreground_mask"}')
-        assert json.loads(answer) == {"ok": True, "format": "png", "width": 320, "height": 240}
-        assert cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_GRAYSCALE).shape == (240, 320)
+        told = json.loads(answer)
+        size, stamp = told.pop("mask_bytes"), (told.pop("number"), told.pop("t_node_ns"))
+        assert told == {"ok": True, "format": "png", "width": 320, "height": 240}
+        assert cv2.imdecode(np.frombuffer(png[:size], np.uint8), cv2.IMREAD_GRAYSCALE).shape == (240, 320)
+        assert cv2.imdecode(np.frombuffer(png[size:], np.uint8), cv2.IMREAD_COLOR).shape == (480, 640, 3)
+        assert stamp == (noisy_frame().number, noisy_frame().t_node_ns)
+        assert cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_GRAYSCALE).shape == (240, 320), \
+            "a master that knows of no picture reads the mask as before"
         learnt = served.foreground.current
         assert served.ask(request="learn_background", seconds=0.2) == {"ok": True}
         assert served.ask(request="revert_foreground") == {"ok": True}

@@ -100,6 +100,19 @@ def test_what_is_sent(tmp_path: Path) -> None:
     assert observations.markers[0].x == SIZE[0] / 2
 
 
+def test_a_preview_has_the_stamp_of_its_frames_observations(tmp_path: Path) -> None:
+    node = Node(tmp_path, range(100))
+    node.daemon.prepare()
+    node.start()
+    node.step(2)
+    node.pictures.wanted = True
+    node.step(3)
+    preview = node.pictures.take_preview()
+    assert preview is not None
+    (own,) = [one for one, _ in node.sender.sent if one.t_frame_node_ns == preview.t_node_ns]
+    assert own.frame_number == preview.number == node.sender.sent[2][0].frame_number
+
+
 def test_sequences_count_from_zero_in_each_session(tmp_path: Path) -> None:
     node = Node(tmp_path, range(100))
     node.daemon.prepare()

@@ -129,8 +129,7 @@ def test_many_slices_come_in_parts_and_their_edges_go_in_parts() -> None:
 def test_a_frame_that_comes_during_a_search_is_left_out() -> None:
     searched = Searched()
     searched.ask(SLICE)
-    for _ in range(3):
-        searched.search.offer(searched.frame(), STREAM, searched.sender)
+    assert [searched.search.offer(searched.frame(), STREAM, searched.sender) for _ in range(3)] == [True, False, False]
     assert searched.search.step() and not searched.search.step()
     assert searched.search.count() == {"slice_requests": 1, "slice_frames": 1, "slice_frames_skipped": 2,
                                        "edges_sent": 1, "edges_not_sent": 0}
@@ -184,9 +183,9 @@ def test_background_and_skin_are_learnt_kept_and_forgotten(tmp_path: Path) -> No
         camera.picture = with_hand(BACKGROUND)
         camera.box.next_still(1.0)  # one that was being taken may have no hand
         assert store.learn_skin(camera.box)
-        png, width, height = store.mask(camera.box)
-    mask = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_GRAYSCALE)
-    assert (width, height) == (80, 60) and mask.shape == (60, 80)
+        encoded, picture = store.mask(camera.box)
+    mask = cv2.imdecode(np.frombuffer(encoded.data, np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert (encoded.width, encoded.height) == (80, 60) and mask.shape == (60, 80) and picture.image.size == (160, 120)
     assert np.median(mask[22:48, 32:53]) > 240 and np.median(mask[:15]) < 15
     again = ForegroundStore(path)
     for kept, used in zip(again.current, store.current, strict=True):

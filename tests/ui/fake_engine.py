@@ -209,7 +209,7 @@ class FakeEngine:
                       (9.0,) * len(ids), False, 0.0, black=True), ids, self.running)]
 
     def preview(self, camera: int, t_s: float) -> Preview:
-        """A picture of the hand as a camera would see it: skin and painted tips on a cluttered desk."""
+        """A picture of the hand as a camera would see it, skin and painted tips on a desk, and what is in it."""
         node = self.rig.nodes[camera]
         points = forward(self._model, hand_pose(t_s))
         image = np.full((240, 320, 3), (58, 62, 66), np.uint8)
@@ -227,7 +227,9 @@ class FakeEngine:
         for marker, place in zip(self.rig.markers.markers, [*points.marker_centres, joints[0]], strict=True):
             cv2.circle(image, at(place), 6, marker.display_rgb[::-1], -1, cv2.LINE_AA)
         _, jpeg = cv2.imencode(".jpg", image)
-        return Preview(node.name, round(t_s * 1e9), 640, 480, jpeg.tobytes())
+        pixels, flags, _ = self._sights(np.vstack([points.marker_centres, joints[:1]]))
+        t_ns = round(t_s * 1e9)
+        return Preview(node.name, t_ns, 640, 480, jpeg.tobytes(), t_ns, pixels[camera], flags[camera])
 
 
 class FakeClient:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from rhot_app.ui.backend.live import Live
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.panels.camera_panel import OUTLINE_COLOUR, CameraPanel
 
-T_NS = 5_000_000_000
+T_NS, T_NODE_NS = 5_000_000_000, 77_000_000_000
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +34,8 @@ def hand():
     previews, contours = [], []
     for node, image, frame in zip(rig.nodes, images, tracker.frames, strict=True):
         small = cv2.resize(image[:, :, ::-1], (320, 240), interpolation=cv2.INTER_AREA)
-        previews.append(Preview(node.name, T_NS, 640, 480, cv2.imencode(".jpg", small)[1].tobytes()))
-        seen = seen_contour(node.name, T_NS, frame, tracker.filter.newest.state)
+        previews.append(Preview(node.name, T_NS, 640, 480, cv2.imencode(".jpg", small)[1].tobytes(), T_NODE_NS))
+        seen = seen_contour(node.name, T_NS, frame, tracker.filter.newest.state, T_NODE_NS)
         contours.append(decode(TOPIC_CONTOUR, encode(seen)))
     return rig, previews, contours
 
@@ -75,7 +77,7 @@ def test_a_contour_of_another_moment_is_not_shown(panel, hand):
     live.previews[previews[0].camera] = previews[0]
     panel.refresh(live)
     assert greens(panel.grab().toImage()) == 0
-    late = Preview(previews[0].camera, T_NS + 100_000_000, 640, 480, previews[0].jpeg)
+    late = replace(previews[0], t_master_ns=T_NS + 8_000_000, t_node_ns=T_NODE_NS + 8_000_000)
     live.contours.append(contours[0])
     live.previews[late.camera] = late
     panel.refresh(live)

@@ -1,7 +1,10 @@
-"""Marks belong to the instant of the picture under them."""
+"""A picture is drawn with what was found in it, and with nothing else."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
 from fake_engine import FakeClient, FakeEngine
@@ -28,31 +31,41 @@ def panel(qtbot, themed, engine):
     return panel
 
 
-def test_marks_are_those_of_the_pictures_time(panel, engine):
-    live = Live()
-    states = [engine.state(1.0 + 0.1 * k) for k in range(5)]
-    for state in states:
-        live.take(state)
-    live.previews["left"] = engine.preview(0, 1.21)
-    panel.refresh(live)
-    view = panel.views["left"]
-    assert view.marked == ["thumb", "index", "middle", "ring", "little", "wrist"]
-    drawn = np.array([(mark.place.x(), mark.place.y()) for mark in view.marks])
-    assert drawn == pytest.approx(states[2].camera_pixels[0])
+def painted(preview, colour):
+    """Where the paint of an RGB colour is in a preview, px of the full frame."""
+    bgr = cv2.imdecode(np.frombuffer(preview.jpeg, np.uint8), cv2.IMREAD_COLOR).astype(int)
+    rows, columns = np.nonzero((np.abs(bgr - np.array(colour[::-1])) < 40).all(axis=2))
+    return 2.0 * columns.mean(), 2.0 * rows.mean()
 
 
-def test_a_picture_that_is_ahead_of_the_states_waits_for_its_marks(panel, engine):
+def test_rings_sit_on_the_markers_of_the_very_picture(panel, engine):
+    """The hand moves; states and other pictures come before and after this one."""
+    live, view = Live(), panel.views["left"]
+    places = []
+    for t_s in (1.0, 3.0, 5.0, 4.0):  # the last one was overtaken
+        live.take(engine.state(t_s + 0.1))
+        live.take(engine.preview(0, t_s))
+        live.take(engine.preview(1, t_s - 0.4))
+        live.take(engine.state(t_s + 0.2))
+        panel.refresh(live)
+        assert view.marked == ["thumb", "index", "middle", "ring", "little", "wrist"]
+        for view_, camera in ((view, "left"), (panel.views["right"], "right")):
+            for mark, marker in zip(view_.marks, engine.rig.markers.markers, strict=True):
+                at = painted(live.previews[camera], marker.display_rgb)
+                assert (mark.place.x(), mark.place.y()) == pytest.approx(at, abs=5.0), marker.id
+        places.append((view.marks[1].place.x(), view.marks[1].place.y()))
+    assert np.linalg.norm(np.diff(places, axis=0), axis=1).min() > 15.0, "rings of another picture would be seen"
+
+
+def test_a_picture_of_which_nothing_is_known_has_no_rings(panel, engine):
     live = Live()
-    live.previews["left"] = engine.preview(0, 3.0)
-    live.take(engine.state(2.0))
-    panel.refresh(live)
-    assert panel.views["left"].marked == []
-    live.take(engine.state(2.98))
+    live.take(engine.preview(0, 1.0))
     panel.refresh(live)
     assert len(panel.views["left"].marked) == 6
-    live.take(engine.state(3.01))
+    live.take(engine.state(1.01))
+    live.take(replace(engine.preview(0, 1.01), pixels=np.empty((0, 2)), flags=np.empty(0, np.uint16)))
     panel.refresh(live)
-    assert panel.unmarked == set()
+    assert panel.views["left"].marked == [], "neither those of the state nor those of the picture before"
 
 
 def test_what_a_camera_does_not_see_is_not_marked(panel, engine):

@@ -136,8 +136,9 @@ def joints_of(hand: BareHandTracker, state: Array) -> Array:
     return points[:21]
 
 
-def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array) -> SeenContour:
-    """The contour of a hand in `state` in one image, with slices and edges, for display."""
+def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array, t_node_ns: int = 0) -> SeenContour:
+    """The contour of a hand in `state` in the image of `t_ns`, `t_node_ns` by its node's clock, with slices and edges,
+    for display."""
     offset, _, good = frame.predict(state)
     centre, normal, half = frame.slices[:, :2], frame.slices[:, 2:4], frame.slices[:, 4:]
     ends = np.hstack([centre - half * normal, centre + half * normal])
@@ -148,5 +149,5 @@ def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array) -> S
         along = edges.offset[row, column]
         places = centre[row] + along[:, None] * normal[row]
         near = np.abs(along - offset[row]) < NEAR_SD * np.hypot(frame.expected_sd[row], edges.sd[row, column])
-    return SeenContour(camera, t_ns, (centre + offset[:, None] * normal)[good], frame.points.behind[good] == SILHOUETTE,
-                       ends[good], places, near)
+    return SeenContour(camera, t_ns, (centre + offset[:, None] * normal)[good],
+                       frame.points.behind[good] == SILHOUETTE, ends[good], places, near, t_node_ns)

@@ -73,6 +73,7 @@ class ContourEstimator:
         self._cameras = self._requests.cameras
         self._evidence, self._maps = Evidence(self._hand, self._cameras), NewestMaps(self._cameras)
         self._waiting: dict[int, tuple[EdgeFrame, ContourFrame]] = {}
+        self._used = self._waiting  # by the last update
         self._unverified: Maps | None = None
         self._epoch_ns, self.overlaps = 0, [False] * len(self._names)
         self._maps_ns = self._agreed_ns = NEVER
@@ -97,11 +98,9 @@ class ContourEstimator:
         """See `ShowsContours`."""
         if not self.confirmed:
             return []
-        state, found = self._hand.filter.newest.state, []
-        for name, camera, frame in zip(self._names, self._cameras, list(self._hand.frames), strict=True):
-            if frame is not None:
-                found.append(seen_contour(name, camera.answered_ns, frame, state))
-        return found
+        state = self._hand.filter.newest.state
+        return [seen_contour(self._names[number], image.t_row0_master_ns, contour, state, image.t_row0_node_ns)
+                for number, (image, contour) in self._used.items()]
 
     def requests(self) -> list[SliceRequest]:
         """The newest requests to the nodes."""
@@ -168,6 +167,7 @@ class ContourEstimator:
             self._markers.start(t_ns)
         self._epoch_ns, self._maps_ns, self._agreed_ns = t_ns, NEVER, NEVER
         self._tracking, self._waiting, self._unverified = True, {}, None
+        self._used = {}
         self._evidence.start(t_ns)
         self._requests.start(t_ns)
 
@@ -251,6 +251,7 @@ class ContourEstimator:
         except np.linalg.LinAlgError:  # the observations contradict the estimate
             self.drop_track()
             return False
+        self._used = waiting
         self._hand.frames = [None] * len(self._names)
         for number, (one, contour) in waiting.items():
             self._hand.frames[number] = contour

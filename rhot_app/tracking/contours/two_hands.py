@@ -260,22 +260,14 @@ class TwoBareHands(TwoHands):
         return self._merged_at(t_ns, replace(hand, t_receive_ns=received_ns), replace(other, t_receive_ns=received_ns))
 
     def seen(self) -> list[SeenContour]:
-        """See `ShowsContours`. The contours of both hands in one image are joined."""
-        found: dict[str, SeenContour] = {}
-        for one in (contour for hand in self._both for contour in hand.seen()):
-            first = found.get(one.camera)
-            found[one.camera] = one if first is None else SeenContour(
-                one.camera, max(first.t_master_ns, one.t_master_ns),
-                *(np.concatenate([getattr(first, name), getattr(one, name)]) for name in _CONTOUR_FIELDS))
-        return list(found.values())
+        """See `ShowsContours`."""
+        return [replace(contour, hand=number) for number, hand in enumerate(self._both) for contour in hand.seen()]
 
     @property
     def key_frames(self) -> KeyFrames:
         """Of the rig's first hand (`KeepsKeyFrames`)."""
         return self._both[0].key_frames
 
-
-_CONTOUR_FIELDS = "contour", "outline", "slices", "edges", "of_hand"
 
 
 def _palm_distance_m(ours: Array, theirs: Array) -> float:

@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 SILENCE_S = 1.5
 """The engine reports ten times a second; silence longer than this means that it is gone or stuck."""
 
-NEAR_NS = 50_000_000
-"""Images nearer in time show a hand in much the same place: 1 m/s is then 5 cm off at most."""
+STATES = 128
+"""States that wait for the picture of their time: a second at 120 Hz."""
 
 _PAUSE_NS = 400_000_000
 """No state for so long is a gap in the plots; at 10 states per second three may be late."""
@@ -34,7 +34,7 @@ LOST = "lost"
 class Live:
     """The newest of everything, and the sliding windows behind the plots.
 
-    `state`, `status` and `previews` are the newest messages; `state_count` grows with each state, so that a widget
+    `state`, `status` and `previews` are the newest messages, `states` the last ones; `state_count` grows with each state, so that a widget
     knows whether there is anything new to draw. The series behind the plots run on this machine's monotonic clock
     (a replayed log's states carry the times of their recording): `jitter` mm, `latency` ms, `rates` per second.
     """
@@ -56,7 +56,7 @@ class Live:
         self.state_count = 0
         self.preview_count = 0
         self.heard_at_s = self._clock()
-        self.observations: deque[tuple[int, Array, NDArray[np.uint16]]] = deque(maxlen=256)
+        self.states: deque[HandState] = deque(maxlen=STATES)
         self.contours: deque[SeenContour] = deque(maxlen=128)
         self.jitter = Series(())
         self.latency = Series(LATENCY_COLUMNS)
@@ -90,11 +90,11 @@ class Live:
 
     def _take_state(self, state: HandState) -> None:
         self.state = state
+        self.states.append(state)
         self.state_count += 1
         self._state_at_ns = round(1e9 * self._clock())
         self._jitter_window.add(state)
         self._latency_window.add(state)
-        self.observations.append((state.t_master_ns, state.camera_pixels, state.camera_flags))
 
     def _take_status(self, status: EngineStatus) -> None:
         self.status = status
@@ -118,17 +118,7 @@ class Live:
             self.jitter.append(now_ns, np.full(len(self.jitter.names), np.nan))
             self.latency.append(now_ns, np.full(len(LATENCY_COLUMNS), np.nan))
 
-    def contour_at(self, camera: str, t_master_ns: int) -> SeenContour | None:
-        """What was seen of a bare hand in the image nearest to a preview's time; None without one within 50 ms."""
-        near = [one for one in self.contours if one.camera == camera and abs(one.t_master_ns - t_master_ns) < NEAR_NS]
-        return min(near, key=lambda one: abs(one.t_master_ns - t_master_ns), default=None)
-
-    def observation_at(self, t_master_ns: int) -> tuple[Array, NDArray[np.uint16]] | None:
-        """Pixels (C, M, 2) and flags (C, M) of the state nearest to a preview's time; None when none is within 0.25 s.
-
-        A preview is older than the newest state; drawn with the newest pixels, marks would run ahead of the picture.
-        """
-        if not self.observations:
-            return None
-        nearest = min(self.observations, key=lambda one: abs(one[0] - t_master_ns))
-        return nearest[1:] if abs(nearest[0] - t_master_ns) < 250_000_000 else None
+    def contours_in(self, preview: Preview) -> list[SeenContour]:
+        """What was seen of bare hands in the very image of a preview."""
+        return [one for one in self.contours
+                if one.camera == preview.camera and one.t_node_ns == preview.t_node_ns != 0]

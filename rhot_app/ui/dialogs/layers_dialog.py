@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from typing import Final
 
@@ -25,7 +24,6 @@ from PySide6.QtWidgets import (
 from rhot_app.engine.status import Preview
 from rhot_app.project import Rig
 from rhot_app.state import HandState
-from rhot_app.ui.backend.live import NEAR_NS
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.models.layers import LayerPicture, LayerPictures
@@ -33,8 +31,8 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.picture_painter import fit
 
 TICK_MS: Final = 60
-KEPT: Final = 120
-"""States that wait for the picture of their time: a second."""
+NEAR_NS: Final = 50_000_000
+"""No state is nearer to a picture's time: the hand was not tracked in it."""
 
 _SIZE, _LIST_PX, _SWATCH_PX = (1000, 640), 220, 14
 NO_HAND = "No hand is tracked, so there are no layers. Press Start, and show the hand to the cameras."
@@ -55,7 +53,6 @@ class LayersDialog(QDialog):
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
         self.resize(*_SIZE)
         self._drawer: LayerPictures | None = None
-        self._states: deque[HandState] = deque(maxlen=KEPT)
         self._job: Job | None = None
         self._drawn: tuple[object, ...] = ()
         self.shown: LayerPicture | None = None
@@ -110,8 +107,6 @@ class LayersDialog(QDialog):
         """Take in the newest state and picture, and have them drawn, one at a time."""
         self._follow(self._controller.rig)
         live = self._controller.live
-        if live.state is not None and (not self._states or live.state is not self._states[-1]):
-            self._states.append(live.state)
         if self._job is not None or self._drawer is None or self.pause_button.isChecked():
             return
         camera, wanted = self.camera_box.currentText(), self._wanted(live.previews.get(self.camera_box.currentText()))
@@ -132,19 +127,19 @@ class LayersDialog(QDialog):
 
     def _wanted(self, preview: Preview | None) -> tuple[HandState, Preview | None] | None:
         """The newest picture with the state of its time; None without a hand."""
-        if not self._states or not self._controller.running or not self._states[-1].tracked:
+        states = self._controller.live.states
+        if not states or not self._controller.running or not states[-1].tracked:
             return None
         if preview is None or not self.over_check.isChecked():
-            return self._states[-1], None
-        nearest = min(self._states, key=lambda state: abs(state.t_master_ns - preview.t_master_ns))
+            return states[-1], None
+        nearest = min(states, key=lambda state: abs(state.t_master_ns - preview.t_master_ns))
         if abs(nearest.t_master_ns - preview.t_master_ns) > NEAR_NS:
-            return self._states[-1], None
+            return states[-1], None
         return nearest, preview
 
     def _follow(self, rig: Rig | None) -> None:
         if rig is (self._drawer.rig if self._drawer is not None else None):
             return
-        self._states.clear()
         self._drawn = ()
         self._drawer = None if rig is None else LayerPictures(rig)
         before = self.camera_box.currentText()

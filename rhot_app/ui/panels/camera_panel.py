@@ -19,6 +19,7 @@ from rhot_app.ui.models.label_layout import place_at_sides
 from rhot_app.ui.models.palette import Scheme, hex_of, visible_on
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.panels.empty_state import EmptyState
+from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -52,7 +53,7 @@ class CameraView(QWidget):
         self._image = QImage()
         self._frame = (4, 3)
         self.marks: list[Mark] = []
-        self.contour: SeenContour | None = None
+        self.contours: list[SeenContour] = []
         self._pointed_at = False
         self.setMinimumSize(120, 90)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -67,32 +68,24 @@ class CameraView(QWidget):
         """Four by three."""
         return QSize(272, 204)
 
-    def show_preview(self, preview: Preview) -> None:
-        """Another picture."""
+    def show_preview(self, preview: Preview, markers: MarkerSet) -> None:
+        """Another picture, with the markers that were found in it."""
         image = QImage.fromData(preview.jpeg)
-        if not image.isNull():
-            self._image = image
-            self._frame = (preview.width, preview.height)
-            self.update()
-
-    def show_marks(self, pixels: Array, flags: NDArray[np.uint16], names: tuple[str, ...], colours: list[str]) -> None:
-        """Markers at `pixels` (M, 2) px of the full frame; NaN ones are left out."""
-        doubtful = int(MarkerFlag.PARTIAL | MarkerFlag.AMBIGUOUS)
-        self.marks = [Mark(QPointF(float(x), float(y)), short_name(name), colour, not int(flag) & doubtful)
-                       for (x, y), flag, name, colour in zip(pixels, flags, names, colours, strict=True)
-                       if np.isfinite(x) and np.isfinite(y)]
+        if image.isNull():
+            return
+        self._image, self._frame, self.marks, self.contours = image, (preview.width, preview.height), [], []
+        if len(preview.pixels) == len(markers.ids):
+            doubtful = int(MarkerFlag.PARTIAL | MarkerFlag.AMBIGUOUS)
+            self.marks = [Mark(QPointF(float(x), float(y)), short_name(marker.id),
+                               visible_on(hex_of(marker.display_rgb), "#000000", 3.0), not int(flag) & doubtful)
+                          for (x, y), flag, marker in zip(preview.pixels, preview.flags, markers.markers, strict=True)
+                          if np.isfinite(x) and np.isfinite(y)]
         self.update()
 
-    def clear_marks(self) -> None:
-        """No marks: no state belongs to this picture."""
-        if self.marks:
-            self.marks = []
-            self.update()
-
-    def show_contour(self, seen: SeenContour | None) -> None:
-        """What was seen of a bare hand in this picture."""
-        if seen is not self.contour:
-            self.contour = seen
+    def show_contours(self, seen: list[SeenContour]) -> None:
+        """What was seen of bare hands in this picture."""
+        if len(seen) != len(self.contours):
+            self.contours = seen
             self.update()
 
     @property
@@ -135,8 +128,8 @@ class CameraView(QWidget):
         painter.translate(target.topLeft())
         scale = target.width() / self._frame[0]
         places = [(mark.place + QPointF(0.5, 0.5)) * scale for mark in self.marks]
-        if self.contour is not None:
-            paint_contour(painter, self.contour, scale)
+        for contour in self.contours:
+            paint_contour(painter, contour, scale)
         self._paint_rings(painter, places, target.width())
         if self.named:
             self._paint_names(painter, places, target.size())
@@ -187,7 +180,7 @@ def paint_contour(painter: QPainter, seen: SeenContour, scale: float) -> None:
 
 
 class CameraPanel(QWidget):
-    """The cameras of the rig, one above the other. `unmarked` are those whose pictures still wait for their marks."""
+    """The cameras of the rig, one above the other."""
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -196,8 +189,7 @@ class CameraPanel(QWidget):
         self.setProperty("guide", "cameras")
         self._scheme = scheme
         self._rig: Rig | None = None
-        self._shown: dict[str, int] = {}
-        self.unmarked: set[str] = set()
+        self._shown: dict[str, Preview] = {}
         self.views: dict[str, CameraView] = {}
         self.empty = EmptyState("Pictures appear here once a rig is open and its nodes answer.")
         self._layout = QBoxLayout(QBoxLayout.Direction.TopToBottom, self)
@@ -218,7 +210,6 @@ class CameraPanel(QWidget):
             view.deleteLater()
         self.views = {node.name: CameraView(node.name, self._scheme) for node in (rig.nodes if rig else ())}
         self._shown = {}
-        self.unmarked = set()
         for view in self.views.values():
             self._layout.addWidget(view, 1)
         self.empty.setVisible(rig is None)
@@ -233,29 +224,14 @@ class CameraPanel(QWidget):
         super().resizeEvent(event)
 
     def refresh(self, live: Live) -> None:
-        """Show new previews, and the marks that belong to their instant as soon as a state of that instant is there."""
+        """Show new previews, and what was seen in their images as soon as it has come."""
         if self._rig is None:
             return
-        for camera, (name, view) in enumerate(self.views.items()):
+        for name, view in self.views.items():
             preview = live.previews.get(name)
             if preview is None:
                 continue
-            if self._shown.get(name) != preview.t_master_ns:
-                self._shown[name] = preview.t_master_ns
-                self.unmarked.add(name)
-                view.show_preview(preview)
-                view.clear_marks()
-            view.show_contour(live.contour_at(name, preview.t_master_ns))
-            if name in self.unmarked:
-                self._mark(view, camera, preview, live)
-
-    def _mark(self, view: CameraView, camera: int, preview: Preview, live: Live) -> None:
-        assert self._rig is not None
-        markers = self._rig.markers
-        observation = live.observation_at(preview.t_master_ns)
-        if observation is None or len(observation[0]) <= camera or observation[0].shape[1] != len(markers.ids):
-            return
-        colours = [visible_on(hex_of(marker.display_rgb), "#000000", 3.0) for marker in markers.markers]
-        view.show_marks(observation[0][camera], observation[1][camera], markers.ids, colours)
-        if live.state is not None and live.state.t_master_ns >= preview.t_master_ns:
-            self.unmarked.discard(view.name)
+            if self._shown.get(name) is not preview:
+                self._shown[name] = preview
+                view.show_preview(preview, self._rig.markers)
+            view.show_contours(live.contours_in(preview))

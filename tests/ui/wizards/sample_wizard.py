@@ -12,7 +12,7 @@ from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Tag
-from rhot_app.ui.wizards.models.step import AcceptStep, Bar, Step, StepView, Task
+from rhot_app.ui.wizards.models.step import AcceptStep, AnnotatedPicture, Bar, Step, StepView, Task
 
 
 class FormStep(Step):
@@ -43,6 +43,11 @@ class FormPage(Page):
         self.changed.emit()
 
 
+def brightest(picture):
+    """The column in which the middle row of a picture is brightest."""
+    return float(picture.bgr[120].max(axis=1).argmax())
+
+
 class CollectStep(Step):
     """Three pictures to capture."""
 
@@ -55,7 +60,7 @@ class CollectStep(Step):
         self.enough = 3
 
     def see(self, pictures):
-        return {name: float(picture.bgr[120].max(axis=1).argmax()) for name, picture in pictures.items()}
+        return {name: (picture, brightest(picture)) for name, picture in pictures.items()}
 
     def take(self, seen):
         self.seen = seen
@@ -78,13 +83,14 @@ class CollectStep(Step):
 
     def view(self):
         count = len(self.captured)
-        overlays = {}
-        for name, x in (self.seen or {}).items():
-            overlays[name] = (Cells(np.eye(3)), Dots(np.array([[x, 120.0]])), Tag(x, 100.0, "edge"),
-                              Line(np.array([[x, 50.0], [x + 30, 50.0], [x, 80.0]]), closed=True, shaded=True))
+        annotated = {}
+        for name, (picture, x) in (self.seen or {}).items():
+            annotated[name] = AnnotatedPicture(picture, (
+                Dots(np.array([[x, 120.0]])), Tag(x, 100.0, "edge"),
+                Line(np.array([[x, 50.0], [x + 30, 50.0], [x, 80.0]]), closed=True, shaded=True)))
         bars = (Bar("pictures", count / self.enough, "captured so far"), Bar("tilt", 0.4), Bar("size", 1.0))
         return StepView("Hold the board still and press Space.", done=count >= self.enough, bars=bars,
-                        overlays=overlays, kept=count)
+                        annotated=annotated, overlays=dict.fromkeys(annotated, (Cells(np.eye(3)),)), kept=count)
 
 
 class SolveStep(Step):

@@ -63,7 +63,7 @@ def test_the_board_is_confirmed_by_what_is_seen(scene):
     step.take(step.see(scene.pictures()))
     view = step.view()
     assert "left and right" in view.sentence and view.done
-    dots = next(mark for mark in view.overlays["left"] if isinstance(mark, Dots))
+    dots = next(mark for mark in view.annotated["left"].overlay if isinstance(mark, Dots))
     corners = scene.board.object_points() @ scene.world_from_board[:3, :3].T + scene.world_from_board[:3, 3]
     expected = 530.0 * corners[:, :2] / corners[:, 2:] + [319.5, 239.5]
     assert np.abs(np.sort(dots.points, axis=0) - np.sort(expected, axis=0)).max() < 0.3
@@ -107,7 +107,7 @@ def test_a_board_that_nobody_measured_is_shown_but_not_done(scene):
     step.take(step.see(scene.pictures()))
     view = step.view()
     assert not view.may_go_on and "Measure the squares" in view.sentence
-    assert set(view.overlays) == {"left", "right"}, "the person sees that it is the right one"
+    assert all(view.annotated[name].overlay for name in ("left", "right")), "the person sees that it is the right one"
 
 
 @pytest.fixture

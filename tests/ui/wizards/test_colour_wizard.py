@@ -248,7 +248,7 @@ def test_names_stand_at_the_side_and_leave_the_paint_in_sight(qapp, picks, scene
     pick_all(picks)
     look(picks, scene)
     place = fit(320, 240, QRectF(0, 0, 800, 600))
-    callouts = [mark for mark in picks.view().overlays["left"] if isinstance(mark, Callout)]
+    callouts = [mark for mark in picks.view().annotated["left"].overlay if isinstance(mark, Callout)]
     boxes = callout_boxes(callouts, place, QFontMetricsF(QFont()))
     assert len(boxes) >= len(PAINTS)
     for box in boxes:
@@ -260,7 +260,7 @@ def test_the_mask_is_what_the_detector_takes(picks, scene):
     pick_all(picks)
     look(picks, scene)
     assert all(mark.found for mark in picks.masked["left"].seen)
-    layer, *marks = picks.view().overlays["left"]
+    layer, *marks = picks.view().annotated["left"].overlay
     assert isinstance(layer, Layer) and {mark.text for mark in marks if isinstance(mark, Callout)} >= set(PAINTS)
     labels = picks.masked["left"].labels
     assert layer.rgba.shape == (120, 160, 4)

@@ -5,15 +5,21 @@ from __future__ import annotations
 import time
 
 import msgspec
+import numpy as np
 import pytest
 from fake_engine import FakeEngine, synthetic_rig
+from paint_scene import PaintScene
 from wizard_hand import HeldMarker
 from wizard_rig import FakeRigAsker
 
 from rhot_app.calibration.verdict import Grade
 from rhot_app.project import CameraCalibration, load_rig
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards import depth
+from rhot_app.ui.wizards.models.drawing import Dots
 from rhot_app.ui.wizards.steps.depth_steps import DistanceStep
+from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import from_bgr
 
 DISTANCES_CM = (25.0, 30.0, 40.0, 50.0, 60.0, 70.0, 85.0, 100.0)
 
@@ -64,7 +70,6 @@ def test_from_distances_to_a_rig_that_uses_them(open_wizard, marker):
     for distance_cm in DISTANCES_CM:
         measure(distance_cm)
     assert page.table.rowCount() == len(DISTANCES_CM)
-    assert set(hands.window.step.view().overlays) == {"left", "right"}
     hands.next()
     assert hands.title == "The law" and hands.window.page.charts.plots
     assert "replaces_calibration" in hands.verdict.codes
@@ -87,3 +92,23 @@ def test_what_cannot_be_measured_is_said(marker):
     marker.distance_m, marker.noise_px = 0.3, 5.0
     assert not step.capture()
     assert "moves" in step.view().hint and not step.rows
+
+
+def test_the_chosen_marker_is_ringed_where_it_is_in_the_picture_shown(marker):
+    """The states are those of other moments: what they say of the marker's place is not drawn."""
+    scene = PaintScene()
+    scene.moving = True
+    step = DistanceStep(synthetic_rig(), lambda seconds: [marker.poll()[0]])
+    index = step.rig.markers.ids.index("ring")
+    step.marker, found = index, []
+    for number in range(6):
+        pictures = {name: Picture(name, scene.draw(node_id), number, 0, number)
+                    for name, node_id in (("left", 1), ("right", 2))}
+        step.take(step.see(pictures))
+        for name, annotated in step.view().annotated.items():
+            assert annotated.picture is pictures[name]
+            (dots,) = [mark for mark in annotated.overlay if isinstance(mark, Dots)]
+            seen = FastDetector(step.rig.markers).detect(from_bgr(annotated.picture.bgr))[index]
+            assert dots.points[0] == pytest.approx((seen.x, seen.y), abs=1.0)
+            found.append(dots.points[0])
+    assert np.linalg.norm(np.diff(found[::2], axis=0), axis=1).min() > 5.0

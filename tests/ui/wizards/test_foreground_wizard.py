@@ -14,7 +14,7 @@ from rhot_app.ui.wizards.foreground import make_plan
 from rhot_app.ui.wizards.steps import foreground_steps
 from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, SceneWatch, SkinStep, findings_of, mask_of, propose
 from rhot_node.foreground_store import ForegroundStore
-from rhot_node.network.pictures import PictureBox
+from rhot_node.network.pictures import PictureBox, encode_still
 
 SKIN = (115, 140, 200)  # BGR
 
@@ -61,7 +61,9 @@ class LearningNodes(FakeRigAsker):
         elif kind == "learn_skin":
             return {"answer": {"found": store.learn_skin(self.box(node_id), save=request["save"])}}
         elif kind == "foreground_mask":
-            return {"answer": {}, "data": store.mask(self.box(node_id))[0]}
+            mask, picture = store.mask(self.box(node_id))
+            return {"answer": {"mask_bytes": len(mask.data), "number": picture.number, "t_node_ns": picture.t_node_ns},
+                    "data": mask.data + encode_still(picture, "jpeg").data}
         elif kind == "save_foreground":
             store.save()
             self.saved.append(node_id)
@@ -173,7 +175,7 @@ def test_the_verdict_names_what_is_wrong_with_a_mask(boxes, code):
     grey = np.zeros((240, 320), np.uint8)
     for x0, y0, x1, y1 in boxes:
         grey[y0:y1, x0:x1] = 255
-    found = findings_of("left", mask_of(cv2.imencode(".png", grey)[1].tobytes()))
+    found = findings_of("left", mask_of("left", {"data": cv2.imencode(".png", grey)[1].tobytes()}))
     assert [finding.code for finding in found] == ([code] if code else [])
 
 

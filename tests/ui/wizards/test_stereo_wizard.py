@@ -110,7 +110,7 @@ def test_nobody_gets_past_the_board_without_measuring_it(hands, scene):
     scene.place(*PLACES[0])
     page, button = hands.window.page, hands.frame.next_button
     assert page.square.text() == "" and "measure" in page.square.placeholderText()
-    hands.until(lambda: len(hands.window.step.view().overlays) == 2)
+    hands.until(lambda: len(hands.window.step.view().annotated) == 2)
     hands.until(lambda: "Measure the squares" in hands.sentence and "Next waits" in hands.hint)
     assert not button.isEnabled()
     hands.key(Qt.Key.Key_Return)

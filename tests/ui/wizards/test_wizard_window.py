@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import sample_wizard
 from fake_engine import synthetic_rig
+from patience import eventually
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMessageBox
+from sample_wizard import brightest
 from wizard_rig import FakeRigAsker
 
 from rhot_app import rig_history
 from rhot_app.project import load_rig
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.guide import page_path
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards.framework.picture_view import PictureWall
 from rhot_app.ui.wizards.framework.plan import WIZARDS
+from rhot_app.ui.wizards.models.drawing import Cells, Dots, Tag
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, StepView
 
 
 @pytest.fixture
@@ -77,6 +86,64 @@ def test_the_pictures_are_live_and_marked(open_sample):
     hands.until(lambda: view.shown is not None and len(view.overlay) == 4)
     first = view.shown.number
     hands.until(lambda: view.shown.number > first + 4)
+
+
+def test_what_is_drawn_was_found_in_the_very_picture_that_is_shown(open_sample):
+    """Something moves in the pictures, and they are looked at more slowly than they come."""
+    hands = open_sample()
+    hands.window.page.box.setValue(9)
+    hands.next()
+    see, feed = hands.window.step.see, hands.window.feed
+
+    def slow(pictures):
+        eventually(lambda: all(feed.newest(name).number > picture.number for name, picture in pictures.items()))
+        return see(pictures)
+
+    hands.window.step.see = slow
+    numbers, views = {}, hands.frame.wall.views
+
+    def drawn():
+        for name, view in views.items():
+            dots = [mark for mark in view.overlay if isinstance(mark, Dots)]
+            if view.shown is not None and dots:
+                assert dots[0].points[0, 0] == brightest(view.shown), "marks of another picture"
+                numbers.setdefault(name, set()).add(view.shown.number)
+        return all(len(numbers.get(name, ())) > 5 for name in views)
+
+    hands.until(drawn)
+
+
+def picture(number, at_s):
+    return Picture("left", np.zeros((240, 320, 3), np.uint8), number, 0, round(1e9 * at_s))
+
+
+def test_a_picture_without_results_is_drawn_without_any(qtbot, themed):
+    class Feed:
+        def newest(self, name):
+            return newest
+
+        def problem(self, name):
+            return ""
+
+    wall = PictureWall(("left",), DARK)
+    qtbot.addWidget(wall)
+    wall.show()
+    view, fixed, own = wall.views["left"], Cells(np.eye(2)), Tag(1.0, 2.0, "a marker")
+    looked_at, newest = picture(1, 10.0), picture(9, 10.9)
+    step_view = StepView("", overlays={"left": (fixed,)}, annotated={"left": AnnotatedPicture(looked_at, (own,))})
+    wall.show_view(step_view)
+    wall.refresh(Feed())
+    assert view.shown is looked_at and view.overlay == (fixed, own)
+    newest = picture(10, 11.1)
+    wall.refresh(Feed())
+    assert view.shown is newest and view.overlay == (fixed,), "nobody has looked at this one, nor will soon"
+    held = picture(5, 10.5)
+    wall.show_view(replace(step_view, pictures={"left": held}))
+    wall.refresh(Feed())
+    assert view.shown is held and view.overlay == (fixed,)
+    wall.show_view(replace(step_view, pictures={"left": looked_at}))
+    wall.refresh(Feed())
+    assert view.shown is looked_at and view.overlay == (fixed, own)
 
 
 def test_back_is_always_safe(open_sample):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 
 import numpy as np
 from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
@@ -16,6 +15,9 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.picture_painter import FramePlacement, fit, paint_overlay
 from rhot_app.ui.wizards.models.drawing import Callout, Overlay
 from rhot_app.ui.wizards.models.step import StepView
+
+ANNOTATED_NS = 1_000_000_000
+"""A picture that was looked at is shown while it is no more behind the newest one."""
 
 FLASH_S = 0.25
 """How long the frame lights up when a picture was kept: long enough to be seen from two metres."""
@@ -76,7 +78,7 @@ class PictureView(QWidget):
 
     def show_overlay(self, overlay: Overlay) -> None:
         """Draw this over the picture from now on."""
-        if overlay is not self._overlay:
+        if overlay != self._overlay:
             self._overlay = overlay
             self.update()
 
@@ -176,6 +178,7 @@ class PictureWall(QWidget):
         super().__init__(parent)
         self.views = {name: PictureView(name, scheme) for name in cameras}
         self._shown = cameras
+        self._view = StepView("")
         self.large = ""  # the camera whose picture is large beside small ones; "" while all are alike
         self._side = QWidget()
         self._column = QVBoxLayout(self._side)
@@ -217,20 +220,24 @@ class PictureWall(QWidget):
         self._side.setVisible(bool(name))
         self._arrange()
 
-    def refresh(self, feed: LiveFeed, frozen: Mapping[str, Picture]) -> None:
-        """Newest pictures; those in `frozen` instead of them."""
+    def refresh(self, feed: LiveFeed) -> None:
+        """The step's own pictures; else those that were looked at, with what was found in them; else the newest."""
         for name, view in self.views.items():
-            if view.isVisible():
-                if name in frozen:
-                    view.show_picture(frozen[name])
-                else:
-                    view.show_picture(feed.newest(name), feed.problem(name))
-                view.tick()
+            if not view.isVisible():
+                continue
+            newest, annotated, frozen = feed.newest(name), self._view.annotated.get(name), self._view.pictures.get(name)
+            picture = frozen or newest
+            if frozen is None and annotated is not None and (
+                    newest is None or newest.received_ns - annotated.picture.received_ns <= ANNOTATED_NS):
+                picture = annotated.picture
+            own = annotated.overlay if annotated is not None and annotated.picture is picture else ()
+            view.show_picture(picture, "" if frozen is not None else feed.problem(name))
+            view.show_overlay((*self._view.overlays.get(name, ()), *own))
+            view.tick()
 
     def show_view(self, view: StepView) -> None:
-        """What the step draws."""
-        for name, widget in self.views.items():
-            widget.show_overlay(view.overlays.get(name, ()))
+        """What the step draws from the next `refresh` on."""
+        self._view = view
 
     def flash(self) -> None:
         """A picture was kept."""

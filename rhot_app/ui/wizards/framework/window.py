@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QLineEdit, QMessageBox, QWidget
 
-from rhot_app.ui.backend.feed import LiveFeed, Picture
+from rhot_app.ui.backend.feed import LiveFeed
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.wizards.framework.frame import WizardFrame
@@ -51,7 +50,6 @@ class WizardWindow(QDialog):
         self._dirty = True
         self._next_show = 0.0
         self._kept = 0
-        self._frozen: Mapping[str, Picture] = {}
         self._job: Job | None = None
         self.guide: GuideViewer | None = None
         self._ending: Job | None = None
@@ -164,8 +162,7 @@ class WizardWindow(QDialog):
     # -- every tick ------------------------------------------------------------------------------------------------
 
     def tick(self) -> None:
-        """Newest pictures; what was seen in them; what the step says to it."""
-        self.frame.wall.refresh(self.feed, self._frozen)
+        """What was seen in the newest pictures; what the step says to it; the pictures."""
         seen = self.looker.found(self.step)
         if seen is not None:
             self.step.take(seen)
@@ -174,6 +171,7 @@ class WizardWindow(QDialog):
         if self._dirty or now >= self._next_show:
             self._next_show = now + SHOW_S
             self.refresh()
+        self.frame.wall.refresh(self.feed)
 
     def refresh(self) -> None:
         """Ask the step and show it; begin its long work if it has some."""
@@ -181,9 +179,9 @@ class WizardWindow(QDialog):
         self.work.offer(self.step)
         views = [page.step.view() for page in self.plan.pages]
         view = views[self.current]
-        self._frozen = view.pictures
         self.plan.pages[self.current].show_view(view)
         self.frame.show_view(view, self.step, self.current, [each.done for each in views])
+        self.frame.wall.refresh(self.feed)
         if view.kept > self._kept:
             self.frame.wall.flash()
         self._kept = view.kept

@@ -23,7 +23,7 @@ from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, MARKER_SHA
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.models.drawing import board_marks
-from rhot_app.ui.wizards.models.step import Pictures, Step, StepView
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, Pictures, Step, StepView
 
 DICTIONARIES = (DEFAULT_DICTIONARY, "DICT_4X4_250", "DICT_5X5_100", "DICT_5X5_250", "DICT_6X6_250",
                 "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_36h11")
@@ -83,10 +83,11 @@ def remembered_fields(text: str) -> BoardFields:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardObservation:
-    """What one look saw: the board it looked for, the board by camera, whether its squares go on where they should end,
-    and why no camera sees it, when that was looked into."""
+    """What one look saw in `pictures`: the board it looked for, the board by camera, whether its squares go on where
+    they should end, and why no camera sees it, when that was looked into."""
 
     board: Board
+    pictures: Pictures
     views: dict[str, BoardView | None]
     beyond: tuple[Beyond, ...] = ()
     missing: str | None = None
@@ -101,6 +102,7 @@ class BoardSearch:
 
     def forget(self) -> None:
         """What was seen is of another board or camera."""
+        self.pictures: Pictures = {}
         self.views: dict[str, BoardView | None] = {}
         self.recognised = False
         self._missing = ""
@@ -116,19 +118,25 @@ class BoardSearch:
             self._next_why_s = now_s + _WHY_S
             beyond = tuple(look_beyond(to_gray(pictures[name].bgr), view, board) for name, view in seen.items()
                            ) if isinstance(board, Chessboard) else ()
-            return BoardObservation(board, views, beyond, "")
+            return BoardObservation(board, pictures, views, beyond, "")
         if now_s < self._next_why_s or not pictures:
-            return BoardObservation(board, views)
+            return BoardObservation(board, pictures, views)
         self._next_why_s = now_s + _WHY_S
-        return BoardObservation(board, views, missing=why_missing(to_gray(next(iter(pictures.values())).bgr), board))
+        return BoardObservation(board, pictures, views,
+                                missing=why_missing(to_gray(next(iter(pictures.values())).bgr), board))
 
     def take(self, seen: BoardObservation) -> None:
         """What a look has seen."""
-        self.views = seen.views
+        self.pictures, self.views = seen.pictures, seen.views
         self.recognised = self.recognised or any(view is not None for view in seen.views.values())
         self._beyond.extend(seen.beyond)
         if seen.missing is not None:
             self._missing = seen.missing
+
+    def annotated(self, board: Board, colour: str = "good") -> dict[str, AnnotatedPicture]:
+        """The pictures looked at last, with the corners found in them."""
+        return {name: AnnotatedPicture(self.pictures[name], () if view is None else board_marks(view, board, colour))
+                for name, view in self.views.items()}
 
     def size_finding(self, board: Board | None) -> Finding | None:
         """What the pictures say against the board's size."""
@@ -209,15 +217,15 @@ class BoardStep(Step):
         if self.board is None:
             return StepView("Say which board you hold.", hint=self.problem)
         search = self._search
-        overlays = {name: board_marks(view, self.board) for name, view in search.views.items() if view is not None}
+        annotated, found = search.annotated(self.board), sum(view is not None for view in search.views.values())
         wrong = search.size_finding(self.board)
         if wrong is not None:
-            return StepView("Count the corners again.", hint=f"{wrong.figure} {wrong.cause}", overlays=overlays)
+            return StepView("Count the corners again.", hint=f"{wrong.figure} {wrong.cause}", annotated=annotated)
         if self._fields.square_mm is None:
             hint = " ".join(filter(None, (UNMEASURED, self._hint())))
-            return StepView("Measure the squares and type their size.", hint=hint, overlays=overlays)
-        return StepView(self._sentence(len(overlays)), done=search.recognised, passable=True,
-                        hint=self._hint(), overlays=overlays)
+            return StepView("Measure the squares and type their size.", hint=hint, annotated=annotated)
+        return StepView(self._sentence(found), done=search.recognised, passable=True,
+                        hint=self._hint(), annotated=annotated)
 
     def _sentence(self, found: int) -> str:
         if found == 0:

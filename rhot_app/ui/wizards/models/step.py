@@ -49,14 +49,22 @@ class Task:
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class AnnotatedPicture:
+    """A picture and what was found in this very picture."""
+
+    picture: Picture
+    overlay: Overlay = ()
+
+
 @dataclass(frozen=True, slots=True)
 class StepView:
     """Everything that is shown of a step at one moment.
 
     `done` ticks it off and lets the person go on, never with a `verdict` that forbids to use the result: the sentence
-    then says so. `passable` lets them go on although more would be better. `hint` says why Next must wait. `overlays`
-    are by camera; `pictures` by camera are shown instead of the live ones. `kept` counts what was captured: the
-    pictures light up when it grows.
+    then says so. `passable` lets them go on although more would be better. `hint` says why Next must wait. By camera:
+    `annotated`, what was found in the last picture that was looked at; `overlays`, what is drawn over any picture;
+    `pictures`, shown instead of the live ones. `kept` counts what was captured: the pictures light up when it grows.
     """
 
     sentence: str
@@ -64,6 +72,7 @@ class StepView:
     hint: str = ""
     bars: tuple[Bar, ...] = ()
     verdict: Verdict | None = None
+    annotated: Mapping[str, AnnotatedPicture] = field(default_factory=dict)
     overlays: Mapping[str, Overlay] = field(default_factory=dict)
     pictures: Mapping[str, Picture] = field(default_factory=dict)
     kept: int = 0

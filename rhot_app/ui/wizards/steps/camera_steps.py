@@ -18,7 +18,7 @@ from rhot_app.project import RigNode
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.proposal import NodeChange, Proposal, Row
 from rhot_app.ui.wizards.models.drawing import Layer, Line, Overlay
-from rhot_app.ui.wizards.models.step import Pictures, Step, StepView
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, Pictures, Step, StepView
 from rhot_node.config import CameraSettings
 from rhot_node.detect.colour import Box
 from rhot_node.detect.fast import FastDetector
@@ -157,12 +157,16 @@ _GREY_PX = 24  # a click on grey paper is a box of this side
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PictureAdvice:
-    """What one picture says: the advice, the `problem` of a grey patch that is none, and what to draw."""
+    """What one picture says: the advice, and the `problem` of a grey patch that is none."""
 
-    received_ns: int
+    annotated: AnnotatedPicture
     advice: CameraAdvice
-    overlay: Overlay
     problem: str = ""
+
+    @property
+    def received_ns(self) -> int:
+        """When the picture came, monotonic."""
+        return self.annotated.picture.received_ns
 
 
 class CameraEye:
@@ -189,7 +193,7 @@ class CameraEye:
             advice = self._advisor.update(image, t_s, settings, masks, grey)
         except CalibrationError as exc:
             advice, problem = self._advisor.update(image, t_s, settings, masks), str(exc)
-        return PictureAdvice(picture.received_ns, advice, _overlay(image, grey), problem)
+        return PictureAdvice(AnnotatedPicture(picture, _overlay(image, grey)), advice, problem)
 
 
 class SettingsStep(Step):
@@ -328,7 +332,7 @@ class SettingsStep(Step):
         sentence = ("The pictures are good: press Next." if good else
                     "Show the hand with its markers, and turn the knobs until the verdict is good.")
         return StepView(sentence, done=good, hint=self._problem, verdict=verdict,
-                        overlays={name: look.overlay for name, look in self._looks.items()}, passable=self._current)
+                        annotated={name: look.annotated for name, look in self._looks.items()}, passable=self._current)
 
     def propose(self, rig_path: Path | None) -> Proposal | None:
         """All changed cameras' settings, or those in force when they may be used; None for neither.

@@ -19,7 +19,7 @@ from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards.models.drawing import Callout, Dots, Layer, Overlay
-from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Pictures, Step, StepView
 from rhot_node.detect.colour import learn_chroma_from_colours
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage, from_bgr
@@ -31,13 +31,17 @@ from rhot_node.wire.messages import MarkerObservation
 _DIMMED = 150  # alpha of the black over everything that is taken for no marker
 _FAINT = 70  # alpha of a marker's colour where it was not asked for
 
+Show = Literal["all", "chosen", "none"]
+"""Whose mask lies over the pictures."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaskedPicture:
-    """One camera's picture as its detector sees it: `labels` (H/2, W/2) 1 + index of the marker, 0 for none; `drift`:
+    """One camera's `picture` as its detector sees it: `labels` (H/2, W/2) 1 + index of the marker, 0 for none; `drift`:
     how the light of the last pictures stands to the one that the marker set was learnt in; `causes`: by index, why the
     markers that were asked for are not found, or found in doubt."""
 
+    picture: Picture
     image: YuvImage
     labels: NDArray[np.uint8]
     seen: tuple[MarkerObservation, ...]
@@ -74,7 +78,7 @@ class MaskMaker:
             drift = self._drifts.setdefault(name, IlluminantDrift(markers, detector))
             drift.update(image, seen)
             causes = self._causes(detector, image, seen, [marker for marker in asked if marker in markers.ids])
-            masked[name] = MaskedPicture(image, detector.labels(image), seen, drift.report(), causes)
+            masked[name] = MaskedPicture(picture, image, detector.labels(image), seen, drift.report(), causes)
         return masked
 
     def _causes(self, detector: FastDetector, image: YuvImage, seen: tuple[MarkerObservation, ...],
@@ -98,6 +102,13 @@ def drift_of(masked: MaskedPictures) -> tuple[Finding, ...]:
     return drift_findings({name: picture.drift for name, picture in masked.items()})
 
 
+def annotated_by_masks(masked: MaskedPictures, markers: MarkerSet, chosen: int | None,
+                       show: Show) -> dict[str, AnnotatedPicture]:
+    """The pictures with the masks that `show` asks for."""
+    return {name: AnnotatedPicture(one.picture, () if show == "none" else mask_overlay(one, markers, chosen))
+            for name, one in masked.items()}
+
+
 def mask_overlay(picture: MaskedPicture, markers: MarkerSet, chosen: int | None) -> Overlay:
     """The mask over a dimmed picture, every marker in its own colour, those found with a ring and their name.
 
@@ -117,9 +128,6 @@ def mask_overlay(picture: MaskedPicture, markers: MarkerSet, chosen: int | None)
 
 
 # -- Step: gather the paints -------------------------------------------------------------------------------------------
-
-Show = Literal["all", "chosen", "none"]
-"""Whose mask lies over the pictures."""
 
 _CLICK_PX = 5.0  # a drag that is smaller was a click
 _PARTS = 10  # of a marker's variety after which its colour is learnt anew
@@ -277,7 +285,7 @@ class PickStep(Step):
         return StepView(self._sentence(),
                         done=gathering.enough and len(names) == len(self.base.ids) and not self._wrong,
                         passable=bool(names), hint=self.problem or self._hint(), bars=bars, verdict=self._verdict(),
-                        overlays=self._overlays(), pictures=self.held)
+                        annotated=self._annotated(), pictures=self.held)
 
     def _sentence(self) -> str:
         if self.held:
@@ -311,8 +319,6 @@ class PickStep(Step):
         missing = [name for name in self.gathering.names if self.gathering.variety(name) < 1.0]
         return f"Still to be seen in other places: {', '.join(missing)}." if missing else ""
 
-    def _overlays(self) -> dict[str, tuple]:
-        if self.show == "none":
-            return {}
+    def _annotated(self) -> dict[str, AnnotatedPicture]:
         chosen = self.base.ids.index(self.chosen) if self.show == "chosen" and self.chosen != SKIN else None
-        return {name: mask_overlay(picture, self._markers, chosen) for name, picture in self._masked.items()}
+        return annotated_by_masks(self._masked, self._markers, chosen, self.show)

@@ -19,7 +19,14 @@ from rhot_app.ui.models.proposal import Change, NodeChange, Proposal, RigChange,
 from rhot_app.ui.models.rows import rig_rows
 from rhot_app.ui.wizards.models.step import Chart, ChartedStep, Curve, Pictures, Step, StepView, Task
 from rhot_app.ui.wizards.steps.camera_steps import Control
-from rhot_app.ui.wizards.steps.colour_pick import MaskedPictures, MaskMaker, PickStep, Show, drift_of, mask_overlay
+from rhot_app.ui.wizards.steps.colour_pick import (
+    MaskedPictures,
+    MaskMaker,
+    PickStep,
+    Show,
+    annotated_by_masks,
+    drift_of,
+)
 from rhot_node.markers import ChromaModel, MarkerSet
 
 # -- Step: move the bounds of the colours ------------------------------------------------------------------------------
@@ -154,8 +161,6 @@ class BoundsStep(Step):
             return StepView("Go back and pick a colour." if not self.picks.gathering.names else
                             "It did not work out." if self.problem else "One moment.", hint=self.problem)
         chosen = self.markers.ids.index(self.chosen) if self.show == "chosen" else None
-        overlays = {} if self.show == "none" else {
-            name: mask_overlay(picture, self.markers, chosen) for name, picture in self._masked.items()}
         index = self.markers.ids.index(self.chosen)
         found = [picture.seen[index].found for picture in self._masked.values()]
         hint = f"{self.chosen} is found by {sum(found)} of {len(found)} cameras." if found else ""
@@ -164,7 +169,8 @@ class BoundsStep(Step):
         drift = drift_of(self._masked)
         if drift:
             hint = f"Since the colours were picked: {drift[0].sentence}"
-        return StepView("The mask must fit the markers.", done=True, hint=hint, overlays=overlays)
+        return StepView("The mask must fit the markers.", done=True, hint=hint,
+                        annotated=annotated_by_masks(self._masked, self.markers, chosen, self.show))
 
 
 def learning(picks: PickStep, given: dict[str, ChromaModel], title: str) -> Task:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -15,9 +15,13 @@ from rhot_app.calibration.verdict import Verdict, judged_anew
 from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
 from rhot_app.state import HandState
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
-from rhot_app.ui.wizards.models.drawing import Callout, Dots, Overlay
-from rhot_app.ui.wizards.models.step import Bar, Chart, ChartedStep, Curve, Step, StepView
+from rhot_app.ui.wizards.models.drawing import Callout, Dots
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Chart, ChartedStep, Curve, Pictures, Step, StepView
+from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import from_bgr
+from rhot_node.wire.messages import MarkerObservation
 
 REASON = "depth calibration"
 ENOUGH = 8
@@ -31,7 +35,7 @@ class DistanceStep(Step):
     """A marker is held at a distance that a person has measured; Space takes what the cameras see in a second."""
 
     title = "Measure"
-    captures = True
+    watches = captures = True
 
     def __init__(self, rig: Rig, recent: Callable[[float], Sequence[HandState]]) -> None:
         """`recent` gives the states of the last seconds."""
@@ -42,6 +46,8 @@ class DistanceStep(Step):
         self.report: DepthReport | None = None
         self.problem = ""
         self._recent = recent
+        self._detectors: dict[str, FastDetector] = {}
+        self._seen: Mapping[str, tuple[Picture, tuple[MarkerObservation, ...]]] = {}
         self._warning = " ".join(finding.sentence for finding in replaced_calibration(rig))
 
     @property
@@ -54,6 +60,15 @@ class DistanceStep(Step):
         pixels = [state.camera_pixels[:2, self.marker, 0] for state in self._recent(LOOK_S)]
         seen = np.array([x[0] - x[1] for x in pixels], dtype=np.float64)
         return seen[np.isfinite(seen)]
+
+    def see(self, pictures: Pictures) -> dict[str, tuple[Picture, tuple[MarkerObservation, ...]]]:
+        """The markers in each picture."""
+        return {name: (picture, self._detectors.setdefault(name, FastDetector(self.rig.markers)).detect(
+            from_bgr(picture.bgr))) for name, picture in pictures.items()}
+
+    def take(self, seen: dict[str, tuple[Picture, tuple[MarkerObservation, ...]]]) -> None:
+        """The markers seen last."""
+        self._seen = seen
 
     def capture(self) -> bool:
         """Take the distance entered with the disparity seen; whether it could be."""
@@ -106,17 +121,16 @@ class DistanceStep(Step):
         enough = all(bar.full for bar in bars)
         return StepView(self._sentence(), done=self.report is not None and enough,
                         hint=self.problem or ("" if self.rows else self._warning), bars=bars,
-                        passable=self.report is not None,
-                        overlays=self._overlays(), kept=len(self.rows))
+                        passable=self.report is not None, kept=len(self.rows),
+                        annotated={name: self._annotated(*seen) for name, seen in self._seen.items()})
 
-    def _overlays(self) -> dict[str, Overlay]:
-        """The chosen marker where each camera saw it last."""
-        states = self._recent(LOOK_S)
-        if not states:
-            return {}
-        name, places = self.rig.markers.ids[self.marker], states[-1].camera_pixels[:, self.marker]
-        return {camera: (Dots(place[None, :]), Callout(float(place[0]), float(place[1]), name))
-                for camera, place in zip(states[-1].camera_names, places, strict=True) if np.isfinite(place).all()}
+    def _annotated(self, picture: Picture, seen: tuple[MarkerObservation, ...]) -> AnnotatedPicture:
+        """The chosen marker where it is in this picture."""
+        mark = seen[self.marker]
+        if not mark.found:
+            return AnnotatedPicture(picture)
+        return AnnotatedPicture(picture, (Dots(np.array([[mark.x, mark.y]])),
+                                          Callout(mark.x, mark.y, self.rig.markers.ids[self.marker])))
 
     def _sentence(self) -> str:
         if not self.rows:

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, judged_anew, told_apart
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.ui.backend.contract import Asker
-from rhot_app.ui.backend.feed import ask_picture
+from rhot_app.ui.backend.feed import Picture, ask_picture
 from rhot_app.ui.models.proposal import Command, Proposal, Row
-from rhot_app.ui.wizards.models.drawing import Layer, Overlay
-from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView
+from rhot_app.ui.wizards.models.drawing import Layer
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Pictures, Step, StepView
 from rhot_node.detect.foreground import BackgroundSums, no_foreground, skin_mask
 from rhot_node.errors import PictureError
 from rhot_node.pictures import decode_picture
@@ -198,11 +198,12 @@ class EmptyStep(LearningStep):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mask:
-    """One camera's foreground: `covered`, its part of the picture, and `whole`, the largest piece's part of it."""
+    """One camera's foreground: `covered`, its part of the picture, and `whole`, the largest piece's part of it.
+    `annotated`: drawn over its picture, None from a node that does not give that."""
 
     covered: float
     whole: float
-    overlay: Overlay
+    annotated: AnnotatedPicture | None = None
 
 
 class SkinStep(LearningStep):
@@ -236,7 +237,7 @@ class SkinStep(LearningStep):
                 if name in self.nodes:
                     with contextlib.suppress(RhotError):  # its picture says what is wrong
                         answer = ask_node(asker.command, self.nodes[name], "foreground_mask")
-                        found[name] = mask_of(answer.get("data", b""))
+                        found[name] = mask_of(name, answer)
         return found
 
     def take(self, seen: dict[str, Mask]) -> None:
@@ -261,22 +262,30 @@ class SkinStep(LearningStep):
                     "The hand and little else should be tinted: then press Next." if good else
                     "Read what is wrong, then learn it again.")
         return StepView(sentence, done=self.learnt and good and not self.learning, hint=self.problem, verdict=verdict,
-                        overlays={name: mask.overlay for name, mask in self.masks.items()})
+                        annotated={name: mask.annotated for name, mask in self.masks.items()
+                                   if mask.annotated is not None})
 
 
-def mask_of(png: bytes) -> Mask:
+def mask_of(camera: str, told: Mapping[str, Any]) -> Mask:
     """What a node's answer shows. Raises EngineError when it is no picture."""
+    about, data = told.get("answer", {}), told.get("data", b"")
+    mask_bytes = about.get("mask_bytes")
     try:
-        grey = decode_picture(png, grey=True)
+        grey = decode_picture(data[:mask_bytes], grey=True)
+        bgr = decode_picture(data[mask_bytes:]) if mask_bytes else None
     except PictureError as exc:
         raise EngineError("a node gave a foreground that cannot be read; restart it.") from exc
     hand: NDArray[np.uint8] = np.asarray(grey > 127, np.uint8)
     count, _, stats, _ = cv2.connectedComponentsWithStats(hand, connectivity=8)
     total = int(hand.sum())
     largest = int(stats[1:, cv2.CC_STAT_AREA].max()) if count > 1 else 0
-    rgba = np.zeros((*hand.shape, 4), np.uint8)
-    rgba[hand > 0] = (*_TINT, 130)
-    return Mask(total / hand.size, largest / max(total, 1), (Layer(rgba),))
+    annotated = None
+    if bgr is not None:
+        rgba = np.zeros((*hand.shape, 4), np.uint8)
+        rgba[hand > 0] = (*_TINT, 130)
+        picture = Picture(camera, bgr, int(about.get("number", 0)), int(about.get("t_node_ns", 0)), time.monotonic_ns())
+        annotated = AnnotatedPicture(picture, (Layer(rgba),))
+    return Mask(total / hand.size, largest / max(total, 1), annotated)
 
 
 def findings_of(camera: str, mask: Mask) -> list[Finding]:

@@ -20,7 +20,7 @@ from rhot_app.ui.backend.feed import Image, Picture
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import lens_figures
 from rhot_app.ui.wizards.models.board_form import OTHER_BOARD, BoardFields, BoardObservation, BoardSearch, BoardStep
-from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Mark, Overlay, Tag, board_marks
+from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Mark, Overlay, Tag
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView, Task
 
 FEWEST = 5  # views that a solve can do anything with
@@ -145,16 +145,15 @@ class LensShowStep(Step):
         bars = [Bar(_BARS[key][0], share, _BARS[key][1]) for key, share in coverage.bars.items()]
         bars.append(Bar("picture", min(coverage.share / 0.7, 1.0), "parts of the picture in which corners were seen"))
         overlay: Overlay = (Cells(coverage.cells / _CELL_FULL),)
-        if self._seen[0] is not None:
-            overlay = (*overlay, *board_marks(self._seen[0], self.board))
+        annotated = self._search.annotated(self.board)
         wrong = self._search.size_finding(self.board)
         if wrong is not None:
             return StepView(OTHER_BOARD, hint=f"{wrong.figure} {wrong.cause}", bars=tuple(bars),
-                            overlays={self.camera: overlay}, kept=count)
+                            annotated=annotated, overlays={self.camera: overlay}, kept=count)
         sentence = "Enough: press Next." if complete else self._sentence or "Show the whole board to the camera."
         taken = f"{count} pictures taken." if count else ""
         return StepView(sentence, done=complete, hint=self._search.missing or taken, bars=tuple(bars),
-                        overlays={self.camera: overlay}, kept=count, passable=count >= FEWEST)
+                        annotated=annotated, overlays={self.camera: overlay}, kept=count, passable=count >= FEWEST)
 
 
 # -- Step: solve for the lens ------------------------------------------------------------------------------------------

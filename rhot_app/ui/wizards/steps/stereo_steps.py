@@ -24,8 +24,8 @@ from rhot_app.project import Rig, RigNode
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import place_figures
 from rhot_app.ui.wizards.models.board_form import OTHER_BOARD, BoardObservation, BoardSearch, BoardStep
-from rhot_app.ui.wizards.models.drawing import Dots, Overlay, board_marks
-from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView, Task
+from rhot_app.ui.wizards.models.drawing import Dots, Overlay
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Pictures, Step, StepView, Task
 
 # -- The solve in its own process --------------------------------------------------------------------------------------
 
@@ -75,10 +75,6 @@ class BoardFinder(Step):
         if seen.board == self.board:
             self.search.take(seen)
             self.seen = {name: seen.views.get(name) for name in self.cameras or ()}
-
-    def marks(self, colour: str = "good") -> dict[str, Overlay]:
-        """The corners in each picture."""
-        return {name: board_marks(view, self.board, colour) for name, view in self.seen.items() if view is not None}
 
 
 class ShowStep(BoardFinder):
@@ -145,8 +141,8 @@ class ShowStep(BoardFinder):
         shots = self.views.shots
         wrong = self.search.size_finding(self.board)
         if wrong is not None:
-            return StepView(OTHER_BOARD, hint=f"{wrong.figure} {wrong.cause}", overlays=self._overlays(shots),
-                            kept=len(shots))
+            return StepView(OTHER_BOARD, hint=f"{wrong.figure} {wrong.cause}", annotated=self._annotated(),
+                            overlays=self._overlays(shots), kept=len(shots))
         if self._guidance is None or len(shots) != self._guided:
             self._guidance, self._guided = self._collector.guidance(), len(shots)
         guidance = self._guidance
@@ -160,8 +156,8 @@ class ShowStep(BoardFinder):
                  Bar("near and far", float(guidance.near_and_far), "the board was seen large and small")]
         hint = self.search.missing or self._offer.why.removesuffix(guidance.advice).strip()
         return StepView(self._sentence(guidance.advice), done=guidance.complete, hint=hint,
-                        bars=tuple(bars), overlays=self._overlays(shots), kept=len(shots),
-                        passable=len(shots) >= FEWEST)
+                        bars=tuple(bars), annotated=self._annotated(), overlays=self._overlays(shots),
+                        kept=len(shots), passable=len(shots) >= FEWEST)
 
     def _sentence(self, advice: str) -> str:
         if not advice:
@@ -170,14 +166,16 @@ class ShowStep(BoardFinder):
             return "Hold the board still."
         return advice
 
+    def _annotated(self) -> dict[str, AnnotatedPicture]:
+        return self.search.annotated(self.board, "good" if self._offer.taken else "accent")
+
     def _overlays(self, shots: tuple[Any, ...]) -> dict[str, Overlay]:
-        """Where the board has been, dimly, and where it is."""
-        marks = self.marks("good" if self._offer.taken else "accent")
-        overlays = {}
+        """Where the board has been, dimly."""
+        overlays: dict[str, Overlay] = {}
         for camera, name in enumerate(self.cameras or ()):
             been = [shot.views[camera].pixels[::3] for shot in shots if shot.views[camera] is not None]
-            old: Overlay = (Dots(np.concatenate(been), "good", radius=1.5, filled=True),) if been else ()
-            overlays[name] = (*old, *marks.get(name, ()))
+            if been:
+                overlays[name] = (Dots(np.concatenate(been), "good", radius=1.5, filled=True),)
         return overlays
 
 
@@ -281,7 +279,8 @@ class TableStep(BoardFinder):
         else:
             sentence = "Lay the board flat and press Space again." if wrong else "The table is known: press Next."
             hint = ""
-        return StepView(sentence, done=not wrong and self.world is not None, hint=hint, overlays=self.marks(),
+        return StepView(sentence, done=not wrong and self.world is not None, hint=hint,
+                        annotated=self.search.annotated(self.board),
                         verdict=self.world.verdict if self.world is not None else None,
                         kept=int(self.world is not None), passable=not wrong)
 
