@@ -34,9 +34,10 @@ LOST = "lost"
 class Live:
     """The newest of everything, and the sliding windows behind the plots.
 
-    `state`, `status` and `previews` are the newest messages, `states` the last ones; `state_count` grows with each state, so that a widget
-    knows whether there is anything new to draw. The series behind the plots run on this machine's monotonic clock
-    (a replayed log's states carry the times of their recording): `jitter` mm, `latency` ms, `rates` per second.
+    `state`, `status` and `previews` are the newest messages, `states` the last ones; `state_count` grows with each
+    state, so that a widget knows whether there is anything new to draw. The series behind the plots run on this
+    machine's monotonic clock (a replayed log's states carry the times of their recording): `jitter` mm, `latency` ms,
+    `rates` per second.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
