@@ -249,7 +249,7 @@ class Engine:
                 if self.recorder.notice:
                     extra.append(Advice("warning", self.recorder.notice, subject="recording"))
                 if self._continued:
-                    extra.append(Advice("info", self._continued, subject="recording"))
+                    extra.append(Advice("info", self._continued, subject="information"))
                 extra += disk_advice(str(self.recorder.path.parent), self.recorder.disk.seconds_left)
             extra += moved_advice(self.rig, self._moved) + hands_advice(self.rig)
             since_s = self._preparing_s
