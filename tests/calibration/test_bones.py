@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from bones_twin import RICH, SIX, TRIAD, Sloppiness, base_hand, bones_mm, person, record
@@ -14,6 +15,7 @@ from bones_twin import RICH, SIX, TRIAD, Sloppiness, base_hand, bones_mm, person
 from rhot_app.__main__ import main
 from rhot_app.calibration.hand import fit as hand_fit
 from rhot_app.calibration.hand.bones import enter_bones, solve_bones
+from rhot_app.calibration.hand.bones_judgement import drift_findings
 from rhot_app.calibration.hand.bones_report import BonesReport, Known
 from rhot_app.calibration.hand.marker_places import MarkerTracks, tracks_of
 from rhot_app.errors import CalibrationError
@@ -131,12 +133,46 @@ def test_a_hand_that_holds_still_is_told_to_move() -> None:
 
 def test_a_few_seconds_are_too_short() -> None:
     report = solve_bones(record(person(3), SIX, 3, seconds=4.0, sloppiness=CAPTURED), base_hand())
-    assert not report.verdict.acceptable
+    assert not report.verdict.acceptable and "too_short" in report.verdict.codes
     assert "4 s long" in report.verdict.findings[0].sentence and "minute" in report.verdict.findings[0].sentence
     with pytest.raises(CalibrationError, match="only 4 instants"):
         solve_bones(record(person(3), RICH, 3, seconds=0.07), base_hand())
     with pytest.raises(CalibrationError, match="the recording is empty"):
         solve_bones(record(person(3), RICH, 3, seconds=1.0).within(5.0, 6.0), base_hand())
+
+
+def test_what_is_wrong_with_a_recording_is_named(rich_report: BonesReport) -> None:
+    assert rich_report.verdict.codes <= {"not_observed"}
+    somebody = record(person(3), RICH, 3, seconds=22.0, rate_hz=20.0, sloppiness=CAPTURED)
+    at, half = somebody.positions, len(somebody.times_s) // 2
+    apart = at[:, 0] - at[:, 1]
+    slipped = at.copy()
+    slipped[half:, 0] += 6e-3 * (apart / np.linalg.norm(apart, axis=1, keepdims=True))[half:]
+    assert "marker_slipped" in solve_bones(replace(somebody, positions=slipped), base_hand()).verdict.codes
+    noisy = at + np.random.default_rng(0).normal(0.0, 7e-3, at.shape)
+    fingers = replace(somebody, positions=noisy[:, 3:], places=somebody.places[3:])
+    assert {"large_error", "no_palm"} <= solve_bones(fingers, base_hand()).verdict.codes
+
+
+def test_a_bone_that_no_hand_has_is_refused() -> None:
+    hand = person(2)
+    middle = hand.fingers["middle"]
+    first, *others = middle.bones_mm
+    longer = msgspec.structs.replace(middle, bones_mm=(1.6 * first, *others))
+    unusual = msgspec.structs.replace(hand, fingers={**hand.fingers, "middle": longer})
+    verdict = solve_bones(record(unusual, RICH, 2, seconds=22.0, rate_hz=20.0, sloppiness=CAPTURED),
+                          base_hand()).verdict
+    assert "unusual_bone" in verdict.codes and not verdict.acceptable
+    assert "middle.proximal" in verdict.findings[0].figure
+
+
+def test_a_marker_that_steps_on_its_bone_is_named() -> None:
+    rng, times = np.random.default_rng(1), np.linspace(0.0, 30.0, 300)
+    local = rng.normal(0.0, 0.2e-3, (300, len(RICH), 3))
+    assert drift_findings(times, local, RICH, 0.1e-3) == []
+    local[150:, 4, 0] += 3e-3
+    (found,) = drift_findings(times, local, RICH, 0.1e-3)
+    assert found.code == "marker_slipped" and RICH[4].name in found.figure
 
 
 def test_markers_with_swapped_names_are_found_out() -> None:
@@ -160,6 +196,9 @@ def test_lengths_by_a_ruler_stand_in_the_hand() -> None:
     assert report.verdict.acceptable
     with pytest.raises(CalibrationError):
         enter_bones(base_hand(), {"index.nose": 41.0})
+    for length_mm, acceptable in ((4.1, False), (70.0, True)):
+        verdict = enter_bones(base_hand(), {"index.proximal": length_mm}).verdict
+        assert verdict.codes == {"implausible_bone"} and verdict.acceptable == acceptable
 
 
 def test_the_command_says_what_it_took_each_marker_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

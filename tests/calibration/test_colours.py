@@ -65,6 +65,12 @@ def test_six_paints_are_learnt_named_and_told_apart(six: ColourReport) -> None:
         assert abs(math.degrees(away)) < 3.0
 
 
+def test_paint_before_a_wall_of_its_colour_is_said(six: ColourReport) -> None:
+    blue = {**PAINTS, "thumb": (60, 90, 160)}
+    assert "runs-on" in calibrate(picture(blue, background=(70, 100, 165)), names=("thumb",)).verdict.codes
+    assert "runs-on" not in six.verdict.codes
+
+
 @pytest.mark.parametrize("lamp", [lamp for lamp in LAMPS if lamp.temperature_shift in (-0.54, 0.54, 0.0)], ids=str)
 def test_no_marker_is_lost_by_another_lamp(six: ColourReport, lamp) -> None:
     shift = (11.0, 23.0)

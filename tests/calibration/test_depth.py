@@ -90,8 +90,15 @@ def test_other_units_are_read_when_named_and_noticed_when_not(tmp_path: Path, un
     assert 100 * named.k_m == pytest.approx(100 * DepthGeometry().constant_m, rel=1e-3)
     assert named.verdict.grade is Grade.GOOD
     wrong = fit_depth(read_depth_table(table_of(rows, tmp_path / "wrong.csv")))
-    assert wrong.verdict.grade is Grade.POOR and f"in {unit}, not cm" in wrong.verdict.findings[0].sentence
+    assert wrong.verdict.codes == {"units"} and wrong.verdict.grade is Grade.POOR
+    assert f"in {unit}, not cm" in wrong.verdict.findings[0].sentence
     assert wrong.z == pytest.approx(-1.0, abs=1e-4)
+
+
+def test_a_guessed_unit_is_said(tmp_path: Path) -> None:
+    verdict = fit_depth(read_depth_table(table_of(plain_rows(), tmp_path / "t.csv", "real,disparity_px"))).verdict
+    assert verdict.codes == {"unit_guessed"} and verdict.grade is Grade.FAIR
+    assert not fit_depth(read_depth_table(table_of(plain_rows(), tmp_path / "cm.csv"))).verdict.codes
 
 
 def test_wrong_rows_are_named_and_the_rest_is_used(tmp_path: Path) -> None:
@@ -99,7 +106,8 @@ def test_wrong_rows_are_named_and_the_rest_is_used(tmp_path: Path) -> None:
     report = fit_depth(read_depth_table(table_of(rows, tmp_path / "t.csv")))
     assert len(report.rows) == 9 and report.z == pytest.approx(-1.0, abs=1e-4)
     assert {row.where for row in report.rejected} == {f"line {n}" for n in (11, 12, 13, 14, 15, 16)}
-    assert report.verdict.grade is Grade.FAIR and "line 12: the disparity is zero" in report.verdict.findings[0].figure
+    assert report.verdict.codes == {"rejected_rows"} and report.verdict.grade is Grade.FAIR
+    assert "line 12: the disparity is zero" in report.verdict.findings[0].figure
     assert any("250 cm" in row.reason for row in report.rejected)
 
 

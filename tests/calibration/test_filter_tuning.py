@@ -123,6 +123,7 @@ def test_stricter_targets_give_calmer_or_faster_filters(tables: tuple[InstantTab
     assert (np.diff(curves.still_jitter_m, axis=0) > 0.0).all() and (np.diff(curves.lag_s, axis=0) < 0.0).all()
     impossible = tune_filters(*tables, RIG, FilterTargets(0.05e-3, 0.5e-3))
     assert impossible.verdict.codes == {"jitter"} and impossible.verdict.grade is Grade.FAIR
+    assert tune_filters(*tables, RIG, FilterTargets(0.05e-3, 1e-5)).verdict.codes == {"jitter", "lag"}
     assert impossible.position.chosen.beta < impossible.position.betas[-1], "no more noise than the lag asks for"
 
 

@@ -76,6 +76,7 @@ def test_frames_in_step_with_the_mains_say_what_they_cannot_see() -> None:
     rows, times = frames(60.0, 0.2, fps=40.0)
     report = measure_flicker(rows, times, 48e-6, 4e-3, 40.0)
     assert report.mains_hz is None and np.isnan(report.depths[60.0])
+    assert [finding.code for finding in report.findings] == ["flicker_unseen"]
     assert "60 Hz mains cannot be measured" in report.findings[0].figure
 
 

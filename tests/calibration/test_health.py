@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import msgspec
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ from synthetic_rig import make_rig
 
 from rhot_app.calibration.check.health import HealthMonitor, HealthSample
 from rhot_app.project import CameraCalibration, Rig
+from rhot_node.wire.messages import MarkerFlag
 
 MARKERS = 6
 
@@ -54,6 +58,7 @@ def test_little_is_no_reason_to_speak() -> None:
         monitor.feed(sample(k, places(rng), 3.0))
     (found,) = monitor.findings()
     assert found.mender == "stereo" and not found.finding.grade.rank < 2
+    assert found.finding.code == "stale_geometry"
 
 
 @pytest.mark.parametrize(("method", "said"), [(None, "no stereo"), ("outdated", "lens"), ("board", "stale")])
@@ -65,6 +70,35 @@ def test_only_a_calibration_that_was_made_is_called_stale(method: str | None, sa
         monitor.feed(sample(k, places(rng), 3.0))
     (found,) = monitor.findings()
     assert said in found.finding.cause and ("stale" in found.finding.sentence) == (method == "board")
+
+
+def codes_after(change: Callable[[int, HealthSample], HealthSample]) -> list[str]:
+    """What is found after ten seconds of a hand that moves fast in every other second."""
+    rng, monitor = np.random.default_rng(1), HealthMonitor(rig_with_palm_markers())
+    hand = places(rng)
+    for k in range(120):
+        hand = hand + rng.normal(0.0, 1e-4, hand.shape)
+        hand[:, 0] += 0.06 * (-1) ** k if k // 10 % 2 else 0.0
+        monitor.feed(change(k, sample(k, hand)))
+    return [found.finding.code for found in monitor.findings()]
+
+
+def stretched(one: HealthSample) -> HealthSample:
+    """The middle finger's tip 40 cm from the wrist."""
+    positions = one.positions.copy()
+    positions[2] = positions[5] + [0.4, 0.0, 0.0]
+    return replace(one, positions=positions)
+
+
+@pytest.mark.parametrize(("change", "code"), [
+    (lambda k, one: replace(one, errors_px=np.full(MARKERS, 3.0 if k // 10 % 2 else 0.1)), "late_camera"),
+    (lambda k, one: stretched(one), "reach"),
+    (lambda k, one: replace(one, qualities=np.full((2, MARKERS), 0.05)), "weak_colour"),
+    (lambda k, one: replace(one, flags=np.full((2, MARKERS), MarkerFlag.AMBIGUOUS, np.uint16)), "doubled_colour")])
+def test_each_doubt_about_a_running_rig_is_said(change: Callable[[int, HealthSample], HealthSample],
+                                                code: str) -> None:
+    assert codes_after(lambda k, one: one) == []
+    assert codes_after(change) == [code]
 
 
 def test_times_that_step_back_begin_anew() -> None:

@@ -12,6 +12,7 @@ from aligned_streams import make_scene, random_pose
 from scipy.stats import chi2
 
 from rhot_app.__main__ import main
+from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.transforms import apply, exp_so3, fit_rigid, inverse, log_so3, quaternion_from_rotation, rigid
 from rhot_app.objects.alignment.alignment_file import load_alignment, save_alignment, to_alignment
@@ -97,6 +98,14 @@ def test_motion_that_does_not_show_the_answer_is_refused(motion, code):
     scene = make_scene(1, **motion)
     verdict = calibrate_alignment(scene.foreign, scene.rig).verdict
     assert not verdict.acceptable and code in verdict.codes, verdict
+
+
+@pytest.mark.parametrize(("motion", "code"), [({"spread_m": (0.2, 0.2, 0.0)}, "planar"), ({"seconds": 3.0}, "short"),
+                                              ({"seconds": 3.0}, "uncertain")])
+def test_motion_that_shows_less_is_not_good(motion, code):
+    scene = make_scene(1, **motion)
+    verdict = calibrate_alignment(scene.foreign, scene.rig).verdict
+    assert verdict.grade is Grade.FAIR and code in verdict.codes, verdict
 
 
 def test_good_motion_is_accepted():

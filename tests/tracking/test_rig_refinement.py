@@ -46,6 +46,12 @@ def still() -> list[CameraObservations]:
     return filmed(SCENE, volume_motion(1), SECONDS)
 
 
+def with_focal_length(rig: Rig, factor: float) -> Rig:
+    node = rig.nodes[1]
+    lens = msgspec.structs.replace(node.intrinsics, fx=factor * node.intrinsics.fx, fy=factor * node.intrinsics.fy)
+    return msgspec.structs.replace(rig, nodes=(rig.nodes[0], msgspec.structs.replace(node, intrinsics=lens)))
+
+
 def with_pose(rig: Rig, correction: np.ndarray) -> Rig:
     node = msgspec.structs.replace(rig.nodes[1], pose=moved(rig.nodes[1].pose, correction))
     return msgspec.structs.replace(rig, nodes=(rig.nodes[0], node))
@@ -74,6 +80,20 @@ def test_a_rig_that_nobody_touched_holds(still: list[CameraObservations]) -> Non
     assert found.holds and found.knocked_s is None and stale_sentence(RIG, found) == ""
     assert not usable(found) and verdict_of(found, "left").codes == {"holds"}
     assert found.dispersion < 1.5
+
+
+def test_rays_that_no_poses_bring_together_are_no_calibration_that_holds(still: list[CameraObservations]) -> None:
+    refocused = verdict_of(refined(still, with_focal_length(RIG, 1.3)), "left")
+    assert "misfit" in refocused.codes and "holds" not in refocused.codes and not refocused.acceptable
+    late = verdict_of(refined([delayed(frame, 100_000_000) for frame in still]), "left")
+    assert "misfit" in late.codes and "holds" not in late.codes
+
+
+def test_poses_that_leave_the_rays_apart_are_not_offered(still: list[CameraObservations]) -> None:
+    rng = np.random.default_rng(0)
+    noisy = [replace(frame, pixels=frame.pixels + rng.normal(0.0, 2.0, frame.pixels.shape)) for frame in still]
+    found = refined(noisy, with_pose(RIG, turn(-3.0, 0.0, 0.0)))
+    assert not found.holds and not usable(found) and "misfit" in verdict_of(found, "left").codes
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     lines = ["", f"{'':{wide}}  before      after", *(f"{what:{wide}}  {before:<10}  {after}"
                                                       for what, before, after in rows)]
     if target is not None and found.holds:
-        lines.append("Nothing was written: the stored calibration still holds.")
+        lines.append("Nothing was written: no other calibration is better.")
     return show(_fields(found, scale), lines, verdict, as_json=args.json, written=written)
 
 

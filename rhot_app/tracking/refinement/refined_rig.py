@@ -179,18 +179,25 @@ def verdict_of(found: Refinement, reference: str, scale: Scale = Scale()) -> Ver
         why = (f"chi-squared {found.chi_squared:.1f} with {found.freedom} degrees of freedom"
                if found.probability > SIGNIFICANCE else
                "no other one predicts better what was held back from it")
-        findings.append(Finding("holds", Grade.GOOD, f"The stored calibration still holds ({why})."))
+        if found.before_px > FAIR_ERROR_PX:
+            findings.append(_misfit(f"The rays miss each other by {found.before_px:.1f} px, and no other poses of the "
+                                    f"cameras explain that ({why})."))
+        else:
+            findings.append(Finding("holds", Grade.GOOD, f"The stored calibration still holds ({why})."))
     else:
         findings += [Finding("moved", Grade.GOOD, f"{sentence}.") for sentence in moved_sentences(found, reference)]
         findings += [finding for camera in found.cameras for finding in _undetermined(camera)]
         if found.after_px > FAIR_ERROR_PX:
-            findings.append(Finding(
-                "misfit", Grade.POOR, f"Even so the rays miss each other by {found.after_px:.1f} px.", "A lens was "
-                "refocused, a camera is late, or a marker was taken for another thing.",
-                "Find the lenses and put the cameras together again with a board."))
+            findings.append(_misfit(f"Even so the rays miss each other by {found.after_px:.1f} px."))
     if scale.known:
         findings.append(scale_finding(scale))
     return judge(summary, findings)
+
+
+def _misfit(figure: str) -> Finding:
+    return Finding("misfit", Grade.POOR, figure,
+                   "A lens was refocused, a camera is late, or a marker was taken for another thing.",
+                   "Find the lenses and put the cameras together again with a board.")
 
 
 def scale_finding(scale: Scale) -> Finding:

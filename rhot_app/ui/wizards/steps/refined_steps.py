@@ -86,8 +86,8 @@ class MoveStep(Step):
             return StepView(sentence if waited_s > ASK_S else "One moment.", hint=self._feed.problem)
         verdict = verdict_from(answer)
         if not answer["stale"]:
-            return StepView("The calibration in force still holds: there is nothing to do.", verdict=verdict,
-                            hint=self._feed.problem)
+            return StepView("The calibration in force still holds: there is nothing to do." if verdict.acceptable else
+                            "No better calibration was found.", verdict=verdict, hint=self._feed.problem)
         if not answer["usable"]:
             return StepView("Go on: move the hand through both pictures, near and far.", verdict=verdict,
                             hint=self._feed.problem or "The movement does not yet determine all of it.")
