@@ -97,7 +97,9 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     control_port: Port = 47801
     preview_port: Port = 47802
     broadcast_port: Annotated[int, Meta(ge=1, le=65535)] | None = 47799
-    detector: str = "fast"  # or "reference", "keypoints:NAME", a model card, or "plug:NAME", a detector plug-in
+    detector: str = "fast"
+    """Or "reference"; "landmarks" or "landmarks:lite": the hand networks beside "fast"; "keypoints:NAME", a model card;
+    "plug:NAME", a detector plug-in."""
     camera: CameraSettings = CameraSettings()
     tags: TagSettings = TagSettings()
     preview_hz: Annotated[float, Meta(ge=0.01, le=30)] = 4.0
@@ -111,9 +113,11 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     version: Literal[1] = VERSION
 
     def __post_init__(self) -> None:
-        if not re.fullmatch(r"fast|reference|(plug|keypoints):[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", self.detector):
-            raise ValueError(f"detector is {self.detector!r}; it may be \"fast\", \"reference\", \"keypoints:NAME\" "
-                             "with the name of a model card, or \"plug:NAME\" with the name of a plug-in")
+        if not re.fullmatch(r"fast|reference|landmarks(:full|:lite)?|(plug|keypoints):[A-Za-z0-9][A-Za-z0-9_.-]{0,63}",
+                            self.detector):
+            raise ValueError(f"detector is {self.detector!r}; it may be \"fast\", \"reference\", \"landmarks\", "
+                             "\"landmarks:lite\", \"keypoints:NAME\" with the name of a model card, or \"plug:NAME\" "
+                             "with the name of a plug-in")
         used: dict[int, str] = {}
         for field in ("control_port", "preview_port", "pairing_port"):
             port = getattr(self, field)
@@ -121,6 +125,12 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise ValueError(f"{used[port]} and {field} are both {port}; each needs its own")
         if self.udp_port and self.udp_port == self.broadcast_port:
             raise ValueError(f"udp_port and broadcast_port are both {self.udp_port}; each needs its own")
+
+
+def network_model(detector: str) -> str | None:
+    """Which hand networks a detector of the settings has beside the search for painted markers; None: none."""
+    name, _, model = detector.partition(":")
+    return (model or "full") if name == "landmarks" else None
 
 
 RESTART_FIELDS = ("node_id", "bind_address", "udp_port", "control_port", "preview_port", "pairing_port",

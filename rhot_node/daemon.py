@@ -11,11 +11,12 @@ from typing import Any, Protocol
 
 from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Reporting, Rewindable
 from rhot_node.clock import NodeClock
-from rhot_node.config import CameraSettings, NodeSettings
+from rhot_node.config import CameraSettings, NodeSettings, network_model
 from rhot_node.detect.image import Detector
 from rhot_node.errors import CameraError
 from rhot_node.foreground_store import ForegroundStore
 from rhot_node.health.checks import BLACK_PICTURE, Check, is_black
+from rhot_node.landmark_search import LandmarkSearch
 from rhot_node.network.pictures import PictureBox
 from rhot_node.network.requests import SettingsStore
 from rhot_node.network.session import Sessions, Stream
@@ -25,6 +26,7 @@ from rhot_node.threads import Watch, complaints
 from rhot_node.wire.messages import (
     Fiducials,
     ForegroundPart,
+    HandLandmarks,
     MarkerObservation,
     NodeState,
     Observations,
@@ -48,7 +50,8 @@ MakeDetector = Callable[[NodeSettings], Detector]
 class ObservationSender(Protocol):
     """Where observations go; the UDP link or a fake. Three threads call it."""
 
-    def send(self, observations: Observations | Fiducials | SliceEdges | ForegroundPart, stream: Stream) -> bool:
+    def send(self, observations: Observations | Fiducials | HandLandmarks | SliceEdges | ForegroundPart,
+             stream: Stream) -> bool:
         """Send them where the stream goes; False when they could not be sent."""
         ...
 
@@ -89,6 +92,7 @@ class NodeDaemon:
         self._troubles = troubles
         self._video = video
         self._tags = TagSearch(store.current, clock)
+        self._landmarks = LandmarkSearch(store.current, clock)
         self.foreground = ForegroundStore(None) if foreground is None else foreground
         self.slices = SliceSearch(store.current.node_id, clock, self.foreground)
         self._frames, self._opening = Watch(_SENDS), Watch("opens the camera", _OPENING_S)
@@ -129,7 +133,8 @@ class NodeDaemon:
                 "foreground": self.foreground.report(*self._size),
                 "marker_checksum": self._settings.markers.checksum, "t_node_ns": self._clock.now_ns(),
                 "camera": camera.report() if isinstance(camera, Reporting) else {},
-                "health": [*self._troubles(), *([BLACK_PICTURE] if self._black else []),
+                "health": [*self._troubles(), *self._landmarks.troubles(),
+                           *([BLACK_PICTURE] if self._black else []),
                            *(Check("threads", "error", text) for text in complaints())]}
 
     def introduce(self) -> dict[str, Any]:
@@ -138,12 +143,13 @@ class NodeDaemon:
 
     def count(self) -> dict[str, Any]:
         """Counters, for the control channel."""
-        return dataclasses.asdict(self.counters) | self._tags.count() | self.slices.count()
+        return dataclasses.asdict(self.counters) | self._tags.count() | self._landmarks.count() | self.slices.count()
 
     def prepare(self) -> None:
         """Make the detector and open the camera: the node is then ready. Raises CameraError."""
         self._detector = self._make_detector(self._settings)
         self._tags.prepare()
+        self._landmarks.prepare()
         self.slices.prepare()
         self._open()
         self._prepared = True
@@ -154,6 +160,7 @@ class NodeDaemon:
         self._frames.dismiss()
         self._opening.dismiss()
         self._tags.close()
+        self._landmarks.close()
         self.slices.close()
         self.foreground.close()
         self._close_camera()
@@ -195,10 +202,11 @@ class NodeDaemon:
         if stream is not None and frame.t_node_ns >= stream.t_start_node_ns:
             if late and self._settings.late_frames == "drop":
                 self.counters.late_dropped += 1
-            else:
+            elif not self._by_networks_alone():
                 self._send(frame, markers, stream, sender)
             searched = self.slices.offer(frame, stream, sender)
             self._tags.offer(frame, stream, sender)
+            self._landmarks.offer(frame, stream, sender)
         pictures.offer(frame, searched=searched)
         if self._video is not None:
             self._video(frame)
@@ -220,6 +228,11 @@ class NodeDaemon:
             self.counters.sent += 1
         else:
             self.counters.not_sent += 1
+
+    def _by_networks_alone(self) -> bool:
+        """Whether all markers are landmarks that the hand networks find: messages of markers would say nothing."""
+        return (network_model(self._settings.detector) is not None
+                and all(marker.shape == "landmark" for marker in self._settings.markers.markers))
 
     def _look_at_light(self, frame: Frame) -> None:
         """Once a second, because the image is gone by the time that somebody asks."""
@@ -295,6 +308,7 @@ class NodeDaemon:
         old, self._settings = self._settings, settings
         pictures.preview_hz = settings.preview_hz
         self._tags.configure(settings)
+        self._landmarks.configure(settings)
         if (settings.detector, settings.markers) != (old.detector, old.markers):
             self._detector = self._make_detector(settings)
         if settings.camera != old.camera and self._camera_takes_settings and self._camera is not None:

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final
 
-from rhot_node.config import NodeSettings
+from rhot_node.config import NodeSettings, network_model
 from rhot_node.detect.image import Detector, YuvImage
 from rhot_node.errors import KeypointError, PluginError
 from rhot_node.health.checks import Check
 from rhot_node.keypoints.detector import PREFIX as KEYPOINTS
-from rhot_node.keypoints.detector import keypoint_detector
+from rhot_node.keypoints.detector import PaintedMarkers, keypoint_detector
 from rhot_node.markers import MarkerSet
 from rhot_node.threads import FOREIGN, TimedCalls
 from rhot_node.wire.messages import CANDIDATES_MAX, MarkerFlag, MarkerObservation
@@ -187,6 +187,12 @@ class DetectorChoice:
         def instead() -> Detector:
             return NoDetector(settings.markers) if landmarks else self._otherwise(settings)
 
+        if network_model(settings.detector) is not None and landmarks:
+            painted = PaintedMarkers(settings.markers)
+            if painted.own.markers:
+                from rhot_node.warm_up import warm_up
+                warm_up(painted, painted.own, (settings.camera.width, settings.camera.height))
+            return painted
         if settings.detector.startswith(KEYPOINTS):
             try:
                 return keypoint_detector(settings.detector.removeprefix(KEYPOINTS), settings.markers)
@@ -194,7 +200,7 @@ class DetectorChoice:
                 return self._refuse(settings, str(exc))
         if landmarks and not settings.detector.startswith(PREFIX):
             return self._refuse(settings, f"the detector {settings.detector!r} finds no landmarks, which the marker "
-                                          "set has. Choose keypoints:NAME or a plug-in.")
+                                          "set has. Choose landmarks, keypoints:NAME or a plug-in.")
         if settings.detector.startswith(PREFIX):
             try:
                 self._detector = PluginDetector(settings.detector.removeprefix(PREFIX), settings.markers, instead)

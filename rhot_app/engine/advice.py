@@ -28,6 +28,8 @@ _RECENT_MIN = 5  # refusals within two seconds that are not chance
 
 _REFUSALS = {
     "marker_set": ("error", "Node {name} uses another marker set than the rig; give both the same marker file."),
+    "no_landmarks": ("error", "Node {name} sends landmarks of a hand, but no marker of the rig is one. Give the rig "
+                              "the marker set landmarks21, or the node another detector."),
     "image_size": ("error", "Node {name} sends images of {size} px, but the rig's intrinsics are for {expected} px; "
                             "set the node's camera or calibrate it for this size."),
     "time": ("warning", "Node {name} sends frames with impossible times; its clock may have been set. "

@@ -14,6 +14,7 @@ from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.objects.observations import fiducial_frame
 from rhot_app.project import Rig, RigNode
 from rhot_app.sources.clock import ClockEstimate, NodeClockModel
+from rhot_app.sources.hand_landmarks import LandmarkMarkers
 from rhot_app.sources.searches import NodeSearches
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Candidates
 from rhot_node.errors import WireError
@@ -22,6 +23,7 @@ from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     Fiducials,
     ForegroundPart,
+    HandLandmarks,
     MarkerFlag,
     Message,
     Observations,
@@ -53,11 +55,12 @@ def refuse_without_key(data: bytes) -> Message:
 OLDEST_FRAME_NS = 1_000_000_000
 """A frame taken longer ago than this is not worth a state, or its time is wrong."""
 
-Verified = tuple[Observations | Fiducials, int, int, int, float] | CameraObservations | EdgeFrame | ForegroundFrame
+Verified = (tuple[Observations | Fiducials | HandLandmarks, int, int, int, float] | CameraObservations | EdgeFrame
+            | ForegroundFrame)
 """A message with its row-0, send and receive times, master ns, and clock bound, s; what is put together from several
 datagrams, and text, need no second half."""
 
-_FrameMessage = Observations | Fiducials | SliceEdges | ForegroundPart
+_FrameMessage = Observations | Fiducials | HandLandmarks | SliceEdges | ForegroundPart
 
 _CLOCK_SLACK_NS = 1_000_000  # scheduling between the stamps at both ends
 
@@ -71,12 +74,12 @@ class DatagramValidator:
         self.open: Open = decode
         self.sequence = SequenceWindow()  # of observations
         self._sequences: dict[type, SequenceWindow] = {
-            Observations: self.sequence, Fiducials: SequenceWindow(), SliceEdges: SequenceWindow(),
-            ForegroundPart: SequenceWindow()}
+            Observations: self.sequence, Fiducials: SequenceWindow(), HandLandmarks: SequenceWindow(),
+            SliceEdges: SequenceWindow(), ForegroundPart: SequenceWindow()}
         self.searches = NodeSearches()
         self.received = 0  # datagrams of any kind
         self.taken = 0  # of the stream, and come for the first time: they are recorded
-        self.accepted = 0  # observations
+        self.accepted = 0  # observations and hand landmarks
         self.fiducials = self.searched = 0  # accepted ones; frames with edges or a foreground map
         self.dropped: dict[str, int] = {}
         self.refused: dict[str, int] = {}  # those of them that were not taken: anybody can send them again
@@ -93,6 +96,7 @@ class DatagramValidator:
         self._node_id = node.node_id
         self._count = len(rig.markers.markers)
         self._checksum = rig.markers.checksum
+        self._landmarks = LandmarkMarkers(rig)
         self._size = (node.intrinsics.width, node.intrinsics.height)
         self._time_offset_ns = round(1e9 * node.time_offset_s)
         self._text = TextReader(camera, self._count, self._size, self._time_offset_ns) if node.text_datagrams else None
@@ -153,6 +157,8 @@ class DatagramValidator:
         message, t_row0_ns, t_send_ns, t_receive_ns, bound_s = verified
         if isinstance(message, Fiducials):
             return fiducial_frame(message, self._camera, t_row0_ns, t_receive_ns)
+        if isinstance(message, HandLandmarks):
+            return self._landmarks.observations(message, self._camera, t_row0_ns, t_send_ns, t_receive_ns, bound_s)
         return self._build(message, t_row0_ns, t_send_ns, t_receive_ns, bound_s)
 
     def _verify_text(self, data: bytes, t_receive_ns: int) -> Verified | str:
@@ -209,6 +215,8 @@ class DatagramValidator:
         if isinstance(message, Observations) and (message.marker_checksum != self._checksum
                                                   or message.marker_count != self._count):
             return "marker_set"
+        if isinstance(message, HandLandmarks) and not self._landmarks:
+            return "no_landmarks"
         if (message.width, message.height) != self._size:
             self.image_size = (message.width, message.height)
             return "image_size"

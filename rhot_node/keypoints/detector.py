@@ -41,27 +41,24 @@ class KeypointDetector:
         """Raises KeypointError when the card, its networks or the marker set do not belong together."""
         card = load_card(path)
         self._landmarks = [k for k, marker in enumerate(markers.markers) if marker.shape == "landmark"]
-        self._painted = [k for k, marker in enumerate(markers.markers) if marker.shape != "landmark"]
         if len(self._landmarks) != card.points.count:
             raise KeypointError(f"the marker set {markers.name!r} has {len(self._landmarks)} landmarks, but the "
                                 f"network of {path.name} finds {card.points.count} points. Use the set that belongs "
                                 "to it.")
         self._network, self._sigma, self._factor = KeypointNetwork(path, card), card.points.sigma, card.region_factor
         self._upright = card.points.upright
-        self._count, self._colours = len(markers.markers), _colours(markers, self._painted)
+        self._painted = PaintedMarkers(markers)
         self._last: Array | None = None
 
     def reset(self) -> None:
         """See `Detector`."""
         self._last = None
-        if self._colours is not None:
-            self._colours.reset()
+        self._painted.reset()
 
     def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
         """See `Detector`."""
         found = self._find(to_bgr(image))
-        out = [MarkerObservation(k, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
-               for k in range(self._count)]
+        out = list(self._painted.detect(image))
         if found is not None:
             variance = (self._sigma * self._side(found.pixels)) ** 2
             width, height = image.size
@@ -69,12 +66,7 @@ class KeypointDetector:
                 if -0.5 <= x <= width - 0.5 and -0.5 <= y <= height - 0.5:
                     out[k] = MarkerObservation(k, float(x), float(y), _DIAMETER_PX, variance, 0.0, variance,
                                                found.probability)
-        if self._colours is None:
-            return tuple(out)
-        painted = [msgspec.structs.replace(one, index=self._painted[one.index]) for one in self._colours.detect(image)]
-        for best in painted[:len(self._painted)]:
-            out[best.index] = best
-        return (*out, *painted[len(self._painted):])
+        return tuple(out)
 
     def _find(self, bgr: NDArray[np.uint8]) -> Found | None:
         """The points of an image, None when they are unlikely to be what the network was made for."""
@@ -130,9 +122,32 @@ def keypoint_detector(name: str, markers: MarkerSet) -> KeypointDetector:
     return KeypointDetector(card_path(name), markers)
 
 
-def _colours(markers: MarkerSet, painted: list[int]) -> Detector | None:
-    if not painted:
-        return None
-    from rhot_node.detect.fast import FastDetector  # compiles for a minute
+class PaintedMarkers:
+    """Implements `Detector` by the fast one for the painted markers of a set. Its landmarks are lost."""
 
-    return FastDetector(msgspec.structs.replace(markers, markers=tuple(markers.markers[k] for k in painted)))
+    def __init__(self, markers: MarkerSet) -> None:
+        """Compiles for a minute when there are any."""
+        self._indices = [k for k, marker in enumerate(markers.markers) if marker.shape != "landmark"]
+        self._count = len(markers.markers)
+        self._fast: Detector | None = None
+        self.own = msgspec.structs.replace(markers, markers=tuple(markers.markers[k] for k in self._indices))
+        """The painted ones."""
+        if self._indices:
+            from rhot_node.detect.fast import FastDetector
+            self._fast = FastDetector(self.own)
+
+    def reset(self) -> None:
+        """See `Detector`."""
+        if self._fast is not None:
+            self._fast.reset()
+
+    def detect(self, image: YuvImage) -> tuple[MarkerObservation, ...]:
+        """See `Detector`."""
+        out = [MarkerObservation(k, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
+               for k in range(self._count)]
+        if self._fast is None:
+            return tuple(out)
+        found = [msgspec.structs.replace(one, index=self._indices[one.index]) for one in self._fast.detect(image)]
+        for best in found[:len(self._indices)]:
+            out[best.index] = best
+        return (*out, *found[len(self._indices):])

@@ -25,6 +25,7 @@ from rhot_node.wire.messages import (
     Fiducials,
     Find,
     ForegroundPart,
+    HandLandmarks,
     Message,
     NodeState,
     Observations,
@@ -77,7 +78,8 @@ class UdpLink:
         for number in self._sockets:
             self._poll.register(number, select.POLLIN)
 
-    def send(self, observations: Observations | Fiducials | SliceEdges | ForegroundPart, stream: Stream) -> bool:
+    def send(self, observations: Observations | Fiducials | HandLandmarks | SliceEdges | ForegroundPart,
+             stream: Stream) -> bool:
         """Send one frame's observations; False when the network refused them, which costs that frame only. Any thread
         may call it."""
         try:

@@ -13,6 +13,7 @@ from rhot_node.wire.discovery import decode_find, decode_here, encode_find, enco
 from rhot_node.wire.edges import decode_edges, edges_fit, encode_edges
 from rhot_node.wire.fiducials import decode_fiducials, encode_fiducials, fiducials_fit
 from rhot_node.wire.foreground_map import decode_foreground, encode_foreground, part_room
+from rhot_node.wire.hand_landmarks import decode_hand_landmarks, encode_hand_landmarks, hands_fit
 from rhot_node.wire.marker_table import candidate_table, marker_table
 from rhot_node.wire.messages import (
     ClockReply,
@@ -20,6 +21,7 @@ from rhot_node.wire.messages import (
     Fiducials,
     Find,
     ForegroundPart,
+    HandLandmarks,
     Here,
     MarkerFlag,
     Message,
@@ -91,6 +93,7 @@ TYPE_FIDUCIALS = 8
 TYPE_EDGES = 9
 TYPE_SLICES = 10
 TYPE_FOREGROUND = 11
+TYPE_HAND_LANDMARKS = 12
 
 MARKERS_MAX = 64
 DATAGRAM_MAX = 1472  # bytes of UDP payload in an Ethernet frame (1500 - 20 IPv4 - 8 UDP): nothing is fragmented
@@ -105,6 +108,7 @@ CANDIDATES_FIT = (DATAGRAM_MAX - _HEADER.size - _OBSERVATIONS.size - TAG_LENGTH)
 FIDUCIALS_FIT = fiducials_fit(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
 EDGES_FIT = edges_fit(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
 SLICES_FIT = slices_fit(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
+HANDS_FIT = hands_fit(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
 FOREGROUND_FIT = part_room(DATAGRAM_MAX - _HEADER.size - TAG_LENGTH)
 _CLOCK_REQUEST = Struct("<q")
 _CLOCK_REPLY = Struct("<qqqIB3s")
@@ -238,6 +242,11 @@ def _encode(message: Message) -> bytes:
         case ForegroundPart():
             return (_header(TYPE_FOREGROUND, message.node_id, message.session, message.sequence)
                     + encode_foreground(message))
+        case HandLandmarks():
+            if len(message.hands) > HANDS_FIT:
+                raise WireError("count", f"{len(message.hands)} hands, at most {HANDS_FIT} in a datagram")
+            return (_header(TYPE_HAND_LANDMARKS, message.node_id, message.session, message.sequence)
+                    + encode_hand_landmarks(message))
 
 
 def _header(kind: int, node_id: int, session: int, sequence: int, version: int = VERSION) -> bytes:
@@ -349,4 +358,5 @@ _DECODERS: dict[int, Callable[[memoryview, int, int, int], Message]] = {
     TYPE_EDGES: decode_edges,
     TYPE_SLICES: decode_slices,
     TYPE_FOREGROUND: decode_foreground,
+    TYPE_HAND_LANDMARKS: decode_hand_landmarks,
 }

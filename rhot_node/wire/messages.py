@@ -234,6 +234,40 @@ class Fiducials:
     truncated: bool = False
 
 
+LANDMARKS = 21
+"""Of a hand, in the order of docs/landmarks.md."""
+
+
+@dataclass(frozen=True, slots=True)
+class LandmarkedHand:
+    """The landmarks of one hand in one frame. `presence`: probability that it is a hand; `right`: that it is a right
+    one. `points`: x, y, xx, xy, yy of each landmark: px, raw image, and their covariance, px^2; all 0 where there is
+    none."""
+
+    presence: float
+    right: float
+    points: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HandLandmarks:
+    """The hands of one frame, as the hand networks find them. Times and image size are as in `Observations`; a landmark
+    at row y is later than `t_frame_node_ns` by y * `row_time_ns`."""
+
+    node_id: int
+    session: int
+    sequence: int
+    t_frame_node_ns: int
+    t_send_node_ns: int
+    processing_ns: int
+    exposure_ns: int
+    row_time_ns: int
+    width: int
+    height: int
+    frame_number: int
+    hands: Sequence[LandmarkedHand]
+
+
 @dataclass(frozen=True, slots=True)
 class Slices:
     """Master to node: short line segments across which edges are to be found in every image, and whether a foreground
@@ -319,4 +353,4 @@ class ForegroundPart:
 
 
 Message = (Observations | ClockRequest | ClockReply | Start | Stop | Find | Here | Fiducials | SliceEdges
-           | Slices | ForegroundPart)
+           | Slices | ForegroundPart | HandLandmarks)

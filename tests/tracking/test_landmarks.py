@@ -28,6 +28,7 @@ from rhot_app.simulator.nodes.landmark_detector import (
 from rhot_app.tracking.markers import acquisition
 from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
+from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 
 FPS, SECONDS, SETTLED_S = 30.0, 2.5, 1.0
@@ -58,6 +59,22 @@ def off(states, truth, begin=SETTLED_S):
 
 def rms_mm(errors):
     return 1e3 * float(np.sqrt(np.nanmean(np.sum(errors**2, axis=-1))))
+
+
+def test_markers_and_landmarks_of_one_image_may_come_apart():
+    """The hand networks work beside the search for paint, and their landmarks come later."""
+    rig = msgspec.structs.replace(RIG, markers=type(RHOT6)((*LANDMARKS21.markers, RHOT6.markers[0])))
+    whole = detected_landmarks(RIG, hand(), 1)[0]
+
+    def frame(found):
+        columns = {"pixels": np.where(found[:, None], [200.0, 200.0], np.nan),
+                   "covariances": np.tile(np.eye(2), (22, 1, 1)), "diameters": np.full(22, 10.0),
+                   "qualities": np.ones(22), "flags": np.where(found, 0, int(MarkerFlag.LOST)).astype(np.uint16)}
+        return replace(whole, **columns)
+    estimator, paint = make_tracker(rig), np.arange(22) == 21
+    for found, taken in ((paint, True), (~paint, True), (paint, False), (~paint, False), (~paint & ~paint, False)):
+        estimator.ingest(frame(found))
+        assert (estimator.solve() is not None) == taken
 
 
 def test_the_marker_set_has_the_joints_in_the_usual_order():

@@ -18,7 +18,9 @@ from rhot_node.wire.messages import (
     Fiducial,
     Fiducials,
     Find,
+    HandLandmarks,
     Here,
+    LandmarkedHand,
     MarkerFlag,
     MarkerObservation,
     Message,
@@ -64,9 +66,20 @@ def fiducials(draw: st.DrawFn) -> Fiducial:
 
 
 @st.composite
+def hands(draw: st.DrawFn) -> LandmarkedHand:
+    points = []
+    for _ in range(21):
+        spread = draw(st.one_of(st.none(), st.floats(0.0009765625, 64.0, width=32)))
+        x, y = draw(st.floats(-64, 543, width=32)), draw(st.floats(-64, 543, width=32))
+        points.append((0.0,) * 5 if spread is None else (x, y, spread, 0.5 * spread, spread))
+    probabilities = st.floats(0, 1, width=32)
+    return LandmarkedHand(draw(probabilities), draw(probabilities), tuple(points))
+
+
+@st.composite
 def messages(draw: st.DrawFn) -> Message:
     node_id, session, sequence = draw(st.integers(1, 2**32 - 1)), draw(st.integers(1, 2**64 - 1)), draw(u32)
-    match draw(st.integers(1, 8)):
+    match draw(st.integers(1, 9)):
         case 1:
             t_frame = draw(st.integers(-(2**61), 2**61))
             count = draw(st.integers(0, 12))
@@ -93,6 +106,11 @@ def messages(draw: st.DrawFn) -> Message:
             return Fiducials(node_id, session, sequence, t_frame, t_frame + draw(st.integers(0, 60 * 10**9)), draw(u32),
                              draw(u32), draw(u32), 640, 480, draw(u32),
                              tuple(draw(st.lists(fiducials(), max_size=16))), draw(st.booleans()))
+        case 8:
+            t_frame = draw(st.integers(-(2**61), 2**61))
+            return HandLandmarks(node_id, session, sequence, t_frame, t_frame + draw(st.integers(0, 60 * 10**9)),
+                                 draw(u32), draw(u32), draw(u32), 640, 480, draw(u32),
+                                 tuple(draw(st.lists(hands(), max_size=3))))
         case _:
             return Stop(session, sequence)
 

@@ -24,6 +24,8 @@ from wire_samples import (
     fiducial,
     fiducials,
     found,
+    hand_landmarks,
+    landmarked_hand,
     lost,
     observations,
     packet,
@@ -113,7 +115,7 @@ HEADER_FAULTS: list[Fault] = [
     (0, "<4s", (b"rhot",), "magic"),
     (4, "<B", (3,), "version"),
     (5, "<B", (0,), "type"),
-    (5, "<B", (12,), "type"),
+    (5, "<B", (13,), "type"),
     (6, "<H", (1,), "tag"),
     (6, "<H", (2,), "flags"),
     (6, "<H", (0x8001,), "flags"),
@@ -188,6 +190,20 @@ OTHER_FAULTS = [
     ("fiducials_two", 100, "<f", (0.0,), "marker"),
     ("fiducials_two", 104, "<f", (1.0,), "marker"),  # not positive semi-definite
     ("fiducials_two", 108, "<f", (math.inf,), "marker"),
+    ("hand_landmarks_two", 8, "<I", (0,), "header"),
+    ("hand_landmarks_two", 12, "<Q", (0,), "header"),
+    ("hand_landmarks_two", 32, "<q", (3_599_999_999_999,), "time"),  # sent before it was exposed
+    ("hand_landmarks_two", 54, "<H", (0,), "size"),
+    ("hand_landmarks_two", 60, "<B", (1,), "length"),
+    ("hand_landmarks_two", 62, "<B", (1,), "reserved"),
+    ("hand_landmarks_two", 64, "<f", (1.5,), "range"),
+    ("hand_landmarks_two", 68, "<f", (math.nan,), "range"),
+    ("hand_landmarks_two", 72, "<f", (704.0,), "marker"),
+    ("hand_landmarks_two", 76, "<f", (math.nan,), "marker"),
+    ("hand_landmarks_two", 80, "<f", (0.0,), "marker"),  # a place without an error
+    ("hand_landmarks_two", 84, "<f", (3.0,), "marker"),  # not positive semi-definite
+    ("hand_landmarks_two", 88, "<f", (math.inf,), "marker"),
+    ("hand_landmarks_two", 152, "<f", (1.0,), "marker"),  # none, and yet a place
     ("here_longest_name", 48, "<4s", (b"abcd",), "range"),  # more than 64 characters
     ("stop", 4, "<B", (2,), "version"),  # only observations have a second one
     ("observations_candidates", 4, "<B", (1,), "length"),
@@ -286,6 +302,12 @@ def test_fiducials_that_do_not_fit_an_ethernet_frame_are_left_out() -> None:
     assert len(data) <= 1472
     assert isinstance(message, Fiducials)
     assert message.truncated and tuple(message.fiducials) == tuple(many.fiducials[:16])
+
+
+def test_more_hands_than_fit_an_ethernet_frame_are_refused() -> None:
+    assert len(encode(hand_landmarks(*3 * [landmarked_hand(1.0, 0.5)]), Seal(KEY))) <= 1472
+    with pytest.raises(WireError, match="count"):
+        encode(hand_landmarks(*4 * [landmarked_hand(1.0, 0.5)]))
 
 
 def test_an_answer_is_never_longer_than_its_question() -> None:

@@ -14,7 +14,9 @@ from rhot_node.wire.messages import (
     Fiducials,
     Find,
     ForegroundPart,
+    HandLandmarks,
     Here,
+    LandmarkedHand,
     MarkerFlag,
     MarkerObservation,
     Message,
@@ -79,6 +81,15 @@ def foreground(data: bytes, part: int = 0, parts: int = 1) -> ForegroundPart:
     return ForegroundPart(**OF_A_FRAME, request=12, step=8, part=part, parts=parts, data=data)
 
 
+def landmarked_hand(x: float, right: float, *, absent: int = -1) -> LandmarkedHand:
+    return LandmarkedHand(0.875, right, tuple(
+        (x + 8.0 * k, 400.5 - 16.25 * k, 2.0, -0.5, 1.5) if k != absent else (0.0,) * 5 for k in range(21)))
+
+
+def hand_landmarks(*hands: LandmarkedHand) -> HandLandmarks:
+    return HandLandmarks(**OF_A_FRAME, hands=hands)
+
+
 SIX = tuple(found(i, 100.5 + 64.25 * i, 200.125 - 8.5 * i) for i in range(6))
 
 SAMPLES: dict[str, Message] = {
@@ -117,6 +128,8 @@ SAMPLES: dict[str, Message] = {
                         SliceEdge(231, 17.0078125, 3.0, 40.03125, 51 / 255, 1.0)), 1, 3),
     "slices_none": slices(b"", 0, 8),
     "slices_two": slices(bytes.fromhex("91010203004014" "fc09000000c0ff"), 232, 0, 1, 2),
+    "hand_landmarks_none": hand_landmarks(),
+    "hand_landmarks_two": hand_landmarks(landmarked_hand(-3.5, 0.9375, absent=4), landmarked_hand(300.25, 0.0625)),
     "foreground_part": foreground(b"\x78\x9c\x03\x00", 1, 2),
 }
 

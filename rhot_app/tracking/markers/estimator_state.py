@@ -94,11 +94,11 @@ class RecentObservations:
                    default=1e-9 * _FRESH_NS)
 
     def enter(self, frame: MarkerFrame) -> bool:
-        """Take a frame in; False when it came before."""
+        """Take a frame in; False when it came before. Markers and landmarks of one image come apart."""
         observations = frame.observations
         camera, begin = observations.camera, observations.t_row0_master_ns
         if any(other.camera == camera and abs(other.observations.t_row0_master_ns - begin) < _SAME_FRAME_NS
-               for other in self._frames):
+               and ((other.seen & frame.seen).any() or not frame.seen.any()) for other in self._frames):
             return False
         self._frames = [*self._frames[1 - _RECENT:], frame]
         last = self.newest[camera]

@@ -82,6 +82,7 @@ _UNUSED = {
     "time": "came too late: this computer or the network is busy",
     "kernel_overflow": "could not be read in time: this computer is busy",
     "marker_set": "of another marker set than the rig's",
+    "no_landmarks": "landmarks, but no marker of the rig is one",
     "image_size": "of another picture size than the rig's",
     "foreign_node": "of another node",
     "duplicate": "came twice",
