@@ -46,8 +46,8 @@ SAID: list[tuple[dict[str, Any], str]] = [
     ({"camera": {"gain": "a"}}, "camera.gain: expected a number or null, not text."),
     ({"node_id": 0}, "node_id: expected a whole number >= 1."),
     ({"detector": "magic"},
-     """detector is 'magic'; it may be "fast", "reference", "keypoints:NAME" with the name of a model card, or """
-     """"plug:NAME" with the name of a plug-in"""),
+     """detector is 'magic'; it may be "fast", "reference", "landmarks", "landmarks:lite", """
+     """"keypoints:NAME" with the name of a model card, or "plug:NAME" with the name of a plug-in"""),
     ({"late_frames": "keep"},
      """late_frames: 'keep' is not one of the values that this field can have: "drop" or "send"."""),
     ({"udp_port": 70000}, "udp_port"), ({"camera": {"width": 641}}, "camera.width"),
