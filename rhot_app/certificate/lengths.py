@@ -214,8 +214,9 @@ def judge_rod(recording: CertifiedRecording, markers: tuple[str, str], length_m:
         if error.half_width > SHOWS_PERCENT:
             return not_measured("rod", ROD, f"an error of {SHOWS_PERCENT:g} % would not show. {measured}",
                                 f"Take a longer rod. {_SWEEP}", tuple(figures), curves)
-        how = ("The intervals hold 0, along the view and across it, too." if len(asked) > 1 else
-               "The interval holds 0. The rod was hardly turned, so a wrong focal length would not show.")
+        turned = len(asked) > 1 and max(one.half_width for one in asked) <= SHOWS_PERCENT
+        how = ("The intervals hold 0, along the view and across it, too." if turned else
+               "The interval holds 0. The rod was turned too little for a wrong focal length to show.")
         return Line("rod", ROD, "agrees", f"{measured} {how}", figures=tuple(figures), curves=curves)
     cause, remedy = _why(error, across, away, off, depth, rig)
     return Line("rod", ROD, "differs", measured, cause, remedy, tuple(figures), curves)

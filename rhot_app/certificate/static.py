@@ -49,10 +49,11 @@ def judge_static(recording: CertifiedRecording, rig: Rig) -> Line:
         short = jitter(recording.times_s, axes.distance(places)[:, None])
         if math.isfinite(short) and 1e-3 * distance.low > _SWAYS * short:
             sways.append(name)
-        if worst is None or larger.value > worst[0]:
+        if math.isfinite(larger.value) and (worst is None or larger.value > worst[0]):
             worst = (larger.value, name, larger, distance)
     if worst is None:
-        return not_measured("static", TITLE, "no marker was located in the recording of the still hand.", AGAIN)
+        return not_measured("static", TITLE, "no marker was located, or long enough, in the recording of the still "
+                            "hand.", AGAIN)
     _, name, larger, distance = worst
     measured = (f"The least steady marker, {name}, moves by {in_words(larger, 'px')} in the pictures and by "
                 f"{in_words(distance, 'mm')} in distance.")
@@ -61,6 +62,9 @@ def judge_static(recording: CertifiedRecording, rig: Rig) -> Line:
         return Line("static", TITLE, "differs", f"{measured} The thesis reaches {limit:g} px.",
                     "The marker is partly hidden, dim, or of a colour that something else has." if not sways else
                     "It moved while it was recorded.", AGAIN, tuple(figures), curves)
+    if larger.high > limit:
+        return not_measured("static", TITLE, f"more than the thesis's {limit:g} px would not show. {measured}", AGAIN,
+                            tuple(figures), curves)
     word = "below" if larger.high < thesis.JITTER_PX[0] else "within"
     swaying = (f" {', '.join(sways)} swayed: most of that is movement, not noise." if sways else "")
     unseen = f" Not judged, because located less than half of the time: {', '.join(hidden)}." if hidden else ""

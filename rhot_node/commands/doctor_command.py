@@ -14,8 +14,8 @@ from rhot_node.compiled import is_compiled_in
 from rhot_node.config import NodeSettings, load_settings
 from rhot_node.errors import CameraError, NodeError, TrustError
 from rhot_node.health.checks import (
-    LEVELS,
     Check,
+    Level,
     check_clock,
     check_heat,
     check_memory,
@@ -31,7 +31,9 @@ from rhot_node.service.install import NAME, STATE_FOLDER
 from rhot_node.terminal import add_examples
 
 SUMMARY = ("Look at everything that a node needs: power, heat, memory, clock, network, camera, compiled code, pairing "
-           "and the service. Exit code 0: all is well; 1: something could be better; 2: something is wrong.")
+           "and the service. Exit code 0: nothing is wrong, as far as can be seen; 1: something could be better; 2: "
+           "something is wrong.")
+EXIT_CODES: dict[Level, int] = {"ok": 0, "unknown": 0, "warning": 1, "error": 2}
 SERVICE_CACHE = Path("var/cache") / STATE_FOLDER.name
 
 LoadStack = Callable[[], CameraStack]
@@ -55,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         for check in checks:
             print(f"{check.level:<8} {check.code:<15} {check.sentence}")
-    return LEVELS.index(level)
+    return EXIT_CODES[level]
 
 
 def examine(machine: Machine, settings: Path | None, user_cache: Path, load: LoadStack = load_stack) -> list[Check]:

@@ -15,18 +15,25 @@ from rhot_node.health.machine import Machine, Throttled
 
 # -- result of a check -------------------------------------------------------------------------------------------------
 
-Level = Literal["ok", "warning", "error"]
-LEVELS: tuple[Level, ...] = ("ok", "warning", "error")
+Level = Literal["ok", "unknown", "warning", "error"]
+LEVELS: tuple[Level, ...] = ("ok", "unknown", "warning", "error")
+"""Unknown is what the machine does not tell: nothing is wrong as far as can be seen."""
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """`code` is a short key, `text` a sentence on what was found, `remedy` one on what to do; empty when ok."""
+    """`code` is a short key, `text` a sentence on what was found, `remedy` one on what to do; empty when there is no
+    trouble."""
 
     code: str
     level: Level
     text: str
     remedy: str = ""
+
+    @property
+    def is_trouble(self) -> bool:
+        """Whether something is not as it should be."""
+        return self.level in ("warning", "error")
 
     @property
     def sentence(self) -> str:
@@ -66,7 +73,7 @@ def is_black(luma: NDArray[np.uint8]) -> bool:
 def check_power(flags: Throttled | None) -> Check:
     """Under-voltage: now, or since the machine was switched on."""
     if flags is None:
-        return Check("power", "ok", "This machine does not tell whether its power supply is strong enough.")
+        return Check("power", "unknown", "This machine does not tell whether its power supply is strong enough.")
     if flags & Throttled.UNDER_VOLTAGE:
         return Check("power", "error", "Its supply voltage is too low now (below 4.63 V): it is slowed down and may "
                      "stop or damage its SD card.", POWER_REMEDY)
@@ -90,13 +97,15 @@ def check_heat(temperature_c: float | None, flags: Throttled | None) -> Check:
     if flags & Throttled.HOT_BEFORE:
         return Check("heat", "warning", f"Its processor{heat} was slowed down by heat since it was switched on.",
                      COOL_REMEDY)
-    return Check("heat", "ok", f"The processor is cool enough{heat}." if heat else "It does not tell its temperature.")
+    if not heat:
+        return Check("heat", "unknown", "It does not tell its temperature.")
+    return Check("heat", "ok", f"The processor is cool enough{heat}.")
 
 
 def check_memory(available_bytes: int | None) -> Check:
     """Memory that is left."""
     if available_bytes is None:
-        return Check("memory", "ok", "It does not tell how much memory is free.")
+        return Check("memory", "unknown", "It does not tell how much memory is free.")
     text = f"{available_bytes / (1 << 20):.0f} MB of memory are free"
     if available_bytes < MEMORY_LOW:
         return Check("memory", "error" if available_bytes < MEMORY_OUT else "warning", f"Only {text}.",
@@ -119,8 +128,9 @@ def check_clock(synchronised: bool | None, source: str | None) -> Check:
                      "better clock.", "Use the system's own kernel for this board.")
     wall = {True: "follows the network's", False: "does not follow the network's",
             None: "may or may not follow the network's"}[synchronised]
-    return Check("clock", "ok", f"The wall clock {wall}; that does not matter: a node's times are of the monotonic "
-                 "clock, which is never set. (Only the camera setting `sync` needs wall clocks that agree.)")
+    text = (f"The wall clock {wall}; that does not matter: a node's times are of the monotonic clock, which is never "
+            "set. (Only the camera setting `sync` needs wall clocks that agree.)")
+    return Check("clock", "ok" if source else "unknown", text)
 
 
 def check_speed(governor: str | None) -> Check:
@@ -128,8 +138,9 @@ def check_speed(governor: str | None) -> Check:
     if governor == "powersave":
         return Check("speed", "warning", "The processor is held at its lowest frequency.",
                      "Set it free: `echo ondemand | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor`.")
-    return Check("speed", "ok", f"The processor's frequency is chosen by {governor}." if governor else
-                 "It does not tell how its processor's frequency is chosen.")
+    if not governor:
+        return Check("speed", "unknown", "It does not tell how its processor's frequency is chosen.")
+    return Check("speed", "ok", f"The processor's frequency is chosen by {governor}.")
 
 
 def check_network(machine: Machine) -> list[Check]:
@@ -193,4 +204,4 @@ class HealthMonitor:
                 flags |= flag
         checks = (check_power(flags), check_heat(self._machine.temperature_c(), flags),
                   check_memory(self._machine.available_bytes()))
-        return [check for check in checks if check.level != "ok"]
+        return [check for check in checks if check.is_trouble]

@@ -15,10 +15,11 @@ from simulated_protocol import SHORT, Recorded, recorded, with_baseline, with_fo
 
 from rhot_app.certificate.certify import certify
 from rhot_app.certificate.document import Certificate
-from rhot_app.certificate.latency import flash_edges, judge_timing
-from rhot_app.certificate.lengths import judge_rod
-from rhot_app.certificate.recordings import FlashStep, ProtocolFile, StaticStep, read_recording
-from rhot_app.certificate.static import judge_static
+from rhot_app.certificate.intervals import Interval
+from rhot_app.certificate.latency import flash_edges, judge_latency, judge_timing
+from rhot_app.certificate.lengths import DistanceReading, judge_depth, judge_rod
+from rhot_app.certificate.recordings import FlashStep, Latencies, ProtocolFile, StaticStep, read_recording
+from rhot_app.certificate.static import judge_handedness, judge_static, judge_upright
 from rhot_app.evaluation.fault_injection import changed
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.simulator.film.node_log import write_node_log
@@ -185,6 +186,63 @@ def test_what_would_not_show_is_not_said_to_agree(one: Recorded) -> None:
     assert judge_timing(times).verdict == "not measured"
     assert judge_timing(np.tile(times, (40, 1))).verdict == "agrees"
     assert judge_timing(times + 0.02).verdict == "differs"
+
+
+def test_an_unknown_clock_proves_no_time(one: Recorded) -> None:
+    flash = one.protocol.flash
+    assert flash is not None
+    recording = read_recording(one.folder / flash.log, one.rig)
+    latencies = Latencies(np.full((20, len(LATENCY_STAGES)), 1e-3), np.full(20, 0.01))
+    assert judge_latency(recording, flash.marker, flash.edges, latencies).verdict == "agrees"
+    vague = replace(recording, clock_bound_s=0.5)
+    line = judge_latency(vague, flash.marker, flash.edges, latencies)
+    assert line.verdict == "not measured" and "would not show" in line.sentence
+
+
+def test_distances_that_show_nothing_do_not_agree(one: Recorded) -> None:
+    near = [DistanceReading(ruler_m, Interval(ruler_m, ruler_m - 0.05, ruler_m + 0.05), np.full(20, 60.0))
+            for ruler_m in (0.4, 0.45, 0.5, 0.55)]
+    line = judge_depth(near, one.rig)
+    assert line.verdict == "not measured" and "would not show" in line.sentence
+    same = judge_depth([near[0]] * 4, one.rig)
+    assert same.verdict == "not measured" and judge_depth(near[:3], one.rig).verdict == "not measured"
+
+
+def test_a_rod_that_is_upside_down_or_too_short_proves_nothing_upright(one: Recorded) -> None:
+    plumb = one.protocol.plumb
+    assert plumb is not None
+    recording = read_recording(one.folder / plumb.log, one.rig)
+    assert judge_upright(recording, plumb.upper, plumb.lower, one.rig).verdict == "agrees"
+    turned = judge_upright(recording, plumb.lower, plumb.upper, one.rig)
+    assert turned.verdict == "differs" and "upside down" in turned.cause
+    upper, lower = (recording.marker(name) for name in (plumb.upper, plumb.lower))
+    places = recording.positions.copy()
+    places[:, upper] = places[:, lower] + 0.05 * (places[:, upper] - places[:, lower])
+    short = judge_upright(replace(recording, positions=places), plumb.upper, plumb.lower, one.rig)
+    assert short.verdict == "not measured"
+
+
+def test_a_hand_edge_on_shows_no_side(one: Recorded) -> None:
+    static = one.protocol.static
+    assert static is not None
+    recording = read_recording(one.folder / static.log, one.rig)
+    roles = [marker.role for marker in one.rig.markers.markers]
+    wrist, index, little = (roles.index(role) for role in ("wrist", "index_tip", "little_tip"))
+    places = recording.positions.copy()
+    noise = np.random.default_rng(1).normal(0.0, 1e-3, (len(places), 3))
+    places[:, little] = 0.5 * (places[:, wrist] + places[:, index]) + noise
+    assert judge_handedness(replace(recording, positions=places), static.facing, one.rig).verdict == "not measured"
+
+
+def test_jitter_that_is_hardly_known_does_not_agree(one: Recorded) -> None:
+    assert one.protocol.static is not None
+    recording = read_recording(one.folder / one.protocol.static.log, one.rig)
+    noise = np.random.default_rng(1).normal(0.0, 4.5, recording.pixels.shape)
+    few = replace(recording, pixels=recording.pixels + noise)
+    kept = np.arange(len(recording.cameras)) < 24
+    for name in ("pixels", "cameras"):
+        few = replace(few, **{name: getattr(few, name)[kept]})
+    assert judge_static(few, one.rig).verdict == "not measured"
 
 
 def test_jitter_beyond_the_thesis_differs(one: Recorded) -> None:

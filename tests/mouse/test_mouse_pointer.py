@@ -34,12 +34,20 @@ def test_a_hand_that_jumps_is_not_at_rest() -> None:
     assert state.cursor == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
 
 
+def test_a_hand_that_drifts_or_is_guessed_gives_no_origin() -> None:
+    drifting, guessed = Mouse(), Mouse()
+    for number in range(3 * REST):
+        assert drifting.feed(hand_state(number, (1e-3 * number, 0.0, 0.0))).cursor is None
+        state = guessed.feed(hand_state(number, unseen=("wrist",)))
+        assert state.cursor is None and not state.observed and "palm" in state.needs[0]
+
+
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_the_palm_moves_the_cursor_over_the_ground_only(side: str) -> None:
     mouse = rested(side=side)
     state = mouse.feed(hand_state(REST, (0.02, -0.03, 0.0), side=side))
     assert state.cursor == pytest.approx([0.06, -0.09, 0.0], abs=1e-9)
-    assert not state.pressed and not state.needs
+    assert not state.pressed and not state.needs and state.observed
 
 
 def test_the_index_finger_changes_the_height_only() -> None:
@@ -70,7 +78,7 @@ def test_without_the_index_fingertip_the_height_stays_with_a_sentence() -> None:
     height = mouse.feed(hand_state(REST, index_mcp_flexion=10.0)).cursor[2]
     state = mouse.feed(hand_state(REST + 1, (0.01, 0.0, 0.0), unseen=("index_tip",)))
     assert state.cursor == pytest.approx([0.03, 0.0, height], abs=1e-9)
-    assert any("index fingertip" in sentence for sentence in state.needs)
+    assert any("index fingertip" in sentence for sentence in state.needs) and not state.observed
 
 
 @pytest.mark.parametrize("side", ["right", "left"])

@@ -117,7 +117,7 @@ def test_the_service(tmp_path: Path, state: tuple[str, str, int], level: str | N
     assert (checks[0].level if checks else None) == level
 
 
-@pytest.mark.parametrize(("level", "code"), [("ok", 0), ("warning", 1), ("error", 2)])
+@pytest.mark.parametrize(("level", "code"), [("ok", 0), ("unknown", 0), ("warning", 1), ("error", 2)])
 def test_exit_code_and_json(level: Any, code: int, monkeypatch: pytest.MonkeyPatch,
                             capsys: pytest.CaptureFixture[str]) -> None:
     checks = [Check("heat", level, "It is so.", "Do it.")]

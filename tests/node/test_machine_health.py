@@ -44,7 +44,8 @@ def test_an_empty_machine_tells_nothing_and_nothing_breaks(tmp_path: Path) -> No
     assert (bare.model(), bare.throttled(), bare.temperature_c(), bare.available_bytes()) == (None,) * 4
     assert bare.ntp_synchronised() is None and bare.interfaces() == [] and bare.video_devices() == []
     checks = [check_power(None), check_heat(None, None), check_memory(None), check_clock(None, None), check_speed(None)]
-    assert worst(checks) == "ok"
+    assert {check.level for check in checks} == {"unknown"} and worst(checks) == "unknown"
+    assert HealthMonitor(bare).troubles() == []
 
 
 @pytest.mark.parametrize(("changes", "commands", "flags"), [
