@@ -6,11 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QAction, QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtGui import QAction, QCloseEvent
 from PySide6.QtWidgets import (
-    QAbstractButton,
     QApplication,
-    QComboBox,
     QMainWindow,
     QStackedWidget,
 )
@@ -21,6 +19,7 @@ from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.guide import page_of
+from rhot_app.ui.common.keys import bind_space
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import show_overflow
 from rhot_app.ui.common.theme import scheme_named
@@ -112,7 +111,7 @@ class MainWindow(QMainWindow):
         self.addActions(a.all())
         self.addActions(self.docks.actions)
         a.start.triggered.connect(c.start_or_stop)
-        QShortcut(QKeySequence(Qt.Key.Key_Space), self).activated.connect(self._press_space)
+        bind_space(self, c.start_or_stop)
         a.record.triggered.connect(lambda: self.recordings.begin_or_end(video=a.video.isChecked()))
         a.bookmark.triggered.connect(lambda: self.recordings.ask_for_bookmark(self))
         a.twin.triggered.connect(lambda: self.open_twin(TwinChoice(motion=self.welcome.motion)))
@@ -179,16 +178,6 @@ class MainWindow(QMainWindow):
             self.docks.arrange()
 
     # -- what the actions do ---------------------------------------------------------------------------------------
-
-    def _press_space(self) -> None:
-        """Start or stop, unless the key means something where the focus is."""
-        focus = QApplication.focusWidget()
-        if isinstance(focus, QAbstractButton):
-            focus.click()
-        elif isinstance(focus, QComboBox):
-            focus.showPopup()
-        else:
-            self.controller.start_or_stop()
 
     def open_twin(self, choice: TwinChoice) -> None:
         """Start the simulated rig and the tracking."""

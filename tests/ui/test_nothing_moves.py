@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtWidgets import QToolButton, QWidget
+from person import wait
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLineEdit, QPushButton, QToolButton, QWidget
+from test_open_and_close import OPENERS, LendingBackend
 
 from rhot_app.engine.status import Advice
+from rhot_app.sources.discovery import Search
+from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.dialogs.nodes_dialog import NodesDialog, PairDialog
 from rhot_app.ui.models.notice import Notice
+from rhot_app.ui.models.palette import DARK
 
 NO_ROOM = (1024, 700)
+LONG = "The engine does not take the rig: the hand has no markers, and the other one's are not all in the set. " * 4
+AIMS = (QAbstractButton, QComboBox, QLineEdit)
 
 
 @pytest.fixture
@@ -107,3 +117,129 @@ def test_controls_that_do_not_fit_stand_behind_an_arrow(desk):
               if action.text() and not controls.widgetForAction(action).isVisible()]
     desk.until(lambda: [action.text() for action in arrow.menu().actions() if action.text()] == hidden)
     assert hidden[-1] == "Guide" and "Start" not in hidden
+
+
+# -- dialogs and other windows -----------------------------------------------------------------------------------------
+
+def aims(window):
+    """Where everything stands that a mouse may aim at, and how large the window is."""
+    QApplication.processEvents()
+    return {**{(kind.__name__, number): part.mapTo(window, part.rect().topLeft()).toTuple()
+               for kind in AIMS for number, part in enumerate(window.findChildren(kind)) if part.isVisible()},
+            "window": window.size().toTuple()}
+
+
+def stays(window):
+    """Nothing moves, whatever its sentences say."""
+    sentences = [one for one in window.findChildren(Sentence) if one.isVisible()]
+    for one in sentences:
+        one.setText("Done.")
+    before = aims(window)
+    for one in sentences:
+        one.setText(LONG)
+        assert aims(window) == before, one.objectName()
+        assert one.verticalScrollBar().maximum() > 0 or one.whole
+    return len(sentences)
+
+
+@pytest.fixture(scope="module")
+def lent(make_shared_bench, tmp_path_factory):
+    """The main window on an engine that answers everything."""
+    bench = make_shared_bench(LendingBackend(tmp_path_factory.mktemp("rig") / "desk.json"))
+    bench.track()
+    return bench
+
+
+WITH_SENTENCES = [one for one in OPENERS if one.name not in ("guide", "rig", "replay")]
+
+
+@pytest.mark.parametrize("opener", WITH_SENTENCES, ids=lambda one: one.name)
+def test_a_long_sentence_moves_no_button(opener, lent):
+    opener.open(lent.window)
+    wait(lambda: (shown := opener.find(lent.window)) is not None and shown.isVisible())
+    shown = opener.find(lent.window)
+    try:
+        assert stays(shown) > 0
+    finally:
+        shown.reject()
+        wait(lambda: opener.find(lent.window) is None)
+
+
+def test_dialogs_of_nodes_keep_their_buttons_in_place(themed, qtbot):
+    for dialog in (NodesDialog(DARK, None, lambda progress: Search((), (), ())),
+                   PairDialog("left", None, lambda address, code: "left")):
+        qtbot.addWidget(dialog)
+        dialog.show()
+        assert stays(dialog) > 0
+
+
+# -- the space bar -----------------------------------------------------------------------------------------------------
+
+SPACED = [one for one in OPENERS if one.name in ("lens", "colours", "certificate", "layers", "fit")]
+
+
+def has_menu(button):
+    return button.menu() is not None or (isinstance(button, QToolButton) and button.defaultAction() is not None
+                                         and button.defaultAction().menu() is not None)
+
+
+def no_menu_by_space(window):
+    """Press Space wherever the Tab key leads: neither a menu nor a list opens. Alt+Down opens them."""
+    parts = [one for kind in (QComboBox, QPushButton, QToolButton) for one in window.findChildren(kind)
+             if one.isVisible() and one.isEnabled() and one.focusPolicy() & Qt.FocusPolicy.TabFocus
+             and (isinstance(one, QComboBox) or has_menu(one))]
+    for one in parts:
+        one.setFocus(Qt.FocusReason.TabFocusReason)
+        QTest.keyClick(one, Qt.Key.Key_Space)
+        opened = QApplication.activePopupWidget()
+        if opened is not None:
+            opened.close()
+        assert opened is None, one
+    return parts
+
+
+@pytest.mark.parametrize("opener", SPACED, ids=lambda one: one.name)
+def test_space_opens_no_menu_in_a_window(opener, lent):
+    opener.open(lent.window)
+    wait(lambda: (shown := opener.find(lent.window)) is not None and shown.isVisible())
+    shown = opener.find(lent.window)
+    shown.activateWindow()
+    assert QTest.qWaitForWindowActive(shown)
+    try:
+        assert no_menu_by_space(shown)
+    finally:
+        shown.reject()
+        wait(lambda: opener.find(lent.window) is None)
+
+
+def test_space_opens_no_menu_of_the_main_window(desk):
+    desk.window.activateWindow()
+    assert QTest.qWaitForWindowActive(desk.window)
+    button = desk.window.toolbar.view_button
+    assert button in no_menu_by_space(desk.window)
+    button.setFocus(Qt.FocusReason.TabFocusReason)
+    opened, timer = [], QTimer()
+
+    def close():
+        if QApplication.activePopupWidget() is not None:
+            opened.append(QApplication.activePopupWidget())
+            opened[-1].close()
+
+    timer.timeout.connect(close)
+    timer.start(10)  # an open menu keeps the key press waiting
+    QTest.keyClick(button, Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier)
+    desk.until(lambda: len(opened) == 1)
+    timer.stop()
+
+
+def test_a_button_that_was_clicked_leaves_space_to_the_window(lent):
+    opener = next(one for one in OPENERS if one.name == "colours")
+    opener.open(lent.window)
+    wait(lambda: opener.find(lent.window) is not None and opener.find(lent.window).isVisible())
+    shown = opener.find(lent.window)
+    button = next(one for one in shown.findChildren(QPushButton) if one.text() == "Hold the pictures")
+    focus = shown.focusWidget()
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert shown.focusWidget() is focus is not button
+    shown.reject()
+    wait(lambda: opener.find(lent.window) is None)

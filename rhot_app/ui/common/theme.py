@@ -97,6 +97,7 @@ def style_sheet(s: Scheme) -> str:
     QLabel[title="true"] {{ font-weight: 600; }}
     QFrame[card="true"] {{ background: {s.raised}; border: 1px solid {s.border}; border-radius: 8px; }}
     QScrollArea {{ border: none; background: {s.panel}; }}
+    QScrollArea[clear="true"], QScrollArea[clear="true"] > QWidget > QWidget {{ background: transparent; }}
     QScrollBar {{ background: {s.panel}; border: none; }}
     QScrollBar:vertical {{ width: 12px; }}
     QScrollBar:horizontal {{ height: 12px; }}

@@ -31,11 +31,12 @@ from rhot_app.export.states import HandStates
 from rhot_app.export.tables import columns
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.sentence import Sentence
 
 ROWS = 8
 LOOK_MS = 300  # a choice is looked at when it has stood for a while
 
-_SIZE = (860, 600)
+_SIZE, _BUTTON_PX = (860, 600), 120
 _FORMATS = {"csv": "CSV: a table", "parquet": "Parquet: a table for analysis", "npz": "NPZ: NumPy's arrays",
             "trc": "TRC: points, for OpenSim", "c3d": "C3D: points, motion capture", "bvh": "BVH: a moving skeleton",
             "gltf": "glTF: an animated hand", "mcap": "MCAP: for Foxglove"}
@@ -76,12 +77,12 @@ class ExportDialog(QDialog):
         self.table = QTableWidget(0, 0)
         self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
         self.table.setToolTip("The first fingertips as they would be written; the file holds much more.")
-        self.sentence = QLabel()
-        self.sentence.setWordWrap(True)
+        self.sentence = Sentence(3)
         self.bar = QProgressBar()
         self.bar.setRange(0, 1000)
         self.bar.hide()
         self.export_button = QPushButton("Export …")
+        self.export_button.setFixedWidth(_BUTTON_PX)  # it says Cancel meanwhile
         self.export_button.setToolTip("Choose a file; it appears when it is whole.")
         self.export_button.setDefault(True)
         self.close_button = QPushButton("Close")

@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QProgressBar,
     QPushButton,
     QTableWidget,
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
 from rhot_app.progress import Progress
 from rhot_app.sources.discovery import FoundNode, Search
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.sentence import Sentence
 from rhot_node.wire.messages import TrustState
 
 Find = Callable[[Progress], Search]
@@ -68,9 +68,7 @@ class FoundNodes(QWidget):
         policy = self.progress_bar.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
         self.progress_bar.setSizePolicy(policy)
-        self.message = QLabel("")
-        self.message.setTextFormat(Qt.TextFormat.PlainText)  # names come from anybody
-        self.message.setWordWrap(True)
+        self.message = Sentence(2)
         buttons = QHBoxLayout()
         for button in self.side_buttons:
             buttons.addWidget(button)

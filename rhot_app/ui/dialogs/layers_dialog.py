@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
     QHBoxLayout,
-    QLabel,
     QListWidget,
     QListWidgetItem,
     QPushButton,
@@ -26,6 +25,8 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.keys import bind_space
+from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.models.layers import LayerPicture, LayerPictures
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.picture_painter import fit
@@ -74,10 +75,9 @@ class LayersDialog(QDialog):
         self.list.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.list.setSelectionMode(QListWidget.SelectionMode.NoSelection)
         self.list.setAccessibleName("Visibility order")
-        self.sentence = QLabel()
-        self.sentence.setWordWrap(True)
+        self.sentence = Sentence(2)
         self._lay_out()
-        QShortcut(QKeySequence("Space"), self).activated.connect(self.pause_button.toggle)
+        bind_space(self, self.pause_button.toggle)
         QShortcut(QKeySequence("F1"), self).activated.connect(open_guide)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.step)

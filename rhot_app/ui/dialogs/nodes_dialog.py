@@ -26,6 +26,7 @@ from rhot_app.sources.discovery import FoundNode
 from rhot_app.sources.pairing import PAIRING_PORT, NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig, look_for_nodes, pair_node
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.dialogs.found_nodes import Find, FoundNodes
 from rhot_app.ui.models.palette import Scheme
@@ -63,7 +64,7 @@ class NodesDialog(QDialog):
         self.hosts: list[QLineEdit] = []
         self.ports: list[QSpinBox] = []
         self._marks: list[ShapeMark] = []
-        self.replies: list[QLabel] = []
+        self.replies: list[Sentence] = []
         self.pair_buttons: list[QPushButton] = []
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
@@ -94,8 +95,7 @@ class NodesDialog(QDialog):
         buttons.addStretch(1)
         buttons.addWidget(cancel)
         buttons.addWidget(self.save_button)
-        self.verdict = QLabel("")
-        self.verdict.setWordWrap(True)
+        self.verdict = Sentence(2)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(16)
@@ -128,7 +128,8 @@ class NodesDialog(QDialog):
                 self.choose(side, named[0])
 
     def _add_row(self, grid: QGridLayout, row: int, side: str) -> None:
-        host, port, mark, reply = QLineEdit(), QSpinBox(), ShapeMark(14), QLabel("not asked yet")
+        host, port, mark, reply = QLineEdit(), QSpinBox(), ShapeMark(14), Sentence(2, muted=True)
+        reply.setText("not asked yet")
         host.setPlaceholderText(f"e.g. 192.168.1.{10 + row}")
         host.setAccessibleName(f"Address of the {side} node")
         host.setMinimumWidth(180)
@@ -140,9 +141,6 @@ class NodesDialog(QDialog):
         port.setToolTip("Where the node says who it is. The default is right unless its settings file says otherwise.")
         port.setAccessibleName(f"Pairing port of the {side} node")
         port.valueChanged.connect(self._forget_answers)
-        reply.setWordWrap(True)
-        reply.setTextFormat(Qt.TextFormat.PlainText)  # it has the node's own words in it
-        reply.setProperty("muted", True)
         mark.set_shape("square", self._scheme.neutral)
         pair = QPushButton("Pair …")
         pair.setEnabled(False)
@@ -264,9 +262,7 @@ class PairDialog(QDialog):
         self.code.setAccessibleName("Pairing code")
         self.code.setMaxLength(40)
         self.code.textChanged.connect(self._show_whether_complete)
-        self.verdict = QLabel("")
-        self.verdict.setWordWrap(True)
-        self.verdict.setMinimumHeight(54)
+        self.verdict = Sentence(3)
         self.pair_button = QPushButton("Pair")
         self.pair_button.setDefault(True)
         self.pair_button.setEnabled(False)

@@ -16,10 +16,12 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QPushButton,
+    QStackedWidget,
     QWidget,
 )
 
 from rhot_app.project import OutputSettings
+from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.models.outputs import OutputRow
 from rhot_app.ui.models.palette import Scheme
@@ -48,10 +50,10 @@ class OutputCard(QFrame):
         self.change_button, self.remove_button = QPushButton("Change …"), QPushButton("Remove")
         self.change_button.setToolTip("Another target, other joints, another rate: in the form below.")
         self.remove_button.setToolTip("Close it and take it out of the rig; Undo brings it back.")
-        self.message_label = QLabel()
-        self.message_label.setTextFormat(Qt.TextFormat.PlainText)
-        self.message_label.setWordWrap(True)
-        self.message_label.setProperty("muted", True)
+        self.message_label = Sentence(2, muted=True)
+        self.said = QStackedWidget()  # what has to be said stands where else the details do, so that no card grows
+        self.said.addWidget(self.detail_label)
+        self.said.addWidget(self.message_label)
         self.url_edit, self.copy_button = QLineEdit(), QPushButton("Copy")
         self.url_edit.setReadOnly(True)
         self.url_edit.setToolTip("Where to connect. The web view's address has a secret in it: whoever knows it sees "
@@ -76,17 +78,16 @@ class OutputCard(QFrame):
         head.addWidget(self.title_label, 1)
         head.addWidget(self.mark)
         head.addWidget(self.status_label)
-        line.addWidget(self.detail_label, 1)
+        line.addWidget(self.said, 1)
         line.addWidget(self.change_button)
         line.addWidget(self.remove_button)
         self.below = QWidget()
         below = QGridLayout(self.below)
         below.setContentsMargins(0, 0, 0, 0)
         below.setColumnStretch(0, 1)
-        below.addWidget(self.message_label, 0, 0, 1, 2)
-        below.addWidget(self.url_edit, 1, 0)
-        below.addWidget(self.copy_button, 1, 1)
-        below.addWidget(self.code_label, 0, 2, 2, 1, Qt.AlignmentFlag.AlignTop)
+        below.addWidget(self.url_edit, 0, 0)
+        below.addWidget(self.copy_button, 0, 1)
+        below.addWidget(self.code_label, 0, 2, Qt.AlignmentFlag.AlignTop)
         grid.addWidget(self.switch, 0, 0)
         for row, part in enumerate((head, line)):
             grid.addLayout(part, row, 1)
@@ -104,10 +105,8 @@ class OutputCard(QFrame):
             self.url_edit.setCursorPosition(0)
             if row.url.startswith("https:"):  # others can open it; nobody photographs an address of this computer only
                 self.code_label.setPixmap(qr_code(row.url, _QR_PX))
-        self.below.setVisible(bool(row.message or row.url))
-        self.message_label.setVisible(bool(row.message))
-        self.url_edit.setVisible(bool(row.url))
-        self.copy_button.setVisible(bool(row.url))
+        self.said.setCurrentWidget(self.message_label if row.message else self.detail_label)
+        self.below.setVisible(bool(row.url))
         self.code_label.setVisible(row.url.startswith("https:"))
 
 

@@ -29,6 +29,7 @@ from rhot_app.outputs.spec import OPENXR_ONLY
 from rhot_app.project import OutputSettings, Rig
 from rhot_app.ui.backend.contract import Asker, Opened
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.output_card import OutputCard
 from rhot_app.ui.models.outputs import (
     EMPTY,
@@ -73,13 +74,15 @@ class OutputsDialog(QDialog):
         self._job: Job | None = None
         self._changing: OutputSettings | None = None  # the one that the form changes
         self.cards: list[OutputCard] = []
-        self.empty_label = _sentence(EMPTY)
+        self.empty_label = QLabel(EMPTY)
+        self.empty_label.setWordWrap(True)
+        self.empty_label.setProperty("muted", True)
         self.form_title = QLabel()
         self.form_title.setProperty("title", True)
         self.kind_box, self.joints_box = QComboBox(), QComboBox()
-        self.kind_label, self.target_edit, self.rate_box = _sentence(), QLineEdit(), QDoubleSpinBox()
+        self.kind_label, self.target_edit, self.rate_box = Sentence(3, muted=True), QLineEdit(), QDoubleSpinBox()
         self.add_button, self.cancel_button = QPushButton("Add"), QPushButton("Cancel")
-        self.sentence = _sentence(muted=False)
+        self.sentence = Sentence(3)
         self.undo_button, self.close_button = QPushButton("Undo"), QPushButton("Close")
         self._fill_form()
         self._lay_out()
@@ -341,10 +344,3 @@ def _heard(settings: OutputSettings | None) -> OutputSettings | None:
 def _capital(sentence: str) -> str:
     return sentence[:1].upper() + sentence[1:]
 
-
-def _sentence(text: str = "", *, muted: bool = True) -> QLabel:
-    label = QLabel(text)
-    label.setWordWrap(True)
-    label.setTextFormat(Qt.TextFormat.PlainText)
-    label.setProperty("muted", muted)
-    return label

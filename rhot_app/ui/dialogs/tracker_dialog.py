@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 from PySide6.QtCore import Qt, QTimer, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtGui import QKeySequence, QShortcut, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -18,6 +18,8 @@ from PySide6.QtWidgets import (
     QLabel,
     QPushButton,
     QRadioButton,
+    QScrollArea,
+    QStackedWidget,
     QVBoxLayout,
     QWidget,
 )
@@ -28,6 +30,7 @@ from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, e
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.models.proposal import RigChange, progress_text
 from rhot_app.ui.models.words import (
     FLAT_MEANING,
@@ -44,7 +47,7 @@ from rhot_app.ui.models.words import (
 )
 
 LOOK_MS = 150
-_WIDTH_PX = 460
+_WIDTH_PX, _FRAME_PX = 460, 48  # the window's title
 
 
 class TrackerDialog(QDialog):
@@ -66,21 +69,23 @@ class TrackerDialog(QDialog):
         self._made: list[RigChange] = []
         self._job: Job | None = None
         self.kinds = {kind: QRadioButton(title) for kind, (title, _) in KINDS.items()}
-        self.ik_box, self.ik_words = _choices(IK_METHODS), _sentence()
-        self.observe_box, self.observe_words = _choices(OBSERVED), _sentence()
-        self.variant_box, self.variant_words = _choices(VARIANTS), _sentence()
-        self.limits_box, self.limits_words = _choices(LIMITS), _sentence()
+        self.ik_box, self.ik_words = _choices(IK_METHODS), Sentence(2, muted=True)
+        self.observe_box, self.observe_words = _choices(OBSERVED), Sentence(2, muted=True)
+        self.variant_box, self.variant_words = _choices(VARIANTS), Sentence(2, muted=True)
+        self.limits_box, self.limits_words = _choices(LIMITS), Sentence(2, muted=True)
         self.size_check = QCheckBox("Estimate the hand's size")
         self.size_check.setToolTip(SIZE_MEANING)
         self.flat_check = QCheckBox("Flat, for the 3-D mouse")
         self.flat_check.setToolTip(FLAT_MEANING)
-        self.size_label = _sentence()
+        self.size_label = Sentence(2, muted=True)
         self.size_button = QPushButton("Use this size for the rig's hand")
         self.size_button.setToolTip("Makes every length of the rig's hand so much larger or smaller. What was there is "
                                     "kept.")
-        self.size_label.hide()
-        self.size_button.hide()
-        self.obstacle_label, self.sentence = _sentence(muted=False), _sentence(muted=False)
+        policy = self.size_button.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.size_button.setSizePolicy(policy)
+        self.obstacle_label, self.sentence = QLabel(), Sentence(3)
+        self.obstacle_label.setWordWrap(True)
         self.undo_button, self.close_button = QPushButton("Undo"), QPushButton("Close")
         self.undo_button.setToolTip("Take the last change back (Ctrl+Z).")
         self._lay_out()
@@ -93,27 +98,41 @@ class TrackerDialog(QDialog):
     # -- putting it together ---------------------------------------------------------------------------------------
 
     def _lay_out(self) -> None:
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(8)
+        choices, area = QWidget(), QScrollArea()
+        column = QVBoxLayout(choices)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(8)
         for kind, (_, meaning) in KINDS.items():
-            words = _sentence()
-            words.setText(meaning)
+            words = QLabel(meaning)
+            words.setWordWrap(True)
+            words.setProperty("muted", True)
             words.setContentsMargins(24, 0, 0, 0)
-            layout.addWidget(self.kinds[kind])
-            layout.addWidget(words)
+            column.addWidget(self.kinds[kind])
+            column.addWidget(words)
         self.obstacle_label.setContentsMargins(24, 0, 0, 0)
-        layout.addWidget(self.obstacle_label)
+        column.addWidget(self.obstacle_label)
         self.solver = _form((("Fingers bent by", self.ik_box), ("", self.ik_words)))
         self.details = _form((
             ("Tracked by", self.observe_box), ("", self.observe_words),
             ("Fingers", self.variant_box), ("", self.variant_words), ("Limits", self.limits_box),
             ("", self.limits_words), ("Hand", self.flat_check),
             ("Size", self.size_check), ("", self.size_label), ("", self.size_button)))
-        layout.addWidget(self.solver)
-        layout.addWidget(self.details)
+        self._forms = QStackedWidget()
+        for form in (self.solver, self.details):
+            self._forms.addWidget(form)
+        column.addWidget(self._forms)
+        column.addStretch(1)
+        area.setProperty("clear", True)
+        area.setWidget(choices)
+        area.setWidgetResizable(True)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._choices, self._area = choices, area
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(8)
+        layout.addWidget(area, 1)
         layout.addWidget(self.sentence)
-        layout.addStretch(1)
         buttons = QHBoxLayout()
         buttons.addWidget(self.undo_button)
         buttons.addStretch(1)
@@ -206,7 +225,6 @@ class TrackerDialog(QDialog):
                 work(asker)
 
         self.sentence.setText(progress_text(rig))
-        self._fit()
         self._job = Job(lambda progress: with_engine(), lambda _: done(), self._failed, None, self).start()
         self._enable()
 
@@ -259,26 +277,16 @@ class TrackerDialog(QDialog):
         obstacle = estimator_obstacle(self._rig)
         self.obstacle_label.setText("" if obstacle is None else f"{obstacle.why} {obstacle.remedy}")
         self.obstacle_label.setVisible(bool(self.obstacle_label.text()))
-        self.solver.setVisible(settings.kind == "classic")
-        self.details.setVisible(settings.kind != "classic")
+        self._forms.setCurrentWidget(self.solver if settings.kind == "classic" else self.details)
         self._enable()
         self.look()
-        self._fit()
 
-    def _fit(self) -> None:
-        """As tall as its sentences, which wrap, need it; moved up where it would leave the screen."""
-        layout = self.layout()
-        if layout is not None:
-            for part in (self.solver, self.details):
-                inner = part.layout()
-                if inner is not None:
-                    inner.invalidate()  # what has just been shown or hidden there counts now, not with the next event
-                    inner.activate()
-            layout.activate()
-            self.setFixedHeight(layout.totalHeightForWidth(_WIDTH_PX))
-            below_px = self.frameGeometry().bottom() - self.screen().availableGeometry().bottom()
-            if self.isVisible() and below_px > 0:
-                self.move(self.x(), self.y() - below_px)
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """As high as its largest form needs, for good; on a small screen the choices scroll, the buttons do not."""
+        super().showEvent(event)
+        others_px = self.sizeHint().height() - self._area.sizeHint().height()
+        needed_px = self._choices.heightForWidth(_WIDTH_PX - 32) + others_px
+        self.setFixedHeight(min(needed_px, self.screen().availableGeometry().height() - _FRAME_PX))
 
     def _enable(self) -> None:
         resting = self._job is None
@@ -300,11 +308,8 @@ class TrackerDialog(QDialog):
         state = self._hand()
         text = size_text(state, self._rig)
         self.size_button.setEnabled(size_settled(state))
-        if text != self.size_label.text():
-            self.size_label.setText(text)
-            self.size_label.setVisible(bool(text))
-            self.size_button.setVisible(bool(text))
-            self._fit()
+        self.size_label.setText(text)
+        self.size_button.setVisible(bool(text))
 
 
 def _form(rows: Sequence[tuple[str, QWidget]]) -> QWidget:
@@ -325,10 +330,3 @@ def _choices(words: dict[str, tuple[str, str]]) -> QComboBox:
         box.addItem(title, name)
         box.setItemData(box.count() - 1, meaning, Qt.ItemDataRole.ToolTipRole)
     return box
-
-
-def _sentence(*, muted: bool = True) -> QLabel:
-    label = QLabel()
-    label.setWordWrap(True)
-    label.setProperty("muted", muted)
-    return label

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QBoxLayout,
     QComboBox,
@@ -22,6 +21,7 @@ from PySide6.QtWidgets import (
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.handfit.session import HandFit
 from rhot_app.handfit.solve import Freedom
+from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.handfit.number_form import NumberForm
 from rhot_app.ui.handfit.picture import FitPicture
 from rhot_app.ui.models.palette import Scheme
@@ -85,11 +85,7 @@ class FitFrame:
                                   "Calibrate, Bring back an earlier calibration restores it.")
         self.close_button, self.cancel_button = _button("Close", "Escape."), _button("Cancel", "Give the search up.")
         self.errors = QLabel()
-        self.sentence = QLabel()
-        self.sentence.setWordWrap(True)
-        self.sentence.setMinimumHeight(2 * self.sentence.fontMetrics().height())
-        self.sentence.setAlignment(Qt.AlignmentFlag.AlignVCenter)
-
+        self.sentence = Sentence(2)
         self.take_button.setVisible(live)
         self.use_button.setVisible(kept.use is not None)
         if kept.out is not None:

@@ -6,7 +6,7 @@ from typing import Final
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QLineEdit, QMessageBox, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMessageBox, QWidget
 
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import JOINTS
@@ -14,6 +14,7 @@ from rhot_app.handfit.quantities import Number
 from rhot_app.handfit.session import HandFit
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.keys import bind_space
 from rhot_app.ui.handfit.changes import Changes
 from rhot_app.ui.handfit.frame import FitFrame, Kept
 from rhot_app.ui.handfit.instants import TITLE, Instants, LiveCameras
@@ -72,7 +73,8 @@ class HandFitWindow(QDialog):
                 (frame.save_button, changes.save), (frame.use_button, changes.use), (frame.close_button, self.reject),
                 (frame.cancel_button, changes.cancel)):
             button.clicked.connect(lambda checked=False, action=action: action())
-        for key, action in (("Space", self._press_space), ("Ctrl+O", instants.choose_pictures),
+        bind_space(self, instants.take_pictures)
+        for key, action in (("Ctrl+O", instants.choose_pictures),
                             ("Ctrl+S", changes.save), ("Ctrl+Z", self._undo_key), ("Ctrl+Shift+Z", changes.redo),
                             ("Ctrl+Y", changes.redo), ("Ctrl+Return", changes.fit_to_anchors),
                             ("Ctrl+Shift+Return", changes.fit_to_contours), ("F", instants.frame_hand),
@@ -180,16 +182,6 @@ class HandFitWindow(QDialog):
         self.frame.arrange(self.width(), self.height())
 
     # -- keys and the end ------------------------------------------------------------------------------------------
-
-    def _press_space(self) -> None:
-        """Take pictures, unless the key means something where the focus is."""
-        focus = QApplication.focusWidget()
-        if isinstance(focus, QAbstractButton):
-            focus.click()
-        elif isinstance(focus, QComboBox):
-            focus.showPopup()
-        else:
-            self._instants.take_pictures()
 
     def _undo_key(self) -> None:
         focus = QApplication.focusWidget()

@@ -20,6 +20,7 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Listener
 from rhot_app.ui.backend.live import SILENCE_S
+from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.pacing import FramePacer
@@ -96,10 +97,7 @@ class MouseWindow(QDialog):
         for button, label in self.words.items():
             label.setFont(app_font(_READOUT_PT))
             label.setToolTip(f"Pressed while the {button} is spread away from the hand.")
-        self.sentence = QLabel()
-        self.sentence.setWordWrap(True)
-        self.sentence.setMinimumHeight(2 * self.sentence.fontMetrics().height())
-        self.sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.sentence = Sentence(2)
 
     def _lay_out(self) -> None:
         top, below = QHBoxLayout(), QHBoxLayout()

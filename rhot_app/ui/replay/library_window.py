@@ -12,7 +12,7 @@ import msgspec
 from platformdirs import user_cache_path
 from PySide6.QtCore import QEvent, Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices, QKeySequence, QShortcut
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app.errors import RhotError
 from rhot_app.keys import load_master_keys
@@ -21,6 +21,7 @@ from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import Collected, collect_videos
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.job import Job, Progress
+from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import recordings_folder
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import Remaining
@@ -59,8 +60,7 @@ class LibraryWindow(QDialog):
         self._rig = rig
         self.empty = EmptyState("No recordings yet. Press Record, or R, while a rig is open.")
         self.table = RecordingTable(scheme)
-        self.sentence = QLabel()
-        self.sentence.setWordWrap(True)
+        self.sentence = Sentence(2)
         self.open_button = _button("Open", "Track the recording and play it (Enter).")
         self.rename_button = _button("Rename", "Call the recording something else (F2).")
         self.delete_button = _button("Delete", "Delete the recording; Undo brings it back until this page is closed "

@@ -9,9 +9,6 @@ from pathlib import Path
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
-    QAbstractButton,
-    QApplication,
-    QComboBox,
     QFileDialog,
     QMainWindow,
     QVBoxLayout,
@@ -23,6 +20,7 @@ from rhot_app.engine.status import Level
 from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.guide import GuideViewer
+from rhot_app.ui.common.keys import bind_space
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.recordings import LOG_FILTER, recordings_folder
 from rhot_app.ui.models.notice import Notice, TransientNotices
@@ -116,7 +114,8 @@ class ReplayWindow(QMainWindow):
         row.bookmark_asked.connect(self.ask_for_bookmark)
         for plot in self.parts.plots:
             plot.copied.connect(lambda sentence: self.tell("info", sentence))
-        for key, action in (("Space", self._press_space), ("Left", lambda: self.step(-1)),
+        bind_space(self, self.toggle)
+        for key, action in (("Left", lambda: self.step(-1)),
                             ("Right", lambda: self.step(1)), ("Home", lambda: self.seek(0.0)),
                             ("End", self.go_to_end), ("B", self.ask_for_bookmark), ("[", lambda: self._loop("begin")),
                             ("]", lambda: self._loop("end")), ("F", self.parts.scene.frame_hand),
@@ -191,16 +190,6 @@ class ReplayWindow(QMainWindow):
         self._show_name()
 
     # -- moving about ----------------------------------------------------------------------------------------------
-
-    def _press_space(self) -> None:
-        """Play or pause, unless the key means something where the focus is."""
-        focus = QApplication.focusWidget()
-        if isinstance(focus, QAbstractButton):
-            focus.click()
-        elif isinstance(focus, QComboBox):
-            focus.showPopup()
-        else:
-            self.toggle()
 
     def toggle(self) -> None:
         """Play or pause."""

@@ -12,6 +12,7 @@ from rhot_app.errors import EngineError
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Memory, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep, StepView
@@ -59,9 +60,7 @@ class SourcePage(Page):
         self.kind.currentIndexChanged.connect(self._choose)
         self.tracker.setPlaceholderText("the only one")
         self.tracker.setToolTip("Serial number, name or role. Empty: the only one.")
-        self.meaning = QLabel()
-        self.meaning.setWordWrap(True)
-        self.meaning.setProperty("muted", True)
+        self.meaning = Sentence(2, muted=True)
         self.connect_button = QPushButton("Connect")
         self.connect_button.setAutoDefault(False)
         self.connect_button.clicked.connect(self._connect)
@@ -91,7 +90,7 @@ class SourcePage(Page):
         self.source.kind = kind = self.source.kinds[index]
         self.meaning.setText(kind.meaning)
         self.detail.setPlaceholderText(kind.detail)
-        self.form.setRowVisible(self.detail, bool(kind.detail))
+        self.detail.setEnabled(bool(kind.detail))
 
     def _connect(self) -> None:
         self.source.detail, self.source.tracker = self.detail.text(), self.tracker.text()

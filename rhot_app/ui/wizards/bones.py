@@ -47,6 +47,7 @@ def make_plan(kit: Kit) -> Plan:
 _HEADS = ("bone", "length, mm", "± mm", "known")
 _SIDES = (("right", "Right hand"), ("left", "Left hand"))
 _ROW_PX = 30
+_BOX_PX = 120
 _LONGEST_MM = 400.0
 _ALPHA = {"measured": 150, "inferred": 60, "guessed": 110}
 
@@ -85,7 +86,9 @@ class EntryPage(Page):
         grid.setContentsMargins(16, 16, 16, 16)
         grid.setSpacing(8)
         for column, head in enumerate(("", "first bone", "second bone", "last bone, to the tip")):
-            grid.addWidget(QLabel(head), 0, column)
+            label = QLabel(head)
+            label.setWordWrap(True)
+            grid.addWidget(label, 0, column)
         for row, finger in enumerate(FINGERS):
             grid.addWidget(QLabel(finger), row + 1, 0)
             for k, name in enumerate(BONE_NAMES[3 * row:3 * row + 3]):
@@ -101,6 +104,7 @@ class EntryPage(Page):
         box.setSpecialValueText("not measured")
         box.setKeyboardTracking(False)
         box.setAccessibleName(name)
+        box.setMinimumWidth(_BOX_PX)
         box.setToolTip(f"{name.replace('.', ', ')}: from the middle of one joint to that of the next, finger bent. "
                        f"{self._entry.usual(name):.0f} mm in the hand now in use.")
         box.valueChanged.connect(lambda value: self._take(name, value))

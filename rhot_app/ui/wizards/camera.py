@@ -16,7 +16,7 @@ from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.models.proposal import NodeChange
 from rhot_app.ui.wizards.framework.control_row import ControlRow
-from rhot_app.ui.wizards.framework.page import AcceptPage, Page
+from rhot_app.ui.wizards.framework.page import AcceptPage, Page, shrinkable
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, Control, SettingsStep, Value
@@ -88,6 +88,7 @@ class CameraPage(Page):
         self.problem.setWordWrap(True)
         self.column.addWidget(self.which)
         self.column.addWidget(scroll, 1)
+        shrinkable(scroll)
         self.column.addWidget(self.problem)
         buttons = QHBoxLayout()
         buttons.addWidget(self.balance_button)

@@ -24,7 +24,7 @@ from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.colour_list import PaintList, PaintRow
 from rhot_app.ui.wizards.framework.control_row import ControlRow
-from rhot_app.ui.wizards.framework.page import AcceptPage, ChartView, Page
+from rhot_app.ui.wizards.framework.page import AcceptPage, ChartView, Page, shrinkable
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.camera_steps import Control, Value
@@ -145,6 +145,7 @@ class PickPage(Page):
         self.undo_button = _button("Undo", "Ctrl+Z. The last click back.")
         for widget in (self.list, self.mask_choice, self.hold, self.undo_button):
             self.column.addWidget(widget, 1 if widget is self.list else 0)
+        shrinkable(self.list)
         self.list.chosen.connect(self._choose)
         self.mask_choice.currentIndexChanged.connect(self._show)
         self.hold.clicked.connect(self._hold)
@@ -203,6 +204,7 @@ class BoundsPage(Page):
         self.again = _button("As learnt", "The chosen marker's bounds as they were learnt from the samples.")
         self.undo_button = _button("Undo", "Ctrl+Z. The last change back.")
         self.column.addWidget(self.list, 1)
+        shrinkable(self.list)
         for row in self.rows.values():
             self.column.addWidget(row)
             row.changed.connect(lambda value, goes_on, row=row: self._move(row.control, value, goes_on=goes_on))

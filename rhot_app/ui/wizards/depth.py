@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 from rhot_app.calibration.depth.table import DepthRow
 from rhot_app.errors import EngineError
 from rhot_app.ui.backend.feed import StateFeed
-from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page
+from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page, shrinkable
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.depth_steps import DistanceStep, LawStep, propose
@@ -86,6 +86,7 @@ class DistancePage(Page):
         self.column.addLayout(form)
         self.column.addWidget(self.take_button)
         self.column.addWidget(self.table, 1)
+        shrinkable(self.table)
         self.column.addWidget(self.remove_button)
         self.first_field = self.distance
         self._show_removable()

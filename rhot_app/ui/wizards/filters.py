@@ -21,7 +21,7 @@ from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.movement_page import MovementPage, Movements
-from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
+from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, shrinkable
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.movement import MovementStep
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
@@ -82,6 +82,7 @@ class MeterPage(MovementPage):
         caption.setProperty("muted", True)
         self.column.insertWidget(self.column.count() - 1, caption)
         self.column.insertWidget(self.column.count() - 1, self.table, 4)
+        shrinkable(self.table)
 
     def show_view(self, view: StepView) -> None:
         """The newest figures."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QAction, QIcon
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QLabel, QListWidget, QMenu, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QMenu, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app import rig_history
 from rhot_app.errors import EngineError, RhotError
@@ -21,6 +21,7 @@ from rhot_app.rig_history import Version
 from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import shape_icon
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.proposal import Proposal, age_text, in_force, set_rig
@@ -226,8 +227,7 @@ class VersionsDialog(QDialog):
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.currentRowChanged.connect(self._show_version)
         self.table = RowTable(scheme, ("", "now", "then"))
-        self.sentence = QLabel()
-        self.sentence.setWordWrap(True)
+        self.sentence = Sentence(2)
         self.back_button = QPushButton("Bring it back")
         self.back_button.setToolTip("Puts the chosen version into force. What is there now is kept, and can be brought "
                                     "back the same way.")

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QAbstractItemView, QCheckBox, QComboBox, QHeaderVi
 
 from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
-from rhot_app.ui.wizards.framework.page import AcceptPage, Page
+from rhot_app.ui.wizards.framework.page import AcceptPage, Page, shrinkable
 from rhot_app.ui.wizards.framework.plan import Kit, Memory, Plan
 from rhot_app.ui.wizards.models.board_form import fields_from
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
@@ -87,6 +87,7 @@ class LensResultPage(Page):
         self.column.addWidget(self.straighten)
         self.column.addWidget(self.square)
         self.column.addWidget(self.table, 1)
+        shrinkable(self.table)
         self._shown: object = None
 
     def _straighten(self, on: bool) -> None:

@@ -12,14 +12,16 @@ from PySide6.QtWidgets import (
     QMenu,
     QProgressBar,
     QPushButton,
+    QScrollArea,
     QSizePolicy,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
 )
 
+from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import ShapeMark, paint_shape
-from rhot_app.ui.common.theme import app_font
+from rhot_app.ui.common.theme import TEXT_PT, app_font
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.page import Page, VerdictView
 from rhot_app.ui.wizards.framework.picture_view import PictureWall
@@ -27,8 +29,11 @@ from rhot_app.ui.wizards.framework.plan import Plan
 from rhot_app.ui.wizards.framework.work import Work
 from rhot_app.ui.wizards.models.step import AcceptStep, Bar, Step, StepView
 
-SENTENCE_PT = 21.0
-"""Letters 5 mm high on a usual screen: readable from two metres."""
+SENTENCE_PT, SMALLEST_PT = 21.0, 13.0
+"""Letters 5 mm high on a usual screen, readable from two metres; a sentence of more than four lines gets smaller ones.
+"""
+
+_SENTENCE_LINES = 4
 
 _RIGHT_PX = 312
 _BELOW_PX = 168
@@ -44,15 +49,13 @@ class WizardFrame:
         self.middle = QStackedWidget()
         self.middle.addWidget(self.wall)
         self.middle.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
-        self.sentence = QLabel()
-        self.sentence.setFont(app_font(SENTENCE_PT, bold=True))
-        self.sentence.setWordWrap(True)
-        self.sentence.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
+        self.sentence = Sentence(_SENTENCE_LINES, size_pt=SENTENCE_PT, smallest_pt=SMALLEST_PT, bold=True)
         self.hint = QLabel()
         self.hint.setWordWrap(True)
+        self.hint.setTextFormat(Qt.TextFormat.PlainText)
         self.pages = QStackedWidget()
         for page in plan.pages:
-            self.pages.addWidget(page)
+            self.pages.addWidget(_scrolling(page))
             if page.centre is not None:
                 self.middle.addWidget(page.centre)
         self.bars = BarsView(scheme)
@@ -72,13 +75,24 @@ class WizardFrame:
         self.twin_button.hide()
         for button in (self.close_button, self.back_button, self.twin_button):
             button.setAutoDefault(False)
+        policy = self.close_button.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.close_button.setSizePolicy(policy)
         self._lay_out(parent)
+        self._keep_width(plan)
+
+    def _keep_width(self, plan: Plan) -> None:
+        """Next is as wide as its longest word, so that Back never comes under a mouse that presses it."""
+        words = {"Next", "Close", *(page.step.use_label for page in plan.pages if isinstance(page.step, AcceptStep))}
+        self.next_button.ensurePolished()
+        for word in sorted(words, key=len):
+            self.next_button.setText(word)
+            self.next_button.setMinimumWidth(max(self.next_button.minimumWidth(), self.next_button.sizeHint().width()))
 
     def _lay_out(self, parent: QWidget) -> None:
         right = QVBoxLayout()
         right.setSpacing(16)
         right.addWidget(self.sentence)
-        right.addWidget(self.hint)
         right.addWidget(self.pages, 1)
         holder = QWidget()
         holder.setFixedWidth(_RIGHT_PX)
@@ -97,7 +111,11 @@ class WizardFrame:
         lower.setSpacing(24)
         self.bars.setFixedWidth(_BARS_PX)
         lower.addWidget(self.bars, alignment=Qt.AlignmentFlag.AlignTop)
-        lower.addWidget(self.below, 1)
+        said = QVBoxLayout()
+        said.setSpacing(8)
+        said.addWidget(self.hint)
+        said.addWidget(self.below, 1)
+        lower.addLayout(said, 1)
         buttons = QHBoxLayout()
         buttons.addWidget(self.close_button)
         buttons.addWidget(self.twin_button)
@@ -119,7 +137,7 @@ class WizardFrame:
 
     def show_page(self, page: Page, number: int) -> None:
         """Another step: its controls, and its own middle or the pictures."""
-        self.pages.setCurrentWidget(page)
+        self.pages.setCurrentIndex(number)
         self.middle.setCurrentWidget(page.centre if page.centre is not None else self.wall)
         self.wall.set_pickable(page.pickable)
         self.wall.show_one_large(page.one_large)
@@ -152,6 +170,17 @@ class WizardFrame:
             self.next_button.setText("Next")
             self.next_button.setEnabled(view.may_go_on and not working)
             self.close_button.setVisible(True)
+
+
+def _scrolling(page: Page) -> QScrollArea:
+    """The page, as high as it needs to be: where a small window has less room it scrolls."""
+    area = QScrollArea()
+    area.setProperty("clear", True)
+    area.setWidgetResizable(True)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    area.setWidget(page)
+    return area
 
 
 # -- the steps at the left ---------------------------------------------------------------------------------------------
@@ -212,9 +241,7 @@ class WorkView(QWidget):
     def __init__(self, work: Work, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._work = work
-        self.label = QLabel()
-        self.label.setFont(app_font(14.0, bold=True))
-        self.label.setWordWrap(True)
+        self.label = Sentence(2, size_pt=14.0, smallest_pt=TEXT_PT, bold=True)
         self.bar = QProgressBar()
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
@@ -233,9 +260,9 @@ class WorkView(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.label)
+        layout.addStretch(1)
         layout.addWidget(self.bar)
         layout.addLayout(row)
-        layout.addStretch(1)
 
     def wanted(self, step: Step) -> bool:
         """Whether there is something to show for `step`."""

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QPushButton,
     QScrollArea,
+    QSizePolicy,
     QTableWidget,
     QTableWidgetItem,
     QVBoxLayout,
@@ -84,9 +85,12 @@ class AcceptPage(Page):
         self.note = QLabel()
         self.note.setWordWrap(True)
         self.note.setProperty("muted", True)
-        self.column.addWidget(self.note)
         self.column.addWidget(self.restore_button)
+        self.column.addWidget(self.note)
         self.column.addStretch(1)
+        policy = self.restore_button.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.restore_button.setSizePolicy(policy)
 
     def show_view(self, view: StepView) -> None:
         """The rows of the proposal, and the way back while there is one."""
@@ -98,6 +102,12 @@ class AcceptPage(Page):
         self.note.setText(f"Nothing was saved so far. {proposal.ways_back}" if proposal is not None else "")
         self.note.setVisible(self._accept.state == "proposed")
         self.restore_button.setVisible(self._accept.restorable)
+
+
+def shrinkable(part: QWidget, least_px: int = 96) -> None:
+    """A list or table of a page that takes the room that is left, and scrolls in it, before the page does."""
+    part.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
+    part.setMinimumHeight(least_px)
 
 
 class RowTable(QTableWidget):

@@ -7,11 +7,12 @@ import time
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QLineEdit, QMessageBox, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMessageBox, QWidget
 
 from rhot_app.ui.backend.feed import LiveFeed
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.keys import bind_space
 from rhot_app.ui.wizards.framework.frame import WizardFrame
 from rhot_app.ui.wizards.framework.page import AcceptPage
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
@@ -76,8 +77,8 @@ class WizardWindow(QDialog):
             page.changed.connect(self._page_changed)
             if isinstance(page, AcceptPage):
                 page.restore_asked.connect(self.restore)
-        for key, action in (("Alt+Left", self.back), ("F1", self.open_guide), ("Space", self._press_space),
-                            ("Ctrl+Z", self._undo)):
+        bind_space(self, self._capture)
+        for key, action in (("Alt+Left", self.back), ("F1", self.open_guide), ("Ctrl+Z", self._undo)):
             QShortcut(QKeySequence(key), self).activated.connect(action)
 
     # -- steps -----------------------------------------------------------------------------------------------------
@@ -196,14 +197,8 @@ class WizardWindow(QDialog):
 
     # -- keys ------------------------------------------------------------------------------------------------------
 
-    def _press_space(self) -> None:
-        """Capture, unless the key means something where the focus is."""
-        focus = QApplication.focusWidget()
-        if isinstance(focus, QAbstractButton):
-            focus.click()
-        elif isinstance(focus, QComboBox):
-            focus.showPopup()
-        elif self.step.captures and self.step.capture():
+    def _capture(self) -> None:
+        if self.step.captures and self.step.capture():
             self.refresh()
 
     def _undo(self) -> None:

@@ -1,0 +1,126 @@
+"""No button of a wizard moves when the sentence changes, and every sentence fits into its place."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+from fake_backend import InProcessSolver
+from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QApplication, QComboBox, QLineEdit, QMenu, QWidget
+from wizard_rig import FakeMemory, FakeRigAsker
+
+from rhot_app.project import load_rig
+from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.wizards import framework, steps
+from rhot_app.ui.wizards.framework.frame import WizardFrame
+from rhot_app.ui.wizards.framework.plan import WIZARDS, Kit, wizard_named
+from rhot_app.ui.wizards.framework.work import Work
+from rhot_app.ui.wizards.models.step import StepView
+from rhot_node.files import resource_path
+
+SIZES = ((1280, 800), (1024, 700))
+LONG = "The board is seen by neither camera, because it is too dark, too far away or turned too much. " * 4
+AIMS = (QAbstractButton, QComboBox, QLineEdit, QAbstractSpinBox)
+
+
+class Silence:
+    """A listener that hears nothing."""
+
+    def poll(self):
+        return []
+
+    def close(self):
+        pass
+
+
+@pytest.fixture
+def frame_of(themed):
+    """A function that lays out a wizard by its module's name, without processes; gives window, frame and plan."""
+    windows = []
+
+    def lay_out(module, size):
+        rig = load_rig(resource_path("rigs", "two_pis.json"))
+        asker = FakeRigAsker(rig)
+        asker.answers = {"refined": {"known": False}, "adapted": {"known": False}}
+        kit = Kit(rig, None, asker.connect, DARK, FakeMemory(), asker.told, Silence)
+        plan, window = wizard_named(module).make_plan(kit), QWidget()
+        frame = WizardFrame(plan, tuple(node.name for node in rig.nodes), Work(InProcessSolver(), window), DARK, window)
+        window.resize(*size)
+        window.show()
+        windows.append((window, plan))
+        return window, frame, plan
+
+    yield lay_out
+    for window, plan in windows:
+        window.hide()
+        if plan.put_back is not None:
+            plan.put_back()
+        window.deleteLater()
+
+
+def places(window):
+    """Where everything stands that a mouse may aim at."""
+    QApplication.processEvents()
+    return {(kind.__name__, number): part.mapTo(window, part.rect().topLeft()).toTuple()
+            for kind in AIMS for number, part in enumerate(window.findChildren(kind)) if part.isVisible()}
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("module", [one.module for one in WIZARDS])
+def test_nothing_moves_when_the_sentences_change(module, size, frame_of):
+    window, frame, plan = frame_of(module, size)
+    frame.offer_twin(QMenu(window))
+    for number, page in enumerate(plan.pages):
+        frame.show_page(page, number)
+        before = None
+        for sentence, hint in (("Wait.", ""), (LONG, ""), (LONG, LONG), ("Wait.", LONG)):
+            frame.show_view(StepView(sentence, hint=hint), page.step, number, [False] * len(plan.pages))
+            now = places(window)
+            assert before in (None, now), page.step.title
+            before = now
+        assert (window.width(), window.height()) == size
+
+
+def known_sentences():
+    """What the steps' views say in plain words: the first argument of StepView, and what methods called `_sentence`
+    and `sentence` return."""
+    for package in (steps, framework):
+        for path in sorted(Path(package.__path__[0]).glob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text())):
+                parts = []
+                if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "StepView" and node.args:
+                    parts = [node.args[0]]
+                elif isinstance(node, ast.FunctionDef) and node.name in ("_sentence", "sentence"):
+                    parts = [one.value for one in ast.walk(node) if isinstance(one, ast.Return) and one.value]
+                for one in (found for part in parts for found in ast.walk(part)):
+                    if isinstance(one, ast.Constant) and isinstance(one.value, str):
+                        yield one.value
+
+
+def test_every_sentence_is_seen_whole_in_a_small_window(frame_of):
+    sentences = set(known_sentences())
+    for one in WIZARDS:
+        *_, plan = frame_of(one.module, SIZES[-1])
+        sentences |= {page.step.view().sentence for page in plan.pages}
+    assert len(sentences) > 60
+    _, frame, plan = frame_of("lens", SIZES[-1])
+    frame.show_page(plan.pages[0], 0)
+    QApplication.processEvents()
+    for sentence in sorted(sentences):
+        frame.sentence.setText(sentence)
+        assert frame.sentence.whole, sentence
+
+
+def test_the_last_button_keeps_its_width_whatever_it_says(frame_of):
+    _, frame, plan = frame_of("lens", SIZES[0])
+    last = plan.pages[-1]
+    frame.show_page(last, len(plan.pages) - 1)
+    before = None
+    for state in ("proposed", "used", "restored"):
+        last.step.finish(state)
+        frame.show_view(last.step.view(), last.step, len(plan.pages) - 1, [False] * len(plan.pages))
+        QApplication.processEvents()
+        now = frame.next_button.geometry(), frame.back_button.geometry()
+        assert before in (None, now)
+        before = now
