@@ -9,15 +9,17 @@ import msgspec
 import numpy as np
 import pytest
 from bare_scenes import model_and_surface, poses, rig_of, scene
-from bench import START_S, TEST_S, Bench, node_status, states_of, wait_until
+from bench import START_S, TEST_S, Bench, messages_of, node_status, wait_until
 from shipped_rig import RIGHT_HAND
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.offline.replay_summary import replay_states
+from rhot_app.engine.status import Preview
 from rhot_app.hand.kinematics import forward
 from rhot_app.project import TrackerSettings
 from rhot_app.recording.raw_log import LogReader, RecordKind
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import HandState, SeenContour
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.capture.yuv import YuvWriter
 from rhot_node.detect.image import from_bgr
@@ -80,9 +82,16 @@ def test_a_bare_hand_is_tracked_by_what_its_nodes_find(bench: Bench) -> None:
         client.command("record", timeout_s=COMMAND_S, path=str(log))
         t0_ns = time.monotonic_ns() + 500_000_000
         write_atomically(begin, str(t0_ns).encode())
-        received = []
+        client.command("preview", on=True)
+        received, previews, contours = [], [], set()
         while time.monotonic_ns() < t0_ns + 1e9 * (len(ORDER) + 1) / FPS:
-            received += [(time.monotonic_ns(), state) for state in states_of(client, 0.05)]
+            for message in messages_of(client, 0.05):
+                if isinstance(message, HandState):
+                    received.append((time.monotonic_ns(), message))
+                elif isinstance(message, Preview):
+                    previews.append(message)
+                elif isinstance(message, SeenContour):
+                    contours.add((message.camera, message.t_node_ns))
         client.command("record_stop", timeout_s=COMMAND_S)
     model = model_and_surface()[0]
     moving = poses("grasp", TIMES)
@@ -100,6 +109,10 @@ def test_a_bare_hand_is_tracked_by_what_its_nodes_find(bench: Bench) -> None:
     assert rate_hz > 0.3 * FPS, "a busy machine may lose the hand once"
     assert np.median(errors_mm) < ERROR_MM
     assert np.median(ages_s) < STATE_AGE_S
+
+    found_ns = {camera: min(t_ns for name, t_ns in contours if name == camera) for camera, _ in contours}
+    shown = [(one.camera, one.t_node_ns) in contours for one in previews if one.t_node_ns >= found_ns[one.camera]]
+    assert np.mean(shown) > 0.3, "pictures come with the contour that was found in them"
 
     with contextlib.closing(LogReader(log)) as reader:
         records = list(reader)
