@@ -77,7 +77,7 @@ def fitted(folder: Path, unit_m: float) -> tuple[Rig, dict[int, HandPose]]:
     rig = msgspec.structs.replace(rig, hand=hand)
     with tempfile.TemporaryDirectory() as name:
         log = Path(name) / "hand.log"
-        write_landmark_log(log, rig, tables, 0.5 / FPS)
+        write_landmark_log(log, rig, tables)
         states = track(rig, log)
     begin_s = min(one.times_s[0] for one in tables)
     poses = {round((1e-9 * (state.t_master_ns - states[0].t_master_ns) + begin_s) * FPS):

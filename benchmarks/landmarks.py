@@ -1,6 +1,6 @@
 """How landmarks of a bare hand err, and what the estimator makes of them.
 
-    python benchmarks/landmarks.py [--data ../shared/data/bare_hand_stereo] [--unit-mm 40] [--seeds 2] [--json FILE]
+    python benchmarks/landmarks.py [--data ../shared/data/bare_hand_stereo] [--unit-mm 38.5] [--seeds 2] [--json FILE]
 
 First the recorded hand, if it is there: the errors of its landmarks about the hand that fits them (the source of the
 constants in `hand.landmarks`), then reprojection, jitter and lag of the tracked hand against plain triangulation of
@@ -53,7 +53,7 @@ def main() -> int:
     """Print the tables, write JSON."""
     parser = arguments(__doc__)
     parser.add_argument("--data", type=Path, default=DATA)
-    parser.add_argument("--unit-mm", type=float, default=40.0, help="a unit of the recording's calibration")
+    parser.add_argument("--unit-mm", type=float, default=38.5, help="a unit of the recording's calibration")
     parser.add_argument("--seeds", type=int, default=2, help="synthetic hands per row (default 2)")
     args = parser.parse_args()
     figures: dict[str, Any] = {}
@@ -193,7 +193,7 @@ def tracked(rig: Rig, tables: list[LandmarkTable], both: NDArray[np.int64], plac
     """Reprojection, jitter and lag of the estimator's hand."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "bare_hand.log"
-        write_landmark_log(log, rig, tables, 0.5 / FPS)
+        write_landmark_log(log, rig, tables)
         states = track(rig, log)
     first_ns, begin = states[0].t_master_ns, min(table.times_s[0] for table in tables)
     cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rhot_app.errors import RecordingError, input_file, positive_number
-from rhot_app.hand.landmarks import ANATOMY_SD_M, COMMON_M, LASTING_M, NOISE_M
+from rhot_app.errors import CalibrationError, RecordingError, input_file, positive_number
+from rhot_app.hand.landmarks import ANATOMY_SD_M, NOISE_M
 from rhot_app.progress import ProgressLine
 from rhot_node.landmarks import install_command
 from rhot_node.landmarks.install import LICENCE, PACKAGE
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 INSTALL = "install"
 
-MEDIAN_M = math.sqrt(2.0 * math.log(2.0) * (ANATOMY_SD_M**2 + LASTING_M**2 + COMMON_M**2 + NOISE_M**2))
+MEDIAN_M = math.sqrt(2.0 * math.log(2.0) * (ANATOMY_SD_M**2 + NOISE_M**2))
 """m: median distance of a landmark from its joint (`hand.landmarks`): a Rayleigh distribution's."""
 
 LARGE = 1.7
@@ -47,6 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="LOG", help="the raw log to write; a new file")
     parser.add_argument("--fps", type=positive_number, default=None, metavar="N",
                         help="frames per second of tables without times")
+    parser.add_argument("--bones", choices=("measured", "rig"), default="measured",
+                        help="the hand's bones: measured from the landmarks (default), or as the rig has them")
     parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
     add_examples(parser, "rhot landmarks left.csv right.csv --rig desk.json --fps 30 --out hand.rhotlog",
                  "rhot landmarks install")
@@ -85,15 +87,18 @@ def _write_log(args: argparse.Namespace) -> int:
     rig = with_tracker(load_rig(args.rig), "estimator")
     landmark_order(rig)
     tables = [read_landmark_table(path, args.fps) for path in args.tables]
-    counted = not all(table.timed for table in tables)
-    bound_s = 0.5 / args.fps if counted and args.fps is not None else 1e-5
-    frames = write_landmark_log(args.out, rig, tables, bound_s)
+    frames = write_landmark_log(args.out, rig, tables)
     announce_compilation()
-    summary: dict[str, Any] = {"log": str(args.out), "frames": frames} | summarise(rig, args.out)
+    bones = "The bones are the rig's."
+    if args.bones == "measured":
+        rig, bones = with_measured_bones(rig, args.out)
+        write_landmark_log(args.out, rig, tables)
+    summary: dict[str, Any] = {"log": str(args.out), "frames": frames, "bones": bones} | summarise(rig, args.out)
     if args.json:
         print(json.dumps(summary))
         return 0
     print(f"{args.out}: {frames} frames of {len(tables)} camera{'' if len(tables) == 1 else 's'}.")
+    print(bones)
     if not summary["tracked"]:
         print("No hand was found in them. Are the tables in the rig's order, and is the rig's hand of the right side?")
         return 0
@@ -108,6 +113,28 @@ def _write_log(args: argparse.Namespace) -> int:
     else:
         print("rhot export writes the hand for other programs; rhot calibrate bones measures its bones.")
     return 0
+
+
+def with_measured_bones(rig: Rig, path: Path) -> tuple[Rig, str]:
+    """The rig with the bones that the landmarks of a log show, if they are usable, and a sentence on them."""
+    import msgspec
+
+    from rhot_app.calibration.hand.bones import solve_bones
+    from rhot_app.calibration.hand.marker_places import tracks_of
+    from rhot_app.calibration.recorded_observations import read_instants
+
+    roles = {marker.id: marker.role for marker in rig.markers.markers if marker.role is not None}
+    try:
+        _, instants = read_instants(path, rig)
+        report = solve_bones(tracks_of(instants.times_s, instants.positions, rig.markers.ids, roles), rig.hand)
+    except (CalibrationError, RecordingError) as exc:
+        return rig, f"The bones are the rig's: {exc}"
+    if report.method != "landmarks":
+        return rig, "The bones are the rig's, as not all joints have a landmark."
+    if not report.verdict.acceptable:
+        return rig, f"The bones are the rig's. Those that the landmarks show: {report.verdict.sentence}"
+    hand = msgspec.structs.replace(report.hand, name=f"measured from {path.name}")
+    return msgspec.structs.replace(rig, hand=hand), f"Bones measured from the landmarks. {report.verdict.sentence}"
 
 
 def summarise(rig: Rig, path: Path) -> dict[str, Any]:

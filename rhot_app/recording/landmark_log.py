@@ -43,6 +43,7 @@ SIGMA_PX: Final = 0.3
 
 DIAMETER_PX: Final = 1.0  # a point has none
 _BEGIN_NS, _EXCHANGE_NS = 1_000_000_000_000, 500_000_000
+_BOUND_NS = 10_000  # of the times in a table
 _SESSION, _LONGEST_S = 1, 86_400.0
 _LARGEST_PX = 16_384.0
 
@@ -50,14 +51,12 @@ _LARGEST_PX = 16_384.0
 @dataclass(frozen=True, slots=True)
 class LandmarkTable:
     """One camera's landmarks in T frames: `times_s` (T,), ascending; `pixels` (T, 21, 2) px, raw image, NaN where there
-    is none; `scores` (T,) 0..1; `sigma_px` (T,), standard deviation that the detector states. `timed`: the times are
-    the file's, not counted frames."""
+    is none; `scores` (T,) 0..1; `sigma_px` (T,), standard deviation that the detector states."""
 
     times_s: Array
     pixels: Array
     scores: Array
     sigma_px: Array
-    timed: bool
 
 
 def read_landmark_table(path: Path, fps: float | None) -> LandmarkTable:
@@ -103,7 +102,7 @@ def _parse(path: Path, names: list[str], rows: Iterable[dict[str, str]], fps: fl
                         ((np.abs(pixels) > _LARGEST_PX).any(axis=(1, 2)), "a pixel in no image")):
         if wrong.any():
             raise RecordingError(f"{path}: line {int(np.argmax(wrong)) + 2} has {what}.")
-    return LandmarkTable(times, pixels, scores, sigma, timed)
+    return LandmarkTable(times, pixels, scores, sigma)
 
 
 def landmark_order(rig: Rig) -> list[int]:
@@ -116,24 +115,23 @@ def landmark_order(rig: Rig) -> list[int]:
     return order
 
 
-def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable], time_bound_s: float) -> int:
+def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable]) -> int:
     """Write one table per node as a raw log; returns the number of frames.
 
-    `time_bound_s`: half-width of the tables' time errors. Raises RecordingError when tables and nodes do not match, or
-    the file cannot be written.
+    Frames of tables without times are taken to be synchronous: those of one number are of one instant. Raises
+    RecordingError when tables and nodes do not match, or the file cannot be written.
     """
     if len(tables) != len(rig.nodes):
         raise RecordingError(f"rig {rig.name!r} has {len(rig.nodes)} cameras, but the landmark tables are "
                              f"{len(tables)}. Give one table for each, in the rig's order.")
     order, first_s = landmark_order(rig), min(table.times_s[0] for table in tables)
-    bound_ns = round(1e9 * time_bound_s)
     begin_ns = _BEGIN_NS + 10 * _EXCHANGE_NS
     last_ns = begin_ns + round(1e9 * (max(table.times_s[-1] for table in tables) - first_s)) + _EXCHANGE_NS
     stated = [Record(RecordKind.START, 0, _BEGIN_NS - 1, encode(Start(
         _SESSION, 0, tuple(StartEntry(node.node_id, 1, 0) for node in rig.nodes))))]
     for node, table in zip(rig.nodes, tables, strict=True):
         for sequence, t_ns in enumerate(range(_BEGIN_NS, last_ns, _EXCHANGE_NS)):
-            stated += _exchange(node, sequence, t_ns, bound_ns)
+            stated += _exchange(node, sequence, t_ns)
         for number, t_s in enumerate(table.times_s):
             stated.append(_datagram(node, rig, number, begin_ns + round(1e9 * (t_s - first_s)),
                                   _observations(node, order, table, number)))
@@ -146,12 +144,13 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable], ti
     return sum(len(table.times_s) for table in tables)
 
 
-def _exchange(node: RigNode, sequence: int, t_ns: int, bound_ns: int) -> list[Record]:
-    """A clock exchange of one clock, whose way takes as long as the times are uncertain."""
+def _exchange(node: RigNode, sequence: int, t_ns: int) -> list[Record]:
+    """A clock exchange of one clock, whose way takes as long as its times are uncertain."""
     request = ClockRequest(node.node_id, _SESSION, sequence, t_ns)
-    reply = ClockReply(node.node_id, _SESSION, sequence, t_ns, t_ns + bound_ns, t_ns + bound_ns, 1, NodeState.STREAMING)
+    heard_ns = t_ns + _BOUND_NS
+    reply = ClockReply(node.node_id, _SESSION, sequence, t_ns, heard_ns, heard_ns, 1, NodeState.STREAMING)
     return [Record(RecordKind.CLOCK_REQUEST, node.node_id, t_ns, encode(request)),
-            Record(RecordKind.CLOCK_REPLY, node.node_id, t_ns + 2 * bound_ns, encode(reply))]
+            Record(RecordKind.CLOCK_REPLY, node.node_id, t_ns + 2 * _BOUND_NS, encode(reply))]
 
 
 def _datagram(node: RigNode, rig: Rig, number: int, t_ns: int, markers: tuple[MarkerObservation, ...]) -> Record:

@@ -13,15 +13,15 @@ import msgspec
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from recorded_landmarks import FOLDER, needs_recording, recorded_nodes
 
 from rhot_app.__main__ import main
 from rhot_app.barehand.follower import HandFollower
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import RecordingError
 from rhot_app.export.bare_hand import lost_intervals
-from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.skeleton import JOINTS
-from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, load_rig, save_rig
+from rhot_app.project import Rig, load_rig, save_rig
 from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
 from rhot_app.simulator.bare_hand.sequence import BareHandFrame, BareHandOptions, bare_hand_frames, bare_hand_rig
 from rhot_app.sources.frame_sets import frame_sets, frames_left_out, on_one_clock, open_video
@@ -336,36 +336,11 @@ def test_lost_intervals_end_when_the_hand_is_there_again() -> None:
 
 # -- A real hand ------------------------------------------------------------------------------------------------------
 
-FOLDER = Path(__file__).parents[3] / "shared" / "data" / "bare_hand_stereo"
-SQUARE_M = 0.025
-"""The unit of the calibration is a chessboard square of unknown size."""
-
-
-def numbers(path: Path) -> list[list[float]]:
-    """Rows of numbers of a calibration file; a comment ends them."""
-    lines = path.read_text().partition("#")[0].splitlines()
-    return [[float(word) for word in line.split()] for line in lines if line.strip() and not line[0].isalpha()]
-
-
-def real_rig() -> Rig:
-    """The rig of the real videos, with the mean right hand."""
-    nodes = []
-    for c in range(2):
-        lens, place = numbers(FOLDER / f"c{c}.dat"), numbers(FOLDER / f"rot_trans_c{c}.dat")
-        left, _, right = np.linalg.svd(np.array(place[:3]))
-        rotation, shift = left @ right, SQUARE_M * np.array(place[3:6]).ravel()
-        w, x, y, z = quaternion_from_rotation(rotation.T).tolist()
-        tx, ty, tz = (-rotation.T @ shift).tolist()
-        k1, k2, p1, p2, k3 = lens[3]
-        nodes.append(RigNode(c + 1, f"c{c}", Intrinsics(720, 720, lens[0][0], lens[1][1], lens[0][2], lens[1][2],
-                                                        (k1, k2, p1, p2, k3)), CameraPose((w, x, y, z), (tx, ty, tz))))
-    return msgspec.structs.replace(bare_hand_rig(), nodes=tuple(nodes), calibration=None)
-
-
-@pytest.mark.skipif(not FOLDER.exists(), reason="../shared/data/bare_hand_stereo is not there")
+@needs_recording
 def test_real_videos_run_and_states_without_a_hand_have_no_numbers(tmp_path: Path,
                                                                    capsys: pytest.CaptureFixture[str]) -> None:
-    save_rig(tmp_path / "rig.json", real_rig())
+    rig = msgspec.structs.replace(bare_hand_rig(), nodes=recorded_nodes(), calibration=None)
+    save_rig(tmp_path / "rig.json", rig)
     arguments = ["bare-hand", "--rig", str(tmp_path / "rig.json"), "--unknown-size", "--json", "--out",
                  str(tmp_path / "hand.csv"), "--overlay", str(tmp_path / "pictures")]
     for c in range(2):

@@ -11,7 +11,7 @@ from shipped_markers import LANDMARKS21, RHOT6
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.landmarks import COMMON_M
+from rhot_app.hand.landmarks import NOISE_M
 from rhot_app.hand.model import build_model
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.places import LANDMARK_ROLES
@@ -92,15 +92,12 @@ def test_a_landmark_is_at_its_joint():
     np.testing.assert_allclose(frame.expected(state), lens.project(truth.joints()[0]), atol=1e-6)
 
 
-def test_rows_have_the_noise_that_all_landmarks_share():
-    """Whitened rows give the normal equations of the full covariance, whose Jacobian is by finite differences."""
+def test_each_landmark_errs_by_itself_in_proportion_to_its_distance():
+    """Whitened rows give the normal equations of each landmark's own noise, with a Jacobian by finite differences."""
     model, truth = compile_markers(RIG), hand()
     process, observations = model.process(), detected_landmarks(RIG, hand(), 1)[0]
-    bound_s = 0.01
-    frame = MarkerFrame(model, replace(observations, clock_bound_s=bound_s))
+    frame = MarkerFrame(model, observations)
     state = process.start(truth.worlds[0], truth.angles[0], (0.01, 0.1))[0]
-    rng = np.random.default_rng(2)
-    state[33:60] = rng.normal(0.0, 0.2, 27)  # velocity
     frame.add_landmark_noise(state)
     rows = frame.linearise(state)
 
@@ -111,12 +108,10 @@ def test_rows_have_the_noise_that_all_landmarks_share():
     jacobian = np.array([(seen(small * unit) - seen(-small * unit)) / (2 * small) for unit in np.eye(size)]).T
     covariance = np.zeros((42, 42))
     for m in range(21):
-        covariance[2 * m:2 * m + 2, 2 * m:2 * m + 2] = frame.covariances[m] + 0.02**2 * np.eye(2)
-    slopes = [jacobian[2 * m:2 * m + 2, :3] for m in range(21)]
-    px_per_m = [np.sqrt(np.linalg.norm(np.cross(slope[0], slope[1]))) for slope in slopes]
-    shift = COMMON_M * np.array([[px * axis, px * (1 - axis)] for px in px_per_m for axis in (1, 0)])
-    late = bound_s / np.sqrt(3.0) * (jacobian[:, :27] @ state[33:60])
-    covariance += shift @ shift.T + np.outer(late, late)
+        slope = jacobian[2 * m:2 * m + 2, :3]
+        px_per_m = np.sqrt(np.linalg.norm(np.cross(slope[0], slope[1])))
+        covariance[2 * m:2 * m + 2, 2 * m:2 * m + 2] = (
+            observations.covariances[m] + (0.02**2 + (NOISE_M * px_per_m) ** 2) * np.eye(2))
     error = (observations.pixels - frame.expected(state)).ravel()
     np.testing.assert_allclose(rows.jacobian.T @ rows.jacobian,
                                jacobian.T @ np.linalg.solve(covariance, jacobian), rtol=1e-3, atol=1.0)
@@ -138,9 +133,7 @@ def test_joints_are_better_than_triangulated_and_their_covariances_true(motion, 
     assert within.mean() >= (0.95 if bone_sd else 0.97)
 
 
-@pytest.mark.parametrize("least", [
-    0.7, pytest.param(0.95, marks=pytest.mark.xfail(strict=True, reason="the aim; the stated distance is too sure"))])
-def test_one_camera_keeps_the_hand_and_says_that_it_knows_the_distance_less(least):
+def test_one_camera_keeps_the_hand_and_says_that_it_knows_the_distance_less():
     frames = [frame for frame in detected_landmarks(RIG, hand(), 1)
               if frame.camera == 0 or frame.t_row0_master_ns < EPOCH_NS + 10**9]
     alone = [state for state in states_of(RIG, frames) if state.t_master_ns > EPOCH_NS + 17 * 10**8]
@@ -150,7 +143,7 @@ def test_one_camera_keeps_the_hand_and_says_that_it_knows_the_distance_less(leas
     along, across = line, np.array([0.0, 1.0, 0.0])
     depth = np.sqrt(np.einsum("i,njik,k->nj", along, covariances, along))
     assert depth.mean() > 1.5 * np.sqrt(np.einsum("i,njik,k->nj", across, covariances, across)).mean()
-    assert (np.abs(errors @ along) <= 3.0 * depth).mean() >= least
+    assert (np.abs(errors @ along) <= 3.0 * depth).mean() >= 0.95
     assert np.abs(errors @ along).max() < 0.15 * DISTANCE_M
 
 

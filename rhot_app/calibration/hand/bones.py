@@ -24,6 +24,7 @@ from rhot_app.calibration.hand.bones_report import (
 )
 from rhot_app.calibration.hand.bundle_model import POSE, Poses, expected, in_segments
 from rhot_app.calibration.hand.fit import fit_hand
+from rhot_app.calibration.hand.landmark_bones import are_landmarks, measure_bones
 from rhot_app.calibration.hand.marker_places import DISTAL, MarkerTracks
 from rhot_app.calibration.hand.shape import BONE_COUNT, HandUnknowns
 from rhot_app.calibration.time.tracks import smooth
@@ -39,11 +40,14 @@ Array = NDArray[np.float64]
 def solve_bones(tracks: MarkerTracks, base: HandAnatomy, *, progress: Progress = silent) -> BonesReport:
     """The hand that wore these markers. `base` gives side, name, limits, and the proportions to begin from.
 
-    Markers whose coordinates outnumber a pose's unknowns show single bones; fewer show size and reaches. Raises
+    Landmarks of all joints show every bone by itself. Markers whose coordinates outnumber a pose's unknowns show single
+    bones; fewer show size and reaches. Raises
     CalibrationError when the recording holds no hand at all.
     """
     if len(tracks.times_s) < 2:
         raise CalibrationError("the recording is empty: no instant shows the markers.")
+    if are_landmarks(tracks):
+        return measure_bones(tracks, base)
     if 3 * len(tracks.places) > POSE:
         return _by_movement(tracks, base, progress)
     return _by_reach(tracks, base, progress)

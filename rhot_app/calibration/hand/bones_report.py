@@ -87,7 +87,8 @@ class RigidDistance:
 class BonesReport:
     """The result: a hand file and its uncertainty.
 
-    `method`: "movement" (all lengths from many markers), "reach" (size and reaches from few), "entered" (by hand).
+    `method`: "landmarks" (each bone's median), "movement" (all lengths from many markers), "reach" (size and reaches
+    from few), "entered" (by hand).
     `size` compares the hand with the base hand by the reach of its four fingers, `size_std` its deviation.
     `residual_mm`: rms per axis of the markers about the fitted hand; `noise_mm` of the tracks; `error_mm` beyond it;
     None where nothing was fitted.

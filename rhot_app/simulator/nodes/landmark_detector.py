@@ -18,7 +18,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
-from rhot_app.hand.landmarks import ANATOMY_SD_M, COMMON_M, LASTING_M, LASTING_S, NOISE_M
+from rhot_app.hand.landmarks import LASTING_S
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettings
@@ -38,12 +38,14 @@ _DEGREES = 4.0  # of freedom of a landmark's own error
 
 @dataclass(frozen=True, slots=True)
 class LandmarkErrors:
-    """Standard deviations per axis, m at the hand; see `hand.landmarks`. `painted_px`: of painted markers, px."""
+    """Standard deviations per axis, m at the hand, of a recorded hand (`python benchmarks/landmarks.py`). `anatomy`: of
+    a landmark's mean place about its joint; `lasting`: of the error of one camera that lasts; `common`: of the error
+    that all landmarks of a frame share; `noise`: of a landmark's own error. `painted_px`: of painted markers, px."""
 
-    anatomy: float = ANATOMY_SD_M
-    lasting: float = LASTING_M
-    common: float = COMMON_M
-    noise: float = NOISE_M
+    anatomy: float = 3e-3
+    lasting: float = 2e-3
+    common: float = 1e-3
+    noise: float = 1.3e-3
     painted_px: float = 0.1
 
 

@@ -18,7 +18,7 @@ from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import CONFUSED_PX, PASSES, BareHandTracker
 from rhot_app.estimation.filter import IteratedFilter, Knot, update
 from rhot_app.estimation.residual import Residual
-from rhot_app.hand.landmarks import LASTING_M, LASTING_S
+from rhot_app.hand.landmarks import LASTING_S
 from rhot_app.hand.motion.hand_process import BIAS_S, FASTEST, MOTION, PALM_SPREAD, POSE, HandProcess
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
@@ -197,7 +197,7 @@ class MarkersOfHand:
         m = sized(self._markers, self._hand.surface.bone, state)
         bias = np.empty((len(m.finger), 3, 3))
         triangulation_covariance(without_shape(state), m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX,
-                                 np.where(m.landmark, LASTING_M, 0.0), m.paint_variance, bias)
+                                 m.paint_variance, bias)
         self._process.set_bias(np.concatenate([self._shape, bias]))
 
 

@@ -16,7 +16,7 @@ from rhot_app.estimation.residual import stack
 from rhot_app.geometry.camera import pixels_per_metre, project_with_slope, undistort_points
 from rhot_app.geometry.transforms import fit_rigid, rigid
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
-from rhot_app.hand.landmarks import LASTING_M, NOISE_M
+from rhot_app.hand.landmarks import NOISE_M
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY, HandProcess
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
@@ -149,7 +149,7 @@ class Starter:
     def _fit_all(self, markers: Array, pose: HandPose) -> HandPose:
         """The pose that all markers (M, 3) m make the most plausible, by a descent from `pose`."""
         m, world, angles = self._markers, pose.world_from_palm.copy(), pose.angles.copy()
-        variance = m.paint_variance + np.where(m.landmark, LASTING_M**2 + NOISE_M**2, _TARGET_SD_M**2)
+        variance = m.paint_variance + np.where(m.landmark, NOISE_M**2, _TARGET_SD_M**2)
         posture = Posture(m.dh, m.limits, m.pose_prior.mean, m.pose_prior.information)
         implausibility(posture, markers, np.eye(3) / variance[:, None, None], 0.0, world, angles)
         return HandPose(world, angles)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.estimation.filter import IteratedFilter
-from rhot_app.hand.landmarks import LASTING_M, LASTING_S
+from rhot_app.hand.landmarks import LASTING_S
 from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
@@ -212,8 +212,8 @@ class Estimator:
 
     def _note_bias(self, state: Array) -> None:
         m, bias = self._markers, np.empty((len(self._markers.finger), 3, 3))
-        triangulation_covariance(state, m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX,
-                                 np.where(m.landmark, LASTING_M, 0.0), m.paint_variance, bias)
+        triangulation_covariance(state, m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX, m.paint_variance,
+                                 bias)
         self._process.set_bias(bias)
 
 

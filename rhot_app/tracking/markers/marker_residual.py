@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rhot_app.estimation.residual import UNIT, Rows, student
 from rhot_app.geometry.camera import is_wide, pixels_per_metre, project_with_slope
 from rhot_app.hand.kinematics import direction_jacobian, forward_arrays, jacobian_arrays
-from rhot_app.hand.landmarks import COMMON_M, NOISE_M
+from rhot_app.hand.landmarks import NOISE_M
 from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
 from rhot_app.tracking.markers.marker_model import MarkerModel, project_marker
 from rhot_app.tracking.tracker import CameraObservations
@@ -55,7 +55,6 @@ class MarkerFrame:
         self.t_ns = observations.t_row0_master_ns + int(mean_row * observations.row_time_ns)
         self.row_s = 1e-9 * observations.row_time_ns
         self.late_s = np.where(self.seen, (rows - mean_row) * self.row_s, 0.0)
-        self.time_sd = observations.clock_bound_s / math.sqrt(3.0)  # of a uniform error
         self.pixels, self.covariances = observations.pixels, observations.covariances
         self.diameters, self.flags = observations.diameters, observations.flags
         self.log_width, self.size_sd = np.full(len(rows), np.nan), np.full(len(rows), SIZE_SD)
@@ -69,7 +68,7 @@ class MarkerFrame:
         rows, observations = _linearise(
             state, m.dh, m.half_axes, m.poses[self.camera], m.intrinsics[self.camera], self.seen, self.pixels,
             self.covariances, self.late_s, m.slender, self.log_width, self.size_sd, self.diameters, self.row_s,
-            np.where(m.landmark, COMMON_M, 0.0), self.time_sd, error, jacobian, first)
+            m.landmark, error, jacobian, first)
         return Rows(error[:rows], jacobian[:rows], UNIT, CENTROID_KERNEL, first[:observations])
 
     def predict_pixels(self, state: Array, covariance: Array) -> tuple[Array, Array]:
@@ -77,7 +76,7 @@ class MarkerFrame:
         m, count = self.markers, len(self.seen)
         pixels, covariances = np.empty((count, 2)), np.empty((count, 2, 2))
         _predict_pixels(state, covariance, m.dh, m.half_axes, m.poses[self.camera], m.intrinsics[self.camera],
-                        self.late_s, np.where(m.landmark, COMMON_M, 0.0), self.time_sd, pixels, covariances)
+                        self.late_s, pixels, covariances)
         return pixels, covariances
 
     def add_landmark_noise(self, state: Array) -> None:
@@ -159,9 +158,9 @@ def _moved(state, m, late, points, jacobian, place):
 
 @njit(cache=True)
 def _linearise(state, dh, half_axes, pose, intrinsics, seen, pixels, covariances, late_s, slender, log_width,
-               size_sd, diameters, row_s, common_m, time_sd, error, out, first):
+               size_sd, diameters, row_s, landmark, error, out, first):
     count = seen.shape[0]
-    shift, joint_pixel, at_joint = np.zeros((error.shape[0], 3)), np.empty(2), np.empty((2, 3))
+    joint_pixel, at_joint = np.empty(2), np.empty((2, 3))
     frames, points, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3)), np.empty((count, 3, POSE))
     world = _place(state, dh, frames, points, jacobian)
     pixel, slope, place, row = np.empty(2), np.empty((2, 3)), np.empty(3), np.empty((2, POSE))
@@ -178,7 +177,7 @@ def _linearise(state, dh, half_axes, pose, intrinsics, seen, pixels, covariances
         b = covariances[m, 0, 1] / a
         c = math.sqrt(max(covariances[m, 1, 1] + FLOOR_PX**2 - b * b, FLOOR_PX**2))
         at_joint[:] = slope
-        if common_m[m] > 0.0:  # a large bias goes with the residual: through its lever it would draw the hand nearer
+        if landmark[m]:  # a large bias goes with the residual: through its lever it would draw the hand nearer
             project_marker(points[m], world, half_axes[m], pose, intrinsics, joint_pixel, at_joint)
         for j in range(POSE):
             for r in range(2):
@@ -188,13 +187,6 @@ def _linearise(state, dh, half_axes, pose, intrinsics, seen, pixels, covariances
             row[1, j] = (row[1, j] - b * row[0, j]) / c
         error[used] = (pixels[m, 0] - pixel[0]) / a
         error[used + 1] = (pixels[m, 1] - pixel[1] - b * error[used]) / c
-        if common_m[m] > 0.0:
-            common_px = common_m[m] * pixels_per_metre(slope)
-            shift[used, 0], shift[used + 1, 1] = common_px / a, common_px / c
-            shift[used + 1, 0] = -common_px * b / (a * c)
-            for j in range(POSE):
-                shift[used, 2] += time_sd * row[0, j] * state[VELOCITY + j]
-                shift[used + 1, 2] += time_sd * row[1, j] * state[VELOCITY + j]
         for k in range(3):
             out[used, MOTION + 3 * m + k] = slope[0, k] / a
             out[used + 1, MOTION + 3 * m + k] = (slope[1, k] - b * slope[0, k] / a) / c
@@ -205,8 +197,6 @@ def _linearise(state, dh, half_axes, pose, intrinsics, seen, pixels, covariances
                 out[used + r, 2 * POSE + j] = 0.5 * late * late * row[r, j]
         first[observations] = used
         used, observations = used + 2, observations + 1
-    if common_m.max() > 0.0 and used > 0:
-        _marginalise(shift[:used], error[:used], out[:used])
     bone, line, change, turning = np.empty(3), np.empty(3), np.empty(3), np.empty((3, POSE))
     for m in range(count):
         if math.isnan(log_width[m]) or not seen[m]:
@@ -250,21 +240,6 @@ def _size_change(point, pose, intrinsics, line, distance, change):
     _, slopes = project_with_slope(near, pose, intrinsics)
     for i in range(3):
         change[i] = math.log(pixels_per_metre(slopes[2 * i]) / pixels_per_metre(slopes[2 * i + 1])) / (2.0 * step)
-
-
-@njit(cache=True)
-def _marginalise(shift, error, out):
-    """Whiten white rows (K,) and (K, n) that have `shift` (K, C) times C standard normal errors in common.
-
-    The covariance is 1 + S S'. Its symmetric root leaves each row with its own observation.
-    """
-    values, axes = np.linalg.eigh(np.dot(shift.T, shift))
-    for i in range(values.shape[0]):
-        if values[i] > 1e-12:
-            direction = np.dot(shift, axes[:, i].copy()) / math.sqrt(values[i])
-            less = 1.0 - 1.0 / math.sqrt(1.0 + values[i])
-            error -= less * np.dot(direction, error) * direction
-            out -= np.outer(direction, less * np.dot(direction, out))
 
 
 @njit(cache=True)
@@ -327,7 +302,7 @@ def _expected(state, dh, half_axes, pose, intrinsics, late_s, pixels):
 
 
 @njit(cache=True)
-def _predict_pixels(state, covariance, dh, half_axes, pose, intrinsics, late_s, common_m, time_sd, pixels, covariances):
+def _predict_pixels(state, covariance, dh, half_axes, pose, intrinsics, late_s, pixels, covariances):
     count = late_s.shape[0]
     frames, points, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3)), np.empty((count, 3, POSE))
     world = _place(state, dh, frames, points, jacobian)
@@ -355,19 +330,11 @@ def _predict_pixels(state, covariance, dh, half_axes, pose, intrinsics, late_s, 
                         product[i] += row[r, j] * covariance[j, i]
             for s in range(2):
                 covariances[m, r, s] = np.dot(product, row[s])
-            covariances[m, r, r] += (common_m[m] * pixels_per_metre(slope)) ** 2
-        if common_m[m] > 0.0:
-            for r in range(2):
-                product[r] = np.dot(row[r, :POSE], state[VELOCITY:ACCELERATION])
-            for r in range(2):
-                for s in range(2):
-                    covariances[m, r, s] += time_sd**2 * product[r] * product[s]
 
 
 @njit(cache=True)
-def triangulation_covariance(state, dh, half_axes, poses, intrinsics, pixel_sd, lasting_m, paint_variance, out):
-    """Fill `out` (M, 3, 3) m^2: of a marker's triangulated centre by the errors of every camera, `pixel_sd` px and
-    `lasting_m` (M,) m across its line of sight, and by the paint."""
+def triangulation_covariance(state, dh, half_axes, poses, intrinsics, pixel_sd, paint_variance, out):
+    """Fill `out` (M, 3, 3) m^2: of a marker's triangulated centre by the cameras' `pixel_sd` px and by the paint."""
     count = out.shape[0]
     frames, points = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3))
     world = np.eye(4)
@@ -380,11 +347,10 @@ def triangulation_covariance(state, dh, half_axes, poses, intrinsics, pixel_sd, 
             information[i, i] = 1e4  # of 10 mm, where the cameras do not tell the distance
         for camera in range(poses.shape[0]):
             if project_marker(points[m], world, half_axes[m], poses[camera], intrinsics[camera], pixel, slope):
-                variance = pixel_sd**2 + (lasting_m[m] * pixels_per_metre(slope)) ** 2
                 for i in range(3):
                     for j in range(3):
                         for r in range(2):
-                            information[i, j] += slope[r, i] * slope[r, j] / variance
+                            information[i, j] += slope[r, i] * slope[r, j] / pixel_sd**2
         out[m] = np.linalg.inv(information)
         for i in range(3):
             out[m, i, i] += paint_variance[m]
