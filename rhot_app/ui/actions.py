@@ -64,6 +64,8 @@ class Actions(QObject):
         self.earlier = self._make("Bring back an earlier calibration …", "", "Every calibration keeps what it "
                                   "replaced; choose one by date and reason.")
         self.tracker = self._make("Tracker …", "", "Which tracker makes a hand of the markers, and what it may assume.")
+        self.networks = self._make("Hand networks …", "", "Install the networks that find landmarks of a bare hand on "
+                                   "this computer.")
         self.cameras = self._make("Cameras …", "", "Lenses and positions that the rig file says.")
         self.markers = self._make("Markers …", "", "The marker set that the rig file says.")
         self.hand = self._make("Hand …", "", "The hand's bones that the rig file says.")
@@ -164,7 +166,7 @@ class MainToolBar(QToolBar):
             a.outputs, a.mouse, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig,
             a.close_rig, None, a.quit])
         self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [
-            *a.wizards, a.fit, None, a.earlier, None, a.tracker, None, a.files])
+            *a.wizards, a.fit, None, a.earlier, None, a.tracker, a.networks, None, a.files])
         self.view_button, self.view_menu = self._add_menu("View", [
             *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, a.layers, None,
             a.dark, a.light, None, a.reset])

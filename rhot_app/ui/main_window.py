@@ -129,6 +129,7 @@ class MainWindow(QMainWindow):
         for action, page in ((a.cameras, "cameras"), (a.markers, "markers"), (a.hand, "hand")):
             action.triggered.connect(lambda checked=False, page=page: self.show_rig_file(page))
         a.tracker.triggered.connect(lambda: self.dialogs.choose_tracker(c, self.rig_watch.look_soon))
+        a.networks.triggered.connect(lambda: self.dialogs.show_networks())
         self._connect_wizards()
         a.files.triggered.connect(lambda: self.open_guide("calibration"))
         a.frame.triggered.connect(self.screen_parts.scene.frame_hand)

@@ -11,8 +11,8 @@ from pathlib import Path
 from rhot_node.capture.pi_camera import CameraStack, load_stack
 from rhot_node.capture.sensors import PRESETS
 from rhot_node.compiled import is_compiled_in
-from rhot_node.config import NodeSettings, load_settings
-from rhot_node.errors import CameraError, NodeError, TrustError
+from rhot_node.config import NodeSettings, load_settings, network_model
+from rhot_node.errors import CameraError, KeypointError, NodeError, TrustError
 from rhot_node.health.checks import (
     Check,
     Level,
@@ -27,6 +27,7 @@ from rhot_node.health.checks import (
 )
 from rhot_node.health.machine import Machine
 from rhot_node.keys import NodeTrust, keys_path
+from rhot_node.landmark_search import OpenNetworks, open_networks
 from rhot_node.service.install import NAME, STATE_FOLDER
 from rhot_node.terminal import add_examples
 
@@ -113,7 +114,35 @@ def check_settings(machine: Machine, path: Path | None) -> list[Check]:
     except NodeError as exc:
         return [Check("settings", "error", f"{exc}")]
     return [Check("settings", "ok", f"{path}: node {settings.node_id}, {settings.name}."),
-            _check_trust(path, settings)]
+            _check_trust(path, settings), *check_landmarks(settings)]
+
+
+def check_landmarks(settings: NodeSettings, open_with: OpenNetworks | None = None) -> list[Check]:
+    """The hand networks, where the settings ask for them: whether they can be used, and the rate to expect."""
+    model = network_model(settings.detector)
+    if model is None:
+        return []
+    import numpy as np
+
+    from rhot_node.landmarks.networks import SEARCH_EVERY
+    from rhot_node.landmarks.runtime import LITERT, best_runtime
+    camera = settings.camera
+    try:
+        networks = (open_networks if open_with is None else open_with)(model)
+        search_s, hand_s = networks.cost_s(np.zeros((camera.height, camera.width, 3), np.uint8))
+    except KeypointError as exc:
+        return [Check("landmarks", "error", f"{exc}")]
+    runtime = best_runtime()
+    hz = 1.0 / (hand_s + search_s / SEARCH_EVERY)
+    text = (f"Hand networks ({model}, {'LiteRT' if runtime == LITERT else 'OpenCV'}): {1e3 * hand_s:.0f} ms an image "
+            f"with one hand, {2e3 * hand_s:.0f} ms with two, and {1e3 * search_s:.0f} ms to search for one. Expect "
+            f"landmarks of a hand in up to {min(hz, camera.fps):.0f} of {camera.fps:.0f} images a second.")
+    if hz >= camera.fps:
+        return [Check("landmarks", "ok", text)]
+    faster = [] if runtime == LITERT else ["install LiteRT (pip install 'rhot[landmarks]')"]
+    faster += [] if model == "lite" else ['set "detector" to "landmarks:lite"']
+    remedy = " or ".join(faster) or "lower camera.fps to save the other images' work"
+    return [Check("landmarks", "warning", text, f"{remedy[:1].upper()}{remedy[1:]}.")]
 
 
 def check_service(machine: Machine) -> list[Check]:

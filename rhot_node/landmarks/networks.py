@@ -8,6 +8,8 @@ that `install` names. Its pixels are kept: a region is sampled without half a pi
 from __future__ import annotations
 
 import math
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -40,6 +42,9 @@ OVERLAP: Final = 0.3
 
 SAME: Final = 0.125
 """Part of a region's side: two palms that are less apart are one hand. It is a quarter of a hand's extent."""
+
+TRIES: Final = 5
+"""Of which the quickest is the cost."""
 
 HAND_SIGMA: Final = 0.004
 """Standard deviation of a landmark's own error, per axis, as a part of its region's side
@@ -119,6 +124,20 @@ class HandNetworks:
         self._regions = [next_region(hand.landmarks) for hand in hands]
         return tuple(hands)
 
+    def cost_s(self, picture: Picture) -> tuple[float, float]:
+        """How long a search for palms in such a picture takes, and the landmarks of one hand, s: the quickest of
+        `TRIES`, because whatever else the machine does makes it longer."""
+        whole = _whole(picture)
+
+        def quickest(work: Callable[[], object]) -> float:
+            times = []
+            for _ in range(TRIES):
+                begun = time.perf_counter()
+                work()
+                times.append(time.perf_counter() - begun)
+            return min(times)
+        return quickest(lambda: self._palms(picture)), quickest(lambda: landmarks_in(self._hand, picture, whole))
+
     def _add(self, hands: list[DetectedHand], picture: Picture, region: Region) -> None:
         """Add the hand of a region, if there is one, and if it is another one than those before."""
         if not _usable(region, picture):
@@ -132,8 +151,7 @@ class HandNetworks:
 
     def _palms(self, picture: Picture) -> list[_Palm]:
         """The palms of a picture, the likeliest first: by weighted non-maximum suppression."""
-        height, width = picture.shape[:2]
-        whole = Region(np.array([0.5 * (width - 1), 0.5 * (height - 1)]), float(max(width, height)), 0.0)
+        whole = _whole(picture)
         boxes, logits = self._palm(_sampled(picture, whole, PALM_PX))[:2]
         probability = 1.0 / (1.0 + np.exp(-np.clip(logits.reshape(-1).astype(np.float64), -100.0, 100.0)))
         likely = np.flatnonzero(probability >= LEAST_PROBABILITY)
@@ -185,6 +203,11 @@ def next_region(landmarks: Array) -> Region:
     low, high = upright.min(axis=0), upright.max(axis=0)
     centre = np.array([[c, -s], [s, c]]) @ (0.5 * (low + high))
     return _region(centre, high - low, turn, 2.0, 0.1)
+
+
+def _whole(picture: Picture) -> Region:
+    height, width = picture.shape[:2]
+    return Region(np.array([0.5 * (width - 1), 0.5 * (height - 1)]), float(max(width, height)), 0.0)
 
 
 def _palm_region(size: Array, points: Array) -> _Palm:

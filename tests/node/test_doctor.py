@@ -10,14 +10,23 @@ from typing import Any
 
 import pytest
 from machine_fake import machine
-from node_fakes import saved_settings
+from node_fakes import node_settings, saved_settings
 
 import rhot_node.commands.doctor_command
 import rhot_node.compiled
 from rhot_node.capture.pi_camera import CameraStack
-from rhot_node.commands.doctor_command import check_camera, check_compiled, check_service, check_settings, examine, run
+from rhot_node.commands.doctor_command import (
+    check_camera,
+    check_compiled,
+    check_landmarks,
+    check_service,
+    check_settings,
+    examine,
+    run,
+)
 from rhot_node.compiled import sources_hash
-from rhot_node.errors import CameraError
+from rhot_node.config import CameraSettings
+from rhot_node.errors import CameraError, KeypointError
 from rhot_node.health.checks import Check, worst
 from rhot_node.keys import Master, NodeTrust, keys_path, new_key_pair
 
@@ -128,3 +137,36 @@ def test_exit_code_and_json(level: Any, code: int, monkeypatch: pytest.MonkeyPat
                     "checks": [{"code": "heat", "level": level, "text": "It is so.", "remedy": "Do it."}]}
     assert run(argparse.Namespace(settings=None, json=False)) == code
     assert "It is so. Do it." in capsys.readouterr().out
+
+
+class CostlyNetworks:
+    """Networks of which a search and a hand take so long, s."""
+
+    def __init__(self, search_s: float, hand_s: float) -> None:
+        self.costs = search_s, hand_s
+
+    def cost_s(self, picture: Any) -> tuple[float, float]:
+        assert picture.shape == (480, 640, 3)
+        return self.costs
+
+
+@pytest.mark.parametrize(("detector", "hand_s", "level", "words"), [
+    ("landmarks", 0.009, "ok", ("9 ms", "18 ms", "up to 30 of 30")),
+    ("landmarks", 0.095, "warning", ("95 ms", "up to 10 of 30", "landmarks:lite")),
+    ("landmarks:lite", 0.095, "warning", ("lite", "up to 10 of 30")),
+])
+def test_the_rate_of_landmarks_to_expect(detector: str, hand_s: float, level: str, words: tuple[str, ...]) -> None:
+    settings = node_settings(detector=detector, camera=CameraSettings(fps=30.0))
+    (check,) = check_landmarks(settings, lambda model: CostlyNetworks(0.05, hand_s))  # type: ignore[arg-type,return-value]
+    assert check.level == level and all(word in check.sentence for word in words), check.sentence
+    assert bool(check.remedy) == (level == "warning")
+
+
+def test_networks_are_looked_at_where_they_are_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(model: str) -> Any:
+        raise KeypointError("the hand networks are not installed. Run the command.")
+    assert check_landmarks(node_settings(), missing) == []
+    monkeypatch.setattr(rhot_node.commands.doctor_command, "open_networks", missing)
+    path = saved_settings(tmp_path / "left.json", detector="landmarks").path
+    (check,) = [check for check in check_settings(machine(tmp_path / "pi"), path) if check.code == "landmarks"]
+    assert check.level == "error" and "not installed" in check.sentence

@@ -85,6 +85,7 @@ def at_top(kind: type) -> Callable[[MainWindow], Any]:
 OPENERS = (
     *map(wizard, WIZARDS),
     dialog("tracker", lambda window: window.actions_.tracker.trigger()),
+    dialog("networks", lambda window: window.actions_.networks.trigger()),
     dialog("outputs", lambda window: window.actions_.outputs.trigger()),
     dialog("mouse", lambda window: window.actions_.mouse.trigger()),
     dialog("layers", lambda window: window.actions_.layers.trigger()),

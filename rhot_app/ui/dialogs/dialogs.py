@@ -28,6 +28,7 @@ from rhot_app.project import Rig, RigNode
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
+from rhot_app.ui.dialogs.networks_dialog import NetworksDialog
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
 from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
 from rhot_app.ui.dialogs.recordings import recordings_folder
@@ -46,6 +47,7 @@ class Dialogs:
         self._parent = parent
         self.guide: GuideViewer | None = None
         self.tracker: TrackerDialog | None = None
+        self.networks: NetworksDialog | None = None
         self.outputs: OutputsDialog | None = None
         self.mouse: MouseWindow | None = None
         self.layers: LayersDialog | None = None
@@ -98,6 +100,12 @@ class Dialogs:
             dialog.rig_used.connect(lambda rig: rig_used())
             self._hold("tracker", dialog)
         _bring_forward(self.tracker)
+
+    def show_networks(self) -> None:
+        """The hand networks of this computer, beside the window; with or without a rig."""
+        if self.networks is None:
+            self._hold("networks", NetworksDialog(self._parent))
+        _bring_forward(self.networks)
 
     def show_outputs(self, controller: Controller, scheme: Callable[[], Scheme], actions: Sequence[QAction],
                      rig_used: Callable[[], None]) -> None:
@@ -164,7 +172,7 @@ class Dialogs:
 
     def close(self) -> None:
         """Close what stands beside the window."""
-        for window in (self.guide, self.tracker, self.outputs, self.mouse, self.layers, self.export):
+        for window in (self.guide, self.tracker, self.networks, self.outputs, self.mouse, self.layers, self.export):
             if window is not None:
                 window.close()
 
