@@ -19,7 +19,7 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from fuzz_targets import Door, NodeSide, Replies, Searches, Target, WronglyTakenError
+from fuzz_targets import Door, Landmarks, NodeSide, Replies, Searches, Target, WronglyTakenError
 from numpy.typing import NDArray
 from tables import arguments, publish, table
 
@@ -113,7 +113,8 @@ def memory_mb() -> float:
 
 def run(phase: str, count: int, seed: int) -> dict[str, object]:
     """One phase; raises WronglyTakenError, or whatever a datagram made the code raise."""
-    targets: tuple[Target, ...] = (Door(), NodeSide(), Replies(), NodeSide(), Door(), Searches())
+    targets: tuple[Target, ...] = (Door(), NodeSide(), Replies(), NodeSide(), Door(), Searches(),
+                                   Landmarks())
     mutator, done, taken = Mutator(seed), 0, 0
     sent: Counter[str] = Counter()
     for target in targets:  # what is compiled and allocated once does not count

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
+from rhot_app.project import Rig
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.node_link import PENDING_MAX, NodeLink
 from rhot_app.sources.validation import OLDEST_FRAME_NS
@@ -18,7 +19,9 @@ from rhot_node.config import NodeSettings
 from rhot_node.detect.edges import EDGES_MAX, find_edges
 from rhot_node.detect.foreground import no_foreground
 from rhot_node.errors import WireError
+from rhot_node.files import resource_path
 from rhot_node.foreground_store import ForegroundStore
+from rhot_node.markers import load_markers
 from rhot_node.network.link import UdpLink
 from rhot_node.network.presence import Presence
 from rhot_node.network.session import Link, LinkKeys, Sessions
@@ -31,6 +34,8 @@ from rhot_node.wire.messages import (
     ClockRequest,
     Find,
     ForegroundPart,
+    HandLandmarks,
+    LandmarkedHand,
     MarkerFlag,
     MarkerObservation,
     Message,
@@ -50,6 +55,7 @@ SLACK_NS = 5_000_000
 SESSION = 1 << 40
 KEY = bytes(range(32))
 RIG = synthetic_rig()
+LANDMARK_RIG = msgspec.structs.replace(RIG, markers=load_markers(resource_path("markers", "landmarks21.json")))
 MAP_STEP = 8
 SLICES = np.array([[x, 240.0, 0.0, 1.0, 9.0] for x in np.linspace(20.0, 600.0, 40)])
 SEARCHED = 64
@@ -87,10 +93,10 @@ class Target(Protocol):
         ...
 
 
-def paired_link() -> NodeLink:
+def paired_link(rig: Rig = RIG) -> NodeLink:
     """A master's link to a paired node whose clock it knows."""
-    node = msgspec.structs.replace(RIG.nodes[0], public_key="0" * 64)
-    link = NodeLink(msgspec.structs.replace(RIG, nodes=(node, RIG.nodes[1])), 0)
+    node = msgspec.structs.replace(rig.nodes[0], public_key="0" * 64)
+    link = NodeLink(msgspec.structs.replace(rig, nodes=(node, rig.nodes[1])), 0)
     link.use_key("fuzz", KEY)
     for k in range(5):
         t = NOW_NS - (5 - k) * 10**8
@@ -104,8 +110,8 @@ class Door:
     name = "door"
     seal = Seal(KEY)
 
-    def __init__(self) -> None:
-        self._link = paired_link()
+    def __init__(self, rig: Rig = RIG) -> None:
+        self._link, self._markers = paired_link(rig), len(rig.markers.markers)
         self._session = SESSION
         self.renew()
 
@@ -130,7 +136,7 @@ class Door:
         """Through the door and into arrays, as in the receiver."""
         frame = self._link.door.admit(data, NOW_NS)
         if isinstance(frame, CameraObservations):
-            check_frame(frame)
+            check_frame(frame, self._markers)
         elif frame is not None:
             check_search(frame)
         return frame is not None
@@ -140,12 +146,12 @@ class Door:
         return self._link.door.dropped
 
 
-def check_frame(frame: CameraObservations) -> None:
+def check_frame(frame: CameraObservations, markers: int) -> None:
     """The oracle: a camera of 640 x 480 px could have seen this a moment ago."""
     lost = (frame.flags & MarkerFlag.LOST) != 0
     seen, xx, yy, xy = (frame.pixels[~lost], frame.covariances[:, 0, 0], frame.covariances[:, 1, 1],
                         frame.covariances[:, 0, 1])
-    sound = (frame.pixels.shape == (6, 2) and np.isnan(frame.pixels[lost]).all()
+    sound = (frame.pixels.shape == (markers, 2) and np.isnan(frame.pixels[lost]).all()
              and ((seen >= -64.0) & (seen <= (703.0, 543.0))).all()
              and ((xx >= 0.0) & (yy >= 0.0) & (xx <= 1e8) & (yy <= 1e8)).all()
              and (xy * xy <= xx * yy * 1.00001 + 1e-29).all()
@@ -154,6 +160,23 @@ def check_frame(frame: CameraObservations) -> None:
              and NOW_NS - OLDEST_FRAME_NS <= frame.t_row0_master_ns <= NOW_NS + SLACK_NS)
     if not sound:
         raise WronglyTakenError(f"an implausible frame was taken: {frame}")
+
+
+class Landmarks(Door):
+    """A master's data port, for the landmarks that a node's hand networks find."""
+
+    name = "landmarks"
+
+    def __init__(self) -> None:
+        super().__init__(LANDMARK_RIG)
+
+    def genuine(self) -> list[bytes]:
+        """The hands of the node's next frame."""
+        self._sequence += 1
+        hands = tuple(LandmarkedHand(0.9, right, tuple((x + 8.0 * k, 200.0, 2.0, 0.5, 1.5) for k in range(21)))
+                      for x, right in ((20.0, 0.9), (300.0, 0.1)))
+        return [encode(HandLandmarks(1, self._session, self._sequence, NOW_NS - 9_000_000, NOW_NS - 200_000, 10**6,
+                                     10**6, 10**4, 640, 480, self._sequence, hands), self.seal)]
 
 
 class Searches(Door):

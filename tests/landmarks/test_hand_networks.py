@@ -237,6 +237,15 @@ def test_a_hand_is_found_however_the_picture_is_turned(runtime: str, pictures: I
     assert np.median(np.linalg.norm(large.landmarks * 0.09 - upright.landmarks, axis=1)) < 6.0
 
 
+def test_a_right_and_a_left_hand_are_told_apart(runtime: str, pictures: Iterator[np.ndarray]) -> None:
+    picture, networks = next(pictures), open_hand_networks(runtime=runtime)
+    found = networks.find(np.ascontiguousarray(np.hstack([picture, picture[:, ::-1]])))
+    assert len(found) == 2
+    right, left = sorted(found, key=lambda hand: hand.landmarks[0, 0])
+    assert right.right > 0.9 and left.right < 0.1
+    assert np.median(np.linalg.norm(left.landmarks - [1439.0, 0.0] - right.landmarks * [-1.0, 1.0], axis=1)) < 6.0
+
+
 @pytest.mark.parametrize("model", MODELS)
 def test_no_hand_is_found_where_there_is_none(runtime: str, model: str) -> None:
     rng = np.random.default_rng(1)
