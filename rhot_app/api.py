@@ -65,14 +65,14 @@ class Recording:
         the whole recording, not only what came before it; the estimator alone can.
 
         Raises RecordingError when nothing can be tracked, RigError when the rig does not suit the tracker, ExportError
-        when the tracker does not smooth.
+        when the tracker does not smooth, or a pause is too long for a rate.
         """
         rate = None if rate_hz is None else checked_rate(rate_hz)
         with TrackedLog(self.path, self.rig, tracker, progress, smooth=smooth) as tracked:
             states = joined(list(tracked.blocks()))
             self.losses = tuple(tracked.losses)
             if rate is not None:
-                states = Resampler(rate, 1.0 / (tracked.camera_rate_hz or rate)).take(states) or states
+                states = joined(list(Resampler(rate, 1.0 / (tracked.camera_rate_hz or rate)).take(states)))
         return states
 
     def to_dataframe(self, tracker: Tracker | None = None, *, rate_hz: float | None = None,

@@ -156,8 +156,7 @@ def _prepared(tracked: TrackedLog, name: str, options: ExportOptions,
                         rate_hz if uniform else None, tracked.path.name, tracked.created, first_ns, options.smooth,
                         tracked.wall_clock_offset_ns)
         for states in held:
-            given = states if resampler is None else resampler.take(states)
-            if given is not None:
+            for given in [states] if resampler is None else resampler.take(states):
                 yield plan, given
         held = []
 

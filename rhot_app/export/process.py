@@ -83,5 +83,5 @@ def first_states(log: Path, format_name: str, options: ExportOptions, count: int
         (block, *_) = itertools.islice(tracked.blocks(), 1)
         if options.rate_hz is not None:
             resampler = Resampler(options.rate_hz, 1.0 / (tracked.camera_rate_hz or options.rate_hz))
-            block = resampler.take(block) or block
+            block = next(resampler.take(block), block)
         return in_frame(block.where(slice(count)), options.frame)

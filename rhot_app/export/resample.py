@@ -8,7 +8,9 @@ frame) is a gap: what lies in it is NaN, unknown, LOST.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
+from datetime import timedelta
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,11 @@ BRIDGED_PERIODS = 2.5
 """One lost frame makes an interval of two periods; the half is for jitter."""
 
 MOST_HZ = 1000.0
+
+PAUSE_ROWS_MAX = 60_000
+"""States without a hand that stand for a pause, such as ten minutes at 100 Hz; a longer pause is another recording."""
+
+_PIECE = 4096  # states that are interpolated at a time: some 60 MB
 
 _LOST = CONDITIONS.index(Condition.LOST)
 _SEVERITY = np.array([{Condition.TRACKING: 0, Condition.PARTIAL: 1, Condition.LOST: 2, Condition.SEARCHING: 3,
@@ -53,8 +60,9 @@ class Resampler:
         self._given = 0  # of the grid
         self._last: HandStates | None = None
 
-    def take(self, block: HandStates) -> HandStates | None:
-        """What lies between the states so far; None when nothing does."""
+    def take(self, block: HandStates) -> Iterator[HandStates]:
+        """What lies between the states so far, in pieces. Raises ExportError at a pause of more than `PAUSE_ROWS_MAX`
+        states."""
         known = block if self._last is None else joined([self._last, block])
         known = known.where(_forward(known.t_master_ns))
         if self._first_ns is None:
@@ -62,12 +70,23 @@ class Resampler:
         self._last = known.where(slice(-1, None))
         span_s = 1e-9 * (int(known.t_master_ns[-1]) - self._first_ns)
         end = math.floor(span_s * self.rate_hz + 1e-6) + 1  # exclusive
-        if end <= self._given:
-            return None
-        numbers = np.arange(self._given, end)
-        self._given = end
-        grid_ns = self._first_ns + np.rint(numbers * (1e9 / self.rate_hz)).astype(np.int64)
-        return self._between(known, grid_ns)
+        self._require_short(known.t_master_ns)
+        while self._given < end:
+            numbers = np.arange(self._given, min(end, self._given + _PIECE))
+            self._given += len(numbers)
+            yield self._between(known, self._first_ns + np.rint(numbers * (1e9 / self.rate_hz)).astype(np.int64))
+
+    def _require_short(self, times: NDArray[np.int64]) -> None:
+        pauses_s = 1e-9 * np.diff(times)
+        longest = int(np.argmax(pauses_s)) if len(pauses_s) else -1
+        if longest < 0 or pauses_s[longest] * self.rate_hz <= PAUSE_ROWS_MAX:
+            return
+        pause, after = (timedelta(seconds=round(seconds)) for seconds in (
+            pauses_s[longest], 1e-9 * (int(times[longest]) - (self._first_ns or 0))))
+        raise ExportError(f"the recording has a pause of {pause} h after {after} h, which would be "
+                          f"{pauses_s[longest] * self.rate_hz:.0f} empty states at {self.rate_hz:g} Hz. Export it "
+                          "without a rate to a format that has times, such as CSV; or record what comes after the "
+                          "pause apart.")
 
     def _between(self, known: HandStates, grid_ns: NDArray[np.int64]) -> HandStates:
         times = known.t_master_ns

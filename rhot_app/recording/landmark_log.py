@@ -35,6 +35,7 @@ from rhot_node.wire.messages import (
 )
 
 Array = NDArray[np.float64]
+Times = NDArray[np.int64]
 
 LANDMARKS: Final = len(LANDMARK_ROLES)
 
@@ -126,11 +127,13 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable]) ->
                              f"{len(tables)}. Give one table for each, in the rig's order.")
     order, first_s = landmark_order(rig), min(table.times_s[0] for table in tables)
     begin_ns = _BEGIN_NS + 10 * _EXCHANGE_NS
-    last_ns = begin_ns + round(1e9 * (max(table.times_s[-1] for table in tables) - first_s)) + _EXCHANGE_NS
+    frames_ns = begin_ns + np.rint(1e9 * (np.unique(np.concatenate([table.times_s for table in tables])) - first_s)
+                                   ).astype(np.int64)
+    exchanges_ns = _near(np.arange(_BEGIN_NS, frames_ns[-1] + _EXCHANGE_NS, _EXCHANGE_NS), frames_ns).tolist()
     stated = [Record(RecordKind.START, 0, _BEGIN_NS - 1, encode(Start(
         _SESSION, 0, tuple(StartEntry(node.node_id, 1, 0) for node in rig.nodes))))]
     for node, table in zip(rig.nodes, tables, strict=True):
-        for sequence, t_ns in enumerate(range(_BEGIN_NS, last_ns, _EXCHANGE_NS)):
+        for sequence, t_ns in enumerate(exchanges_ns):
             stated += _exchange(node, sequence, t_ns)
         for number, t_s in enumerate(table.times_s):
             stated.append(_datagram(node, rig, number, begin_ns + round(1e9 * (t_s - first_s)),
@@ -142,6 +145,16 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable]) ->
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be written ({exc.strerror}). Choose another --out.") from exc
     return sum(len(table.times_s) for table in tables)
+
+
+def _near(times_ns: Times, frames_ns: Times) -> Times:
+    """Those of the times that lie as shortly before or after a frame as the first ones do before the first: in a pause
+    no clock is asked."""
+    place = np.searchsorted(frames_ns, times_ns)
+    until = frames_ns[np.minimum(place, len(frames_ns) - 1)] - times_ns
+    since = times_ns - frames_ns[np.maximum(place - 1, 0)]
+    near = 10 * _EXCHANGE_NS
+    return np.asarray(times_ns[(np.abs(until) <= near) | (np.abs(since) <= near)])
 
 
 def _exchange(node: RigNode, sequence: int, t_ns: int) -> list[Record]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,11 @@ import pandas
 import pyarrow.parquet
 import pytest
 
+from rhot_app.errors import ExportError
 from rhot_app.export.export import export_log
 from rhot_app.export.plan import ExportOptions
-from rhot_app.export.states import HandStates
+from rhot_app.export.resample import Resampler
+from rhot_app.export.states import HandStates, joined
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 
 AXES = "xyz"
@@ -82,6 +85,23 @@ def test_a_rate_gives_equal_intervals_and_leaves_the_gap(gappy: Path, gappy_stat
     known = table[~inside & table["joint_wrist_x_mm"].notna()]
     expected = np.interp(known["time_s"], gappy_states.times_s, 1e3 * gappy_states.joint_positions[:, 0, 0])
     assert len(known) > 90 and known["joint_wrist_x_mm"].to_numpy() == pytest.approx(expected, abs=1e-3)
+
+
+def paused(states: HandStates, pause_s: float) -> HandStates:
+    """The later half of the states after a pause."""
+    late = np.arange(len(states)) >= len(states) // 2
+    return replace(states, t_master_ns=states.t_master_ns + np.where(late, round(1e9 * pause_s), 0))
+
+
+def test_a_long_pause_comes_in_pieces_and_a_day_of_it_is_refused(states: HandStates) -> None:
+    pieces = list(Resampler(100.0, 1.0 / 40.0).take(paused(states, 300.0)))
+    assert max(map(len, pieces)) < 10_000
+    whole = joined(pieces)
+    assert len(whole) == pytest.approx(100 * (300.0 + states.times_s[-1]), abs=2) and np.ptp(
+        np.diff(whole.t_master_ns)) == 0
+    assert np.count_nonzero(whole.tracked) == pytest.approx(100 * states.times_s[-1], rel=0.1)
+    with pytest.raises(ExportError, match=r"22:13:20 h.*8000\d{3} empty states.*without a rate"):
+        list(Resampler(100.0, 1.0 / 40.0).take(paused(states, 80_000.0)))
 
 
 def test_parquet_holds_the_same_columns_and_says_what_it_is(log: Path, states: HandStates, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -20,6 +21,7 @@ from rhot_app.recording.landmark_log import read_landmark_table, write_landmark_
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.simulator.nodes.landmark_detector import detected_landmarks, landmark_rig, moving_hand
 from rhot_app.sources.replay import LogValidator
+from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.files import resource_path
 
 PLACES = [f"{axis}{k}" for k in range(21) for axis in "xy"]
@@ -50,6 +52,19 @@ def test_the_log_gives_the_tables_back(tmp_path: Path) -> None:
     np.testing.assert_allclose(frames[0].pixels, tables[0].pixels[0], atol=1e-4)
     lost = np.isnan(frames[2].pixels[:, 0])
     assert set(np.flatnonzero(lost)) == {7, 20}  # none, and outside of the image
+
+
+def test_a_day_without_frames_takes_no_records(tmp_path: Path) -> None:
+    rig, one = landmark_rig(), read_landmark_table(table(tmp_path / "a.csv", [1, 2, 3, 4]), FPS)
+    one = replace(one, times_s=one.times_s + np.array([0.0, 0.0, 80_000.0, 80_000.0]))
+    assert write_landmark_log(tmp_path / "a.log", rig, [one, one]) == 8
+    validator, frames = LogValidator(rig), 0
+    with contextlib.closing(LogReader(tmp_path / "a.log")) as reader:
+        records = list(reader)
+        for record in records:
+            frames += isinstance(validator.feed(record), CameraObservations)
+    assert frames == 8, "the clocks are known again after the pause"
+    assert len(records) < 300
 
 
 @pytest.mark.parametrize(("frames", "change", "head", "fps", "says"), [
