@@ -15,11 +15,11 @@ from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.words import shipped_motions
 
 TITLE = "Simulated hand does"
-_FIRST = {"still": "Holds still", "wave": "Waves", "fast": "Moves fast", "sweep": "Moves every joint",
+FIRST = {"still": "Holds still", "wave": "Waves", "brisk": "Waves briskly", "sweep": "Moves every joint",
           "roam": "Moves and turns"}
 """The motions that calibrations ask for; the others stand in a menu of their own."""
 
-_THINGS = (("held:wave", "Holds a tagged cube", "The hand waves with a cube of 40 mm that has a tag on each face. Rig, "
+THINGS = (("held:wave", "Holds a tagged cube", "The hand waves with a cube of 40 mm that has a tag on each face. Rig, "
             "Add a tracked object offers its file."),
            ("bare:grasp", "Takes its markers off", "A bare hand that opens and closes."),
            ("bare:still", "Holds a bare hand still", "A bare hand that waits to be found. Calibrate, Tracker chooses "
@@ -45,15 +45,15 @@ class TwinShows(QObject):
         self._group.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
         self.actions: dict[str, QAction] = {}
         motions = {info.name: info.description for info in shipped_motions()}
-        for name, text in _FIRST.items():
+        for name, text in FIRST.items():
             self._make(f"hand:{name}", text, motions.get(name, ""))
-        for key, text, meaning in _THINGS:
+        for key, text, meaning in THINGS:
             self._make(key, text, meaning)
         for distance in DISTANCES_CM:
             self._make(f"marker:{0.01 * distance:g}", f"{distance} cm",
                        f"One painted ball, {distance} cm from the cameras, before the middle between them.")
         for name, meaning in motions.items():
-            if name not in _FIRST:
+            if name not in FIRST:
                 self._make(f"hand:{name}", name, meaning)
         self._fill(menu)
         menu.aboutToShow.connect(self._look)
@@ -89,7 +89,7 @@ class TwinShows(QObject):
             each.setToolTipsVisible(True)
         for key, action in self.actions.items():
             kind, _, name = key.partition(":")
-            where = one_marker if kind == "marker" else others if kind == "hand" and name not in _FIRST else menu
+            where = one_marker if kind == "marker" else others if kind == "hand" and name not in FIRST else menu
             where.addAction(action)
         menu.addMenu(one_marker)
         menu.addMenu(others)

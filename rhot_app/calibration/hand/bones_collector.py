@@ -18,6 +18,9 @@ SWEEPS = 3
 LEAST_S = 30.0
 """So long all markers shall have been in sight together, even when every finger has moved."""
 
+GAP_S = 0.5
+"""An instant counts until the next one, at most so long: cameras of two pictures a second are slow, not blind."""
+
 BENT_PART = 0.75
 THUMB_BENT_PART = 0.9
 """A finger has bent when its tip is nearer to the palm than this part of its farthest; the thumb is shorter."""
@@ -72,7 +75,7 @@ class BonesCollector:
         """Take one instant: `positions` (M, 3) m in the order of the places, NaN where a marker is not seen."""
         seen = np.isfinite(positions[:, 0])
         if self._times and seen.mean() >= _SEEN_PART:
-            self._together_s += min(max(t_s - self._times[-1], 0.0), 0.2)
+            self._together_s += min(max(t_s - self._times[-1], 0.0), GAP_S)
         self._times.append(t_s)
         self._positions.append(np.array(positions, dtype=np.float64))
         palm = positions[self._palm][seen[self._palm]] if self._palm else positions[seen]

@@ -181,8 +181,8 @@ PLACES = 26
 SHARED = 16  # of the places: seen whole by all cameras
 _CANDIDATES = 800
 _MARGIN_PX = 5.0
-_WIDTHS = (0.24, 0.6)  # of the picture's width, as wide as the sheet appears
-_TILT_RAD, _ROLL_RAD = 0.75, 0.3
+_WIDTHS = (0.24, 0.7)  # of the picture's width, as wide as the sheet appears: the widest fills the size bar of a lens
+_TILT_RAD, _ROLL_RAD = 0.95, 0.3
 _STEEPEST = 0.5  # least cosine between the sheet's normal and the line of sight
 _COLUMNS, _ROWS = 12, 9  # fields of a picture that the places should cover
 _INSIDE = np.array([[x, y, 0.0] for x in np.linspace(-0.75, 0.75, 9) for y in np.linspace(-0.7, 0.7, 7)])
@@ -209,10 +209,13 @@ class _Candidates:
 
 
 def board_places(sheet: Sheet, cameras: Sequence[CameraModel], seed: int) -> Array:
-    """(PLACES, 4, 4) world_from_sheet: greedily the most new fields of the pictures and ways of leaning, then in an
-    order of short ways. Raises SimulatorError when no camera can see such a sheet whole."""
+    """(PLACES, 4, 4) world_from_sheet: greedily the most new fields of the pictures and ways of leaning, and the place
+    that fills most of each picture; then in an order of short ways. Raises SimulatorError when no camera can see such a
+    sheet whole."""
     found = _candidates(sheet, cameras, np.random.default_rng([seed, 0xB0A2D]))
     chosen = _choose(found, np.asarray(found.whole.all(axis=1)), SHARED, [])
+    covered = found.fields.reshape(len(found.poses), len(cameras), -1).sum(axis=2) * found.whole
+    chosen = list(dict.fromkeys([*chosen, *(int(best) for best in covered.argmax(axis=0) if covered[best].any())]))
     chosen = _choose(found, np.asarray(found.whole.any(axis=1)), PLACES, chosen)
     if not chosen:
         raise SimulatorError("no camera of the simulated rig can see a sheet of this shape whole; choose another size.")

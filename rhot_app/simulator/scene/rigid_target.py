@@ -81,7 +81,7 @@ def ball_on_stick(markers: MarkerSet, index: int) -> RigidTarget:
 
 # -- motion of a calibration board -------------------------------------------------------------------------------------
 
-STILL_S = 1.3
+STILL_S = 2.0
 MOVE_S = 0.9
 _TREMOR_HZ = np.array([0.9, 2.3, 8.7])
 _TREMOR_M, _TREMOR_RAD = 0.05e-3, 0.25e-3  # rms of a board held with two hands, elbows on the table

@@ -26,9 +26,9 @@ _OPTION_OF = {"tone": "--tone", "length_mm": "--ruler-mm", "square_mm": "--squar
 def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments that choose the scene; shared by every command that simulates."""
     parser.add_argument("--motion", default="grasp", metavar="M",
-                        help="name of a motion (still, rest, wave, grasp, pinch, point, spread, tap, fast, sweep, "
-                             "cross, roam, mouse), a motion file (.json), or a recording (Qualisys .tsv, Leap Motion "
-                             ".csv); default grasp")
+                        help="name of a motion (still, rest, wave, brisk, grasp, pinch, point, spread, tap, fast, "
+                             "sweep, cross, roam, mouse), a motion file (.json), or a recording (Qualisys .tsv, Leap "
+                             "Motion .csv); default grasp")
     parser.add_argument("--seed", type=whole, default=1, metavar="N", help="seed of all that is random (default 1)")
     parser.add_argument("--preset", default=None, choices=("wide", "fast"),
                         help="camera preset: wide (62.2 degrees, 40 fps) or fast (26.5 degrees, 120 fps)")

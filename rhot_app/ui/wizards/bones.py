@@ -34,6 +34,7 @@ def make_plan(kit: Kit) -> Plan:
     entry = EntryStep(kit.rig.hand)
     page = movements.page("Move freely", "Press Record, then bend and stretch every finger and turn the hand.", SECONDS,
                           lambda: make_coach(kit.rig))
+    page.twin_facts = "Simulated hand does, Moves every joint: all of them within the minute."
     page.movement.unneeded = lambda: "Press Next: the bones were entered." if entry.report is not None else ""
     hand = HandStep(entry, page.movement, kit.rig)
     accept = AcceptStep(lambda: propose(hand.report, kit.rig, kit.rig_path), "Record the movement first.")

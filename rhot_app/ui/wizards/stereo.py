@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout, QPushButton
 
+from rhot_app.simulator.scene.scene_description import RulerShow
 from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
@@ -51,6 +52,8 @@ class KnownPage(Page):
         super().__init__(step)
         self._known = step
         self.pickable = True
+        self.twin_facts = (f"the crosses of its ruler are {RulerShow().length_mm:g} mm apart. Simulated hand does, "
+                           "Shows a ruler.")
         self.baseline = _length("The distance between the middles of the two lenses, measured by hand. 75 mm on the "
                                 "frame that the thesis describes.")
         self.ruler = _length("The distance between two marks on a ruler, 200 mm for instance, that both cameras see.")

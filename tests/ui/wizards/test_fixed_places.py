@@ -7,11 +7,21 @@ from pathlib import Path
 
 import pytest
 from fake_backend import InProcessSolver
-from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QApplication, QComboBox, QLineEdit, QMenu, QWidget
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractSpinBox,
+    QApplication,
+    QComboBox,
+    QLabel,
+    QLineEdit,
+    QMenu,
+    QWidget,
+)
 from wizard_rig import FakeMemory, FakeRigAsker
 
 from rhot_app.project import load_rig
 from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.simulated_rig_menus import FIRST, THINGS
 from rhot_app.ui.wizards import framework, steps
 from rhot_app.ui.wizards.framework.frame import WizardFrame
 from rhot_app.ui.wizards.framework.plan import WIZARDS, Kit, wizard_named
@@ -61,7 +71,8 @@ def frame_of(themed):
 
 def places(window):
     """Where everything stands that a mouse may aim at."""
-    QApplication.processEvents()
+    for _ in range(3):  # a scrolling page is laid out once more when its bar has come or gone
+        QApplication.processEvents()
     return {(kind.__name__, number): part.mapTo(window, part.rect().topLeft()).toTuple()
             for kind in AIMS for number, part in enumerate(window.findChildren(kind)) if part.isVisible()}
 
@@ -124,3 +135,18 @@ def test_the_last_button_keeps_its_width_whatever_it_says(frame_of):
         now = frame.next_button.geometry(), frame.back_button.geometry()
         assert before in (None, now)
         before = now
+
+
+def test_the_simulated_rig_says_what_a_person_would_measure(frame_of):
+    """Sizes of board and ruler, and entries of the menu that there are."""
+    entries = {*FIRST.values(), *(text for _, text, _ in THINGS), "Shows one marker at"}
+    told = {}
+    for one in WIZARDS:
+        window, frame, _ = frame_of(one.module, SIZES[0])
+        said = {label.text() for label in window.findChildren(QLabel)}
+        frame.offer_twin(QMenu(window))
+        for text in {label.text() for label in window.findChildren(QLabel)} - said:
+            told[one.module] = told.get(one.module, "") + text
+            assert any(entry in text for entry in entries), text
+    assert {"lens", "stereo", "depth", "time", "filters", "bones", "alignment"} <= told.keys()
+    assert all("25 mm" in told[module] for module in ("lens", "stereo")) and "200 mm" in told["stereo"]

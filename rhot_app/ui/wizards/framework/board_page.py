@@ -10,7 +10,7 @@ from PySide6.QtCore import QLocale, QRegularExpression, QUrl
 from PySide6.QtGui import QDesktopServices, QRegularExpressionValidator
 from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QLabel, QLineEdit, QPushButton, QSpinBox, QWidget
 
-from rhot_app.calibration.board.standard_board import SQUARE_MM
+from rhot_app.calibration.board.standard_board import BOARD, SQUARE_MM
 from rhot_app.calibration.board.target import write_target
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.framework.page import Page
@@ -70,6 +70,8 @@ class BoardPage(Page):
         self.column.addWidget(self.note)
         self.column.addStretch(1)
         self.first_field = self.square
+        self.twin_facts = (f"its board is a chessboard of {BOARD} inner corners; a square measures {SQUARE_MM:g} mm. "
+                           "Simulated hand does, Shows a board.")
         self._fill(step.fields)
         self._connect_fields()
 

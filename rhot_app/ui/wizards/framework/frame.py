@@ -44,6 +44,7 @@ class WizardFrame:
     """The widgets, laid out in `parent`."""
 
     def __init__(self, plan: Plan, cameras: tuple[str, ...], work: Work, scheme: Scheme, parent: QWidget) -> None:
+        self._plan = plan
         self.steps = StepList([page.step.title for page in plan.pages], scheme)
         self.wall = PictureWall(cameras, scheme)
         self.middle = QStackedWidget()
@@ -133,6 +134,8 @@ class WizardFrame:
         """A button for what the simulated hand does; None on a real rig, where a person does it."""
         if menu is not None:
             self.twin_button.setMenu(menu)
+            for page in self._plan.pages:
+                page.tell_twin_facts()
         self.twin_button.setVisible(menu is not None)
 
     def show_page(self, page: Page, number: int) -> None:

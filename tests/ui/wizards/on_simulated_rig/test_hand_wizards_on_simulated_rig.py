@@ -137,8 +137,9 @@ def test_filters_are_tuned(simulated_rig, open_on_rig):
     hands = open_on_rig("filters")
     hands.record(12.0, "filters-still")
     hands.next()
-    simulated_rig.twin.show(HandShow("wave"))
+    simulated_rig.twin.show(HandShow("brisk"))
     hands.record(20.0, "filters-fast")
+    assert hands.window.step.view().done, hands.sentence
     hands.next()
     hands.solved(SOLVING_S)
     hands.keep("filters-result")

@@ -101,7 +101,7 @@ def test_a_lens_is_found(simulated_rig, open_on_rig):
     hands.next()
     hands.until(lambda: len(hands.window.step.views) >= 9, 120.0)
     hands.keep("lens-show")
-    hands.until(lambda: len(hands.window.step.views) >= 17, 120.0)  # the twin never brings the board really near
+    hands.until(lambda: hands.window.step.view().done, 240.0)
     hands.next()
     hands.until(lambda: hands.verdict is not None, 60.0)
     hands.keep("lens-result")
