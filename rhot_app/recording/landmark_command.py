@@ -37,7 +37,7 @@ recorded hand in docs/landmarks.md with the shipped bones, and 1.8 with a wrong 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot landmarks``."""
-    parser.usage = ("%(prog)s [-h] CSV [CSV ...] --rig FILE --out LOG [--fps N] [--json]\n"
+    parser.usage = ("%(prog)s [-h] CSV [CSV ...] --rig FILE --out LOG [--fps N] [--bones {measured,rig}] [--json]\n"
                     "       %(prog)s install [--wheel FILE]")
     parser.add_argument("tables", type=_table_or_install, nargs="+", metavar="CSV",
                         help="a landmark table for each camera, in the rig's order (docs/landmarks.md); or the word "

@@ -39,7 +39,7 @@ _CLOCK_S = 2.0  # of clock exchanges before the first datagram: as much as a rec
 _RECORDS_MAX = 500_000
 _SESSIONS_MAX = 64  # starts and stops before the last minute
 _PACKAGES = ("rhot", "numpy", "numba", "opencv-python-headless", "msgspec", "pyzmq", "scipy", "PySide6-Essentials",
-             "pyqtgraph", "PyOpenGL", "zeroconf", "platformdirs")
+             "pyqtgraph", "PyOpenGL", "zeroconf", "platformdirs", "ai-edge-litert")
 _NODE_REQUESTS = ("state", "counters", "settings")
 _SECRETS = (
     (re.compile(r"[0-9a-fA-F]{32,}"), "[hexadecimal digits]"),
