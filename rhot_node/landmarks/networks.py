@@ -50,6 +50,11 @@ HAND_SIGMA: Final = 0.004
 """Standard deviation of a landmark's own error, per axis, as a part of its region's side
 (`python benchmarks/hand_networks.py`)."""
 
+PALM_REGION: Final = 2.6, 0.5
+NEXT_REGION: Final = 2.0, 0.1
+"""Side of the region of a palm's box, and of landmarks, by the box's longer side; and by which part of its height the
+region is moved towards the fingers (MediaPipe's `RectTransformationCalculator`)."""
+
 PALM_LANDMARKS: Final = (0, 5, 9, 13, 17, 1, 2)
 """The landmarks that the palm detector finds, too, in its order."""
 
@@ -76,8 +81,8 @@ class Region(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class DetectedHand:
     """A hand in a picture. `landmarks` (21, 2) px, (0, 0) at the centre of the first pixel, in the order of
-    docs/landmarks.md. `world` (21, 3) m: about the hand's centre, along the picture's axes, of a hand of usual size.
-    `presence`: probability that the region shows a hand; `right`: that it is a right one. `region`: where it was
+    docs/landmarks.md. `world` (21, 3) m: about the hand's centre, of a hand of usual size; x and y along the picture's
+    axes. `presence`: probability that the region shows a hand; `right`: that it is a right one. `region`: where it was
     looked for."""
 
     landmarks: Array
@@ -190,7 +195,9 @@ def landmarks_in(hand: Network, picture: Picture, region: Region) -> tuple[Array
     landmarks, presence, right, world = hand(_sampled(picture, region, HAND_PX))[:4]
     into = region.from_input(HAND_PX)
     pixels = landmarks.reshape(21, 3)[:, :2].astype(np.float64) @ into[:, :2].T + into[:, 2]
-    return pixels, float(presence.item()), float(right.item()), world.reshape(21, 3).astype(np.float64)
+    turned = world.reshape(21, 3).astype(np.float64)
+    turned[:, :2] = turned[:, :2] @ into[:, :2].T * (HAND_PX / region.side)  # the region's axes to the picture's
+    return pixels, float(presence.item()), float(right.item()), turned
 
 
 def next_region(landmarks: Array) -> Region:
@@ -202,7 +209,7 @@ def next_region(landmarks: Array) -> Region:
     upright = landmarks[list(_STEADY)] @ np.array([[c, -s], [s, c]])
     low, high = upright.min(axis=0), upright.max(axis=0)
     centre = np.array([[c, -s], [s, c]]) @ (0.5 * (low + high))
-    return _region(centre, high - low, turn, 2.0, 0.1)
+    return _region(centre, high - low, turn, *NEXT_REGION)
 
 
 def _whole(picture: Picture) -> Region:
@@ -213,7 +220,7 @@ def _whole(picture: Picture) -> Region:
 def _palm_region(size: Array, points: Array) -> _Palm:
     """`size` (2,) px of a palm's box; `points` (8, 2): its centre and seven points."""
     x, y = points[3] - points[1]  # from the wrist to the middle finger
-    return _Palm(points[1:], _region(points[0], size, math.atan2(x, -y), 2.6, 0.5))
+    return _Palm(points[1:], _region(points[0], size, math.atan2(x, -y), *PALM_REGION))
 
 
 def _region(centre: Array, size: Array, turn: float, scale: float, up: float) -> Region:

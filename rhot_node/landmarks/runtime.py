@@ -23,7 +23,7 @@ RUNTIMES: Final = (LITERT, OPENCV)
 
 def best_runtime() -> str:
     """LiteRT if it can be loaded."""
-    with contextlib.suppress(ImportError, OSError):
+    with contextlib.suppress(Exception):  # it may be built for another numpy, or another processor
         import ai_edge_litert.interpreter  # noqa: F401
         return LITERT
     return OPENCV

@@ -80,10 +80,11 @@ class FakeNetworks:
         shown = bool(off) and off[nearest] < 0.3 * HAND_PX
         points = own[nearest] if shown else np.zeros((21, 2))
         landmarks = np.column_stack([points, np.zeros(21)]).astype(np.float32).reshape(1, 63)
+        world = np.column_stack([0.001 * (points - points[9]), np.arange(21)]).astype(np.float32)
         if self.spoilt:
             landmarks[:] = np.nan
         return [landmarks, np.float32([[self.presence[nearest] if shown else 0.1]]),
-                np.float32([[self.right[nearest]]]), np.zeros((1, 63), np.float32)]
+                np.float32([[self.right[nearest]]]), world.reshape(1, 63)]
 
 
 # -- the wheel ---------------------------------------------------------------------------------------------------------

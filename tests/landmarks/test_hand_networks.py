@@ -39,6 +39,10 @@ def test_a_hand_is_found_where_it_is(turn: float, size: float) -> None:
         (found,) = networks.find(PICTURE)
         # half a pixel is MediaPipe's; the rest are the steps of the colours
         assert errors_px(found.landmarks, fake.hands[0]) < 0.8 + 0.01 * size
+        along = found.landmarks - found.landmarks[9]
+        np.testing.assert_allclose(found.world[:, :2] * np.linalg.norm(along[0]), along * np.linalg.norm(
+            found.world[0, :2]), atol=1e-4 * size, err_msg="along the picture's axes")
+        np.testing.assert_array_equal(found.world[:, 2], np.arange(21))
         assert (found.presence, found.right) == (pytest.approx(0.99), pytest.approx(0.9))
         if picture:  # the region is about the hand, upright
             assert abs(math.remainder(found.region.turn - turn, 2.0 * math.pi)) < 0.2
@@ -229,6 +233,7 @@ def test_a_hand_is_found_however_the_picture_is_turned(runtime: str, pictures: I
     (upright,) = open_hand_networks(runtime=runtime).find(picture)
     (turned,) = open_hand_networks(runtime=runtime).find(np.ascontiguousarray(picture[::-1, ::-1]))
     assert np.median(np.linalg.norm(719.0 - turned.landmarks - upright.landmarks, axis=1)) < 6.0
+    np.testing.assert_allclose(turned.world, upright.world * [-1.0, -1.0, 1.0], atol=0.01)
     (mirrored,) = open_hand_networks(runtime=runtime).find(np.ascontiguousarray(picture[:, ::-1]))
     assert upright.right > 0.9 and mirrored.right < 0.1
     (grey,) = open_hand_networks(runtime=runtime).find(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
