@@ -228,10 +228,10 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class CameraCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How the lenses and poses of a rig were found, and how far they may be trusted.
 
-    `method`: `board`, by the stereo calibration; `outdated`, likewise, but a lens was found anew since; `exact`, known
-    without error, as in a simulation; `refined`, one of these, and refined from a moving hand since. `lengths`:
-    which second known length confirmed the size of the board's squares; without one every length may be wrong by one
-    factor.
+    `method`: `board`, by the stereo calibration; `outdated`, likewise, but intrinsics were calibrated anew since;
+    `exact`, known without error, as in a simulation; `refined`, one of these, and refined from a moving hand since.
+    `lengths`: which second known length confirmed the size of the board's squares; without one every length may be
+    wrong by one factor.
     `error_m`: standard deviation of a place `distance_m` from the cameras by the calibration alone; none when unknown.
     """
 
@@ -389,7 +389,7 @@ def estimator_obstacle(rig: Rig) -> Obstacle | None:
     if rig.depth.mode == "disparity":
         return Obstacle("The estimator needs calibrated cameras; this rig takes distance from disparity alone "
                         "(depth.mode).",
-                        "Use Calibrate, Put the cameras together, or the classic tracker (tracker.kind).")
+                        "Use Calibrate, Stereo calibration, or the classic tracker (tracker.kind).")
     text = next((node.name for node in rig.nodes if node.text_datagrams), None)
     if text is not None:
         return Obstacle(f"The estimator needs the time of every picture; node {text} sends text datagrams, which "

@@ -13,8 +13,8 @@ from rhot_node.terminal import add_examples
 KINDS: dict[str, str] = {
     "bones": "the hand's bones and where the markers sit, from a minute of free movement or a ruler",
     "filters": "the filters' settings, from a hand held still and one that moves fast",
-    "intrinsics": "one camera's lens from pictures of a board",
-    "stereo": "two or more cameras from pictures of a board that they took together",
+    "intrinsics": "focal length, centre and distortion of one camera's lens, from pictures of a board",
+    "stereo": "how two or more cameras stand to each other, from pictures of a board that they took together",
     "time": "when each camera sees, from a moving marker",
     "colours": "the markers' colours, from boxes on their paint in pictures",
     "alignment": "where another tracker's world is in the rig, from two streams of one motion",

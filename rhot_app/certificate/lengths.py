@@ -99,7 +99,7 @@ def judge_depth(readings: Sequence[DistanceReading], rig: Rig) -> Line:
     cause = ("The error grows with the square of the distance: the angle between the cameras is not what the rig file "
              "says." if angle else f"All distances are {_too(scale.value)} by one factor: the baseline (or the board's "
              "square size, or a focal length) is not what the rig file says.")
-    remedy = ("Something moved a camera: put the cameras together again." if angle else
+    remedy = ("Something moved a camera: repeat the stereo calibration." if angle else
               f"Measure lens to lens: the rig file says {1e3 * geometry.baseline_m:.1f} mm, this ruler says "
               f"{1e3 * geometry.baseline_m / line.values[1]:.1f} mm. Then measure ten squares of the board.")
     return Line("depth", DEPTH, "differs", measured, cause, remedy, tuple(figures), curves)
@@ -245,11 +245,11 @@ def _why(error: Interval, across: Interval, away: Interval, off: Array, depth: A
                                             f"{1e3 * baseline / (1.0 + 0.01 * error.value):.1f} mm.")
     if math.isfinite(across.value) and across.holds(0.0) and not away.holds(0.0):
         return ("Only what points away from the cameras has a wrong length: a focal length is not what the rig file "
-                "says, or the cameras' angle.", "Find the lenses again, then put the cameras together again.")
+                "says, or the cameras' angle.", "Calibrate the intrinsics again, then stereo.")
     near, far = (mean_of(off[depth <= np.quantile(depth, 1 / 3)]), mean_of(off[depth >= np.quantile(depth, 2 / 3)]))
     if abs(far.value - near.value) > math.hypot(far.half_width, near.half_width):
         return ("The error changes with the distance: the angle between the cameras is not what the rig file says.",
-                "Something moved a camera: put the cameras together again.")
+                "Something moved a camera: repeat the stereo calibration.")
     return (f"Every length is {_too(error.value)}, near and far alike: the baseline, or the size of the board's "
             f"squares that it was found with, is {_too(error.value)}.",
             f"Measure lens to lens and ten squares of the board.{said}")

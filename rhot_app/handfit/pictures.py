@@ -25,7 +25,7 @@ def require_calibrated(rig: Rig) -> str:
     exact = rig.calibration is not None and rig.calibration.method == "exact"
     if rig.depth.mode == "disparity" or (nominal and not exact):
         raise CalibrationError("No camera of this rig is calibrated, so a hand fitted to its pictures would have wrong "
-                               "lengths. Find the lens of each camera, then put the cameras together (Calibrate menu).")
+                               "lengths. Calibrate the intrinsics of each camera, then stereo (Calibrate menu).")
     return "" if finding is None else f"{finding.finding.figure} {finding.finding.cause}".strip()
 
 

@@ -61,7 +61,7 @@ def test_little_is_no_reason_to_speak() -> None:
     assert found.finding.code == "stale_geometry"
 
 
-@pytest.mark.parametrize(("method", "said"), [(None, "no stereo"), ("outdated", "lens"), ("board", "stale")])
+@pytest.mark.parametrize(("method", "said"), [(None, "no stereo"), ("outdated", "ntrinsics"), ("board", "stale")])
 def test_only_a_calibration_that_was_made_is_called_stale(method: str | None, said: str) -> None:
     record = None if method is None else CameraCalibration(method)
     rig = msgspec.structs.replace(rig_with_palm_markers(), calibration=record)

@@ -18,6 +18,7 @@ import pytest
 from rhot_app.__main__ import SUBCOMMANDS, parse
 from rhot_app.__main__ import main as rhot
 from rhot_app.calibration.calibrate_command import ALIASES, KINDS
+from rhot_app.ui.wizards.framework.plan import WIZARDS
 from rhot_node.__main__ import daemon_parser
 from rhot_node.commands import COMMANDS
 
@@ -179,6 +180,14 @@ def test_a_calibration_has_one_name_and_its_former_ones_still_run_it(
             assert rhot(["calibrate", name]) == 2
         told.append(capsys.readouterr().err.replace(f"calibrate {name}", f"calibrate {kind}"))
     assert told[0] == told[1] != ""
+
+
+def test_wizards_and_commands_call_a_calibration_by_one_name() -> None:
+    """Every kind of `rhot calibrate` is a word of its wizard's title, and no former title is left in the documents."""
+    titles = " ".join(wizard.title.lower() for wizard in WIZARDS)
+    assert [kind for kind in KINDS if kind not in titles] == []
+    told = " ".join(path.read_text() for path in (ROOT / "docs").rglob("*.md"))
+    assert not re.findall(r"put the cameras together|find the lens", told, re.IGNORECASE)
 
 
 def test_a_file_that_exists_is_only_replaced_by_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

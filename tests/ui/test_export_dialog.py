@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -101,3 +103,23 @@ def test_the_menu_opens_it(make_bench: Callable[..., Any]) -> None:
     bench.until(opened.isVisible)
     assert not opened.export_button.isEnabled() and "Choose a recording" in opened.log_label.text()
     opened.close()
+
+
+def test_the_newest_recording_and_its_own_rate_are_chosen_to_begin_with(
+        themed: Any, qtbot: Any, log: Path, tmp_path: Path) -> None:
+    for age_s, name in ((100, "old"), (0, "new"), (200, "older")):
+        path = tmp_path / f"{name}.rhotlog"
+        path.write_bytes(log.read_bytes())
+        os.utime(path, (time.time() - age_s, time.time() - age_s))
+    dialog = ExportDialog(None, tmp_path)
+    qtbot.addWidget(dialog)
+    assert dialog.log == tmp_path / "new.rhotlog" and dialog.export_button.isEnabled()
+    qtbot.waitUntil(lambda: dialog.rate_box.text() == "as recorded, 40 Hz", timeout=PATIENCE_MS)
+    assert dialog.options().rate_hz is None, "every state keeps its own time"
+    dialog.close()
+
+
+def test_without_a_recording_one_is_asked_for(themed: Any, qtbot: Any, tmp_path: Path) -> None:
+    dialog = ExportDialog(None, tmp_path / "nowhere")
+    qtbot.addWidget(dialog)
+    assert dialog.log is None and not dialog.export_button.isEnabled()

@@ -27,7 +27,7 @@ def calibration_finding(rig: Rig) -> HealthFinding | None:
     if rig.depth.mode == "disparity":
         return HealthFinding("stereo", Finding(
             "disparity", Grade.FAIR, "Distances are estimates: the rig finds them from disparity, without a "
-            "calibration.", remedy="Put the cameras together with a board (Calibrate menu) for exact ones."))
+            "calibration.", remedy="A stereo calibration with a board (Calibrate menu) gives exact ones."))
     if rig.calibration is not None and rig.calibration.method == "exact":
         return None
     nominal = [node.name for node in rig.nodes if node.intrinsics.nominal]
@@ -35,15 +35,16 @@ def calibration_finding(rig: Rig) -> HealthFinding | None:
         exact = " The estimator takes them as exact." if rig.tracker.kind != "classic" else ""
         return HealthFinding("lens", Finding(
             "nominal", Grade.FAIR, NOT_CALIBRATED, f"The lenses of {' and '.join(nominal)} are nominal.{exact}",
-            "Find each lens, then put the cameras together."))
+            "Calibrate the intrinsics of each camera, then stereo."))
     if rig.calibration is not None and rig.calibration.method == "outdated":
         return HealthFinding("stereo", Finding(
-            "outdated_poses", Grade.FAIR, NOT_CALIBRATED, "A lens was found anew after the cameras were put together.",
-            "Put the cameras together again with a board."))
+            "outdated_poses", Grade.FAIR, NOT_CALIBRATED,
+            "Intrinsics were calibrated anew after the stereo calibration.",
+            "Repeat the stereo calibration with a board."))
     if rig.calibration is None and _poses_nominal(rig):
         return HealthFinding("stereo", Finding(
             "nominal_poses", Grade.FAIR, NOT_CALIBRATED, "The cameras' poses are nominal: none is turned.",
-            "Put the cameras together with a board."))
+            "Do the stereo calibration with a board."))
     if rig.calibration is not None and rig.calibration.lengths == "skipped":
         return HealthFinding("stereo", lengths_finding())
     return None
@@ -53,7 +54,7 @@ def lengths_finding() -> Finding:
     """What is said when no second length was given."""
     return Finding("lengths_unproven", Grade.FAIR, "Lengths were never checked against a ruler.",
                    "If the board's squares are not as large as said, every length is wrong by the same factor.",
-                   "Put the cameras together again with a known length: lens to lens, or a ruler.")
+                   "Repeat the stereo calibration with a known length: lens to lens, or a ruler.")
 
 
 def calibration_text(rig: Rig) -> str:
@@ -62,7 +63,8 @@ def calibration_text(rig: Rig) -> str:
     if record is None:
         return "not recorded"
     if record.method in ("exact", "outdated"):
-        return "exact, as simulated" if record.method == "exact" else "with a board, before a lens was found anew"
+        return ("exact, as simulated" if record.method == "exact" else
+                "with a board, before intrinsics were calibrated anew")
     error = "" if record.error_m is None else f", ± {1e3 * record.error_m:.2f} mm at {record.distance_m:g} m"
     how = "refined from a moving hand" if record.method == "refined" else "with a board"
     return f"{how}{error}; lengths {lengths_text(rig)}"
@@ -129,7 +131,7 @@ def calibration_error(rig: Rig | None) -> CalibrationAccuracy:
         return KNOWN_EXACTLY
     if record is None or record.error_m is None:
         return _unknown("Nobody knows how far places are off: the rig file does not say how well its cameras were "
-                        "calibrated. Put the cameras together again (Calibrate menu) to know it.")
+                        "calibrated. Repeat the stereo calibration (Calibrate menu) to know it.")
     middle = np.mean([node.pose.translation_m for node in rig.nodes], axis=0)
     return CalibrationAccuracy(record.error_m, record.distance_m, middle)
 

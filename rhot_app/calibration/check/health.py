@@ -99,7 +99,7 @@ def misfit_cause(rig: Rig) -> str:
     if rig.calibration is None:
         return "The rig has no stereo calibration, and its cameras do not stand as it says."
     if rig.calibration.method == "outdated":
-        return "A lens was found anew after the cameras were put together."
+        return "Intrinsics were calibrated anew after the stereo calibration."
     return "The stereo calibration is stale: a camera was moved or turned, or its lens refocused."
 
 
@@ -122,7 +122,7 @@ def _geometry(figures: HealthFigures) -> list[HealthFinding]:
     return [HealthFinding("stereo", Finding(
         "stale_geometry", Grade.POOR if error > POOR_ERROR_PX else Grade.FAIR,
         f"The cameras' rays miss each other by {error:.1f} px.", figures.misfit,
-        "Put the cameras together with a board (Calibrate menu)."))]
+        "Do the stereo calibration with a board (Calibrate menu)."))]
 
 
 def _rigid(figures: HealthFigures) -> list[HealthFinding]:

@@ -323,4 +323,4 @@ def replaced_calibration(rig: Rig) -> list[Finding]:
     how = "" if rig.calibration is None else f" ({calibration_text(rig)})"
     return [Finding("replaces_calibration", Grade.FAIR, f"This rig finds distances from calibrated cameras{how}.",
                     "Disparity alone is less exact: it takes them for equal and parallel.",
-                    "Keep the calibration, or put the cameras together with a board again, unless you want this law.")]
+                    "Keep the calibration, or repeat the stereo calibration, unless you want this law.")]

@@ -39,7 +39,7 @@ class LensStart:
     """One camera's lens: `lens` (12,), see `geometry.camera`, for pictures of `size` (width, height).
 
     `std` (12,) the standard deviations, when known. `origin`: "given" by a file or the rig, or found from the same
-    "views" that now put the cameras together. `trouble`: why those views leave no usable lens.
+    "views" that now calibrate stereo. `trouble`: why those views leave no usable lens.
     """
 
     lens: Array
@@ -110,7 +110,7 @@ def find_lens(views: Sequence[BoardView], board: Board, name: str) -> LensStart:
     """
     if len(views) < FEWEST_VIEWS:
         raise CalibrationError(f"{name}: the board was found in {len(views)} pictures; {FEWEST_VIEWS} are the least to "
-                               "find the lens from, 15 are good. Or give the intrinsics.")
+                               "estimate the intrinsics from, 15 are good. Or give the intrinsics' file.")
     size = views[0].size
     lens = _closed_form(views, board, size)
     posed = [(view, pose_view(view, board, lens)) for view in views]

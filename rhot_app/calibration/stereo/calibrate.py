@@ -64,7 +64,7 @@ def calibrate(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool =
     outcome = solve(views, lenses, refine=refine, progress=progress)
     noticed = [*noticed, *(lens.trouble for lens in lenses if lens.trouble is not None)]
     if isinstance(outcome, Finding):
-        summary = f"{' and '.join(views.cameras)} cannot be put together."
+        summary = f"{' and '.join(views.cameras)} cannot be calibrated together."
         return StereoReport(views.cameras, None, tuple(dropped), summary, judge(summary, [*noticed, outcome]))
     progress("measuring what came out", 0.97)
     figures = figures_of(outcome, lenses, [shot.name for shot in views.shots])
@@ -117,7 +117,7 @@ def _summary(figures: StereoFigures) -> str:
 
 def solve(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool = False,
           progress: Progress = silent) -> StereoSolution | Finding:
-    """All cameras in the first one's frame; or the finding that says why they cannot be put together.
+    """All cameras in the first one's frame; or the finding that says why they cannot be calibrated together.
 
     `lenses` one per camera; `refine` lets given ones change within their standard deviations. Raises CalibrationError
     when cameras share no shot, or too few.

@@ -205,7 +205,7 @@ def _of_another_camera(solution: StereoSolution, lenses: Sequence[LensStart], fr
                 f"The intrinsics given for {name} fit the pictures of {other}; in those of {name} they leave "
                 f"{here:.1f} times the error of its own lens.",
                 f"The file is that of {other}, or the pictures of {name} are.",
-                f"Give the file of {name}, or none: these pictures find the lens, too.")
+                f"Give the file of {name}, or none: these pictures show the intrinsics, too.")
     return None
 
 

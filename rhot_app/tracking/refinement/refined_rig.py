@@ -197,7 +197,7 @@ def verdict_of(found: Refinement, reference: str, scale: Scale = Scale()) -> Ver
 def _misfit(figure: str) -> Finding:
     return Finding("misfit", Grade.POOR, figure,
                    "A lens was refocused, a camera is late, or a marker was taken for another thing.",
-                   "Find the lenses and put the cameras together again with a board.")
+                   "Calibrate intrinsics and stereo again with a board.")
 
 
 def scale_finding(scale: Scale) -> Finding:
@@ -208,7 +208,7 @@ def scale_finding(scale: Scale) -> Finding:
         return Finding("scale", Grade.GOOD, figure)
     return Finding("scale", Grade.FAIR, figure, "The cameras' distance has changed, or this is another hand. Rays "
                    "alone cannot tell, so the scale was left as it is.",
-                   "Measure the hand, or put the cameras together again with a board.")
+                   "Measure the hand, or repeat the stereo calibration with a board.")
 
 
 def refined_rig(rig: Rig, found: Refinement) -> Rig:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -32,11 +33,13 @@ from rhot_app.export.tables import columns
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.dialogs.recordings import newest_recording
 
 ROWS = 8
 LOOK_MS = 300  # a choice is looked at when it has stood for a while
 
 _SIZE, _BUTTON_PX = (860, 600), 120
+_OWN_RATE = "as recorded"
 _FORMATS = {"csv": "CSV: a table", "parquet": "Parquet: a table for analysis", "npz": "NPZ: NumPy's arrays",
             "trc": "TRC: points, for OpenSim", "c3d": "C3D: points, motion capture", "bvh": "BVH: a moving skeleton",
             "gltf": "glTF: an animated hand", "mcap": "MCAP: for Foxglove"}
@@ -46,7 +49,7 @@ _UNITS: tuple[tuple[str, Units], ...] = (("mm", "mm"), ("m", "m"))
 
 
 class ExportDialog(QDialog):
-    """`log` is the recording; None until one is chosen."""
+    """`log` is the recording, the newest one in `folder` unless another is given; None while there is none."""
 
     def __init__(self, log: Path | None, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -70,9 +73,9 @@ class ExportDialog(QDialog):
         self.rate_box.setRange(0.0, MOST_HZ)
         self.rate_box.setDecimals(1)
         self.rate_box.setSuffix(" Hz")
-        self.rate_box.setSpecialValueText("none")
+        self.rate_box.setSpecialValueText(_OWN_RATE)
         self.rate_box.setMinimumHeight(30)
-        self.rate_box.setToolTip("States at equal intervals. With none each keeps its own time, and formats that "
+        self.rate_box.setToolTip("States at equal intervals. As recorded each keeps its own time, and formats that "
                                  "have a rate get the cameras'.")
         self.table = QTableWidget(0, 0)
         self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
@@ -92,7 +95,7 @@ class ExportDialog(QDialog):
         self._lay_out()
         self._connect()
         self._show_format()
-        self.show_log(log)
+        self.show_log(newest_recording(folder) if log is None else log)
 
     def _lay_out(self) -> None:
         source = QHBoxLayout()
@@ -147,11 +150,12 @@ class ExportDialog(QDialog):
         self.log = log
         self.log_label.setText("Choose a recording." if log is None else str(log))
         self.export_button.setEnabled(log is not None)
+        self.rate_box.setSpecialValueText(_OWN_RATE)
         if log is not None:
             self._preview()
 
     def _choose_log(self) -> None:
-        start = self._folder if self.log is None else self.log.parent
+        start = self._folder if self.log is None else self.log
         name, _ = QFileDialog.getOpenFileName(self, "Choose a recording", str(start),
                                               "Recordings (*.rhotlog *.log);;All files (*)")
         if name:
@@ -183,6 +187,9 @@ class ExportDialog(QDialog):
         tips = [f"fingertip_{finger}_{axis}_{units}" for finger in FINGERS for axis in "xyz"]
         wanted = ("time_s", "condition", *tips)
         table = dict(columns(states, 1000.0 if units == "mm" else 1.0, None))
+        steps_s = np.diff(np.asarray(table["time_s"], dtype=np.float64))
+        if self.rate_box.value() == 0.0 and len(steps_s) and np.median(steps_s) > 0.0:
+            self.rate_box.setSpecialValueText(f"{_OWN_RATE}, {1.0 / np.median(steps_s):.0f} Hz")
         self.table.setColumnCount(len(wanted))
         self.table.setRowCount(len(states))
         self.table.setHorizontalHeaderLabels([name.replace("fingertip_", "") for name in wanted])

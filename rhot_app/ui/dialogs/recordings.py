@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -43,6 +44,15 @@ SHOW_FOLDER = "show the recording's folder"
 def recordings_folder() -> Path:
     """Where recordings are made; it may not exist yet."""
     return user_documents_path() / "RHOT"
+
+
+def newest_recording(folder: Path) -> Path | None:
+    """The recording in a folder that was written last; None when there is none."""
+    written = []
+    for path in folder.glob(f"*{LOG_SUFFIX}"):
+        with contextlib.suppress(OSError):  # it may just have been removed
+            written.append((path.stat().st_mtime_ns, path))
+    return max(written)[1] if written else None
 
 
 class Recordings:

@@ -22,7 +22,7 @@ from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.keys import bind_space
 from rhot_app.ui.common.settings import Settings
-from rhot_app.ui.dialogs.recordings import LOG_FILTER, recordings_folder
+from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording, recordings_folder
 from rhot_app.ui.models.notice import Notice, TransientNotices
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import Look, condition_look
@@ -131,7 +131,8 @@ class ReplayWindow(QMainWindow):
 
     def choose(self) -> None:
         """Ask for a recording and open it."""
-        start = self.replay.path.parent if self.replay is not None else recordings_folder()
+        folder = self.replay.path.parent if self.replay is not None else recordings_folder()
+        start = newest_recording(folder) or folder
         name, _ = QFileDialog.getOpenFileName(self, "Open a recording", str(start), LOG_FILTER)
         if name:
             self.open(Path(name))

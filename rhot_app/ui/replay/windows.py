@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from rhot_app.project import Rig
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.settings import Settings
-from rhot_app.ui.dialogs.recordings import LOG_FILTER, recordings_folder
+from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording, recordings_folder
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.replay.library_window import LibraryWindow
 from rhot_app.ui.replay.window import ReplayWindow
@@ -29,7 +29,8 @@ class ReplayWindows:
 
     def choose(self) -> None:
         """Ask for a recording and replay it."""
-        name, _ = QFileDialog.getOpenFileName(self._parent, "Open a recording", str(recordings_folder()), LOG_FILTER)
+        start = newest_recording(recordings_folder()) or recordings_folder()
+        name, _ = QFileDialog.getOpenFileName(self._parent, "Open a recording", str(start), LOG_FILTER)
         if name:
             self.open(Path(name))
 

@@ -46,7 +46,8 @@ def make_plan(kit: Kit, poses: PoseFeed | None = None, now_ns: Callable[[], int]
 
     pages = (SourcePage(source, kit.memory), TogetherPage(together, states, kit), ChartPage(solve, kit.scheme),
              AcceptPage(accept, kit.scheme))
-    return Plan("Another tracker", pages, solver="rhot_app.ui.wizards.steps.alignment_steps", put_back=end)
+    return Plan("Alignment with another tracker", pages, solver="rhot_app.ui.wizards.steps.alignment_steps",
+                put_back=end)
 
 
 class SourcePage(Page):

@@ -1,4 +1,4 @@
-"""The wizard that finds a camera's lens: camera and board, views, solve, before and after."""
+"""The wizard of a camera's intrinsics: camera and board, views, solve, before and after."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def make_plan(kit: Kit) -> Plan:
 
     pages = (LensBoardPage(board, kit.memory), Page(show), LensResultPage(solve),
              AcceptPage(AcceptStep(propose), kit.scheme))
-    return Plan("Find the lens of a camera", pages, solver="rhot_app.calibration.lens.intrinsics")
+    return Plan("Intrinsics of a camera", pages, solver="rhot_app.calibration.lens.intrinsics")
 
 
 def _next(cameras: tuple[str, ...], done: str) -> str:
@@ -50,7 +50,7 @@ class LensBoardPage(BoardPage):
         self.which = QComboBox()
         self.which.addItems(step.choices)
         self.which.setCurrentText(step.camera)
-        self.which.setToolTip("Whose lens is to be found. One camera at a time.")
+        self.which.setToolTip("Whose intrinsics are calibrated. One camera at a time.")
         self.add_field("Camera", self.which)
         self.which.currentTextChanged.connect(self._choose)
         self.first_field = self.which

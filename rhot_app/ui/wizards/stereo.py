@@ -36,8 +36,8 @@ def make_plan(kit: Kit) -> Plan:
         return stereo_proposal(kit.rig, kit.rig_path, solve.report, table.world) if solve.report is not None else None
 
     accept = AcceptPage(AcceptStep(propose), kit.scheme)
-    return Plan("Put the cameras together", (BoardPage(board, kit.memory), Page(show), KnownPage(known), Page(solve),
-                                             Page(table), accept), solver="rhot_app.ui.wizards.steps.stereo_steps")
+    pages = (BoardPage(board, kit.memory), Page(show), KnownPage(known), Page(solve), Page(table), accept)
+    return Plan("Stereo calibration", pages, solver="rhot_app.ui.wizards.steps.stereo_steps")
 
 
 # -- the fields of the second known length, and clicks on the ruler's ends ---------------------------------------------

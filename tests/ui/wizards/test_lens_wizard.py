@@ -67,7 +67,7 @@ def test_from_the_board_to_a_saved_lens(hands, scene):
     hands.next()
     assert hands.window.page.table.item(1, 1).text() == "572.0, 572.0 px"
     hands.use()
-    assert "put the cameras together" in hands.hint
+    assert "then stereo" in hands.hint
     left, right = load_rig(hands.path).nodes
     assert left.intrinsics.fx == pytest.approx(TRUE_F, rel=0.005) and right.intrinsics.fx == 572.0
     assert left.intrinsics.cx == pytest.approx(319.5, abs=3.0)

@@ -1,4 +1,4 @@
-"""The wizard that puts cameras together, clicked through on drawn boards; its steps on their own."""
+"""The wizard of the stereo calibration, clicked through on drawn boards; its steps on their own."""
 
 from __future__ import annotations
 

@@ -231,7 +231,7 @@ def test_f1_opens_the_guide_beside_the_wizard(open_sample):
     hands.until(lambda: hands.window.guide is not None and hands.window.guide.isVisible())
     guide = hands.window.guide
     assert guide.page == "calibration"
-    guide.open_page("calibration", "Put the cameras together")
+    guide.open_page("calibration", "Stereo calibration")
     assert guide.browser.verticalScrollBar().value() > 500
     guide.close()
 

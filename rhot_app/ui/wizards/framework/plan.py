@@ -89,9 +89,9 @@ OPEN_WIZARD = "wizard "
 WIZARDS: tuple[Wizard, ...] = (
     Wizard("camera", "Set the cameras", "Exposure, gains, white balance: what each camera is told, tried out live.",
            "camera settings"),
-    Wizard("lens", "Find the lens of a camera", "Focal length, centre and distortion of one camera, from a board that "
-           "is held all over its picture.", "intrinsics of"),
-    Wizard("stereo", "Put the cameras together", "Where the cameras stand to each other and to the table, from a board "
+    Wizard("lens", "Intrinsics of a camera", "Focal length, centre and distortion of one camera's lens, from a board "
+           "that is held all over its picture.", "intrinsics of"),
+    Wizard("stereo", "Stereo calibration", "Where the cameras stand to each other and to the table, from a board "
            "that they see at the same time.", "stereo calibration"),
     Wizard("refined", "Use refined calibration", "How the cameras stand now, from the hand that moves while it is "
            "tracked.", "refined calibration"),
@@ -108,8 +108,8 @@ WIZARDS: tuple[Wizard, ...] = (
            "bones calibration"),
     Wizard("filters", "Filters", "How much jitter and how much lag, from a hand held still and one that moves fast.",
            "filter tuning"),
-    Wizard("alignment", "Another tracker", "Where a Vive tracker's world is in the rig, from a movement of both.",
-           "alignment with another tracker"),
+    Wizard("alignment", "Alignment with another tracker", "Where a Vive tracker's world is in the rig, from a movement "
+           "of both.", "alignment with another tracker"),
     Wizard("certificate", "Certificate", "How good this rig is, measured as the thesis did, with 95 % intervals: five "
            "minutes.", "certificate"),
 )

@@ -166,7 +166,7 @@ ARROW_PX = 20.0
 class LensSolveStep(Step):
     """The solve; then the picture with the residuals, or straightened by the new lens."""
 
-    title = "The lens"
+    title = "Result"
     watches = True
 
     def __init__(self, show: LensShowStep) -> None:
@@ -195,7 +195,8 @@ class LensSolveStep(Step):
         if self.report is not None:
             return None
         views = tuple(replace(view, source=f"view {number}") for number, view in enumerate(self._show.views, 1))
-        return Task("Finding the lens", solve, (views, self._show.board), {"square_pixels": self.square_pixels})
+        return Task("Estimating the intrinsics", solve, (views, self._show.board),
+                    {"square_pixels": self.square_pixels})
 
     def take_result(self, result: Any) -> None:
         """The answer."""
@@ -220,7 +221,7 @@ class LensSolveStep(Step):
     def view(self) -> StepView:
         """The verdict, and the residuals over the picture."""
         if self.report is None:
-            return StepView("One moment: the lens is being found.", hint=self.problem)
+            return StepView("One moment: the intrinsics are being estimated.", hint=self.problem)
         usable = self.report.verdict.acceptable
         sentence = "Read the verdict, then press Next." if usable else "Do what the verdict says, then come back."
         overlays = {} if self.straighten else {self._show.camera: residual_marks(self.report)}
@@ -255,8 +256,8 @@ def lens_proposal(rig: Rig, path: Path | None, camera: str, report: IntrinsicsRe
     """The rig with the new lens, and its figures beside the old ones."""
     after = with_lens(rig, camera, report.intrinsics)
     reason = f"{REASON} {camera}"
-    afterwards = ("Calibrate the other cameras' lenses, then put the cameras together: their places were found with "
-                  "the old lens.") if len(rig.nodes) > 1 else ""
+    afterwards = ("Calibrate the other cameras' intrinsics, then stereo: the poses of the cameras were found with "
+                  "the old intrinsics.") if len(rig.nodes) > 1 else ""
     return Proposal(reason, report.verdict, _rows(rig, after, camera, report), (RigChange(rig, after, path, reason),),
                     afterwards)
 

@@ -1,4 +1,4 @@
-"""The steps that put cameras together: shared captures, the solve, the world on the table. No mathematics here."""
+"""The steps of the stereo calibration: shared captures, the solve, the world on the table. No mathematics here."""
 
 from __future__ import annotations
 
@@ -180,9 +180,9 @@ class ShowStep(BoardFinder):
 
 
 class StereoSolveStep(Step):
-    """Puts the cameras together and says what that is worth."""
+    """Calibrates the cameras to each other and says what that is worth."""
 
-    title = "Put them together"
+    title = "Result"
 
     def __init__(self, show: ShowStep, lenses: Sequence[LensStart | None],
                  known: Callable[[], KnownLengths]) -> None:
@@ -206,7 +206,7 @@ class StereoSolveStep(Step):
         if self.report is not None or self._asked is None:
             return None
         views, known = self._asked
-        return Task("Putting the cameras together", put_together, (views, self._lenses), {"known": known})
+        return Task("Calibrating the cameras", put_together, (views, self._lenses), {"known": known})
 
     def take_result(self, result: StereoReport) -> None:
         """The answer."""
@@ -219,7 +219,7 @@ class StereoSolveStep(Step):
     def view(self) -> StepView:
         """The verdict."""
         if self.report is None:
-            return StepView("One moment: the cameras are being put together.", hint=self.problem)
+            return StepView("One moment: the cameras are being calibrated.", hint=self.problem)
         usable = self.report.figures is not None and self.report.verdict.acceptable
         sentence = "Read the verdict, then press Next." if usable else "Do what the verdict says, then come back."
         return StepView(sentence, done=usable, verdict=self.report.verdict)
