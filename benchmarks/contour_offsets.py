@@ -24,10 +24,10 @@ from tables import arguments, publish, table
 from rhot_app.barehand.contours import SILHOUETTE
 from rhot_app.barehand.surface import FOREARM, PALM, Surface
 from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.export.landmark_track import states_of_log
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import FINGERS, HandPose
 from rhot_app.project import Rig
-from rhot_app.recording.landmark_command import track
 from rhot_app.recording.landmark_log import read_landmark_table, write_landmark_log
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import learn_skin
@@ -78,7 +78,7 @@ def fitted(folder: Path, unit_m: float) -> tuple[Rig, dict[int, HandPose]]:
     with tempfile.TemporaryDirectory() as name:
         log = Path(name) / "hand.log"
         write_landmark_log(log, rig, tables)
-        states = track(rig, log)
+        states = list(states_of_log(rig, log))
     begin_s = min(one.times_s[0] for one in tables)
     poses = {round((1e-9 * (state.t_master_ns - states[0].t_master_ns) + begin_s) * FPS):
              HandPose(state.world_from_palm, state.angles) for state in states if state.tracked}

@@ -27,12 +27,12 @@ from rhot_app.calibration.hand.bundle_model import POSE, expected
 from rhot_app.calibration.hand.fit import fit_hand
 from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.calibration.hand.shape import MARKERS
+from rhot_app.export.landmark_track import states_of_log
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettings
-from rhot_app.recording.landmark_command import track
 from rhot_app.recording.landmark_log import LandmarkTable, read_landmark_table, write_landmark_log
 from rhot_app.simulator.nodes.landmark_detector import EPOCH_NS, detected_landmarks, landmark_rig, moving_hand
 from rhot_app.state import HandState
@@ -194,7 +194,7 @@ def tracked(rig: Rig, tables: list[LandmarkTable], both: NDArray[np.int64], plac
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "bare_hand.log"
         write_landmark_log(log, rig, tables)
-        states = track(rig, log)
+        states = list(states_of_log(rig, log))
     first_ns, begin = states[0].t_master_ns, min(table.times_s[0] for table in tables)
     cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
     by_frame: dict[int, HandState] = {}

@@ -43,9 +43,17 @@ def overlay(image: Image, frame: ContourFrame, state: Array, joints: Array | Non
             cv2.circle(out, place(centre + edges.offset[s, k] * normal), round(0.7 * zoom) << _SUB,
                        FOUND_RGB if found[s, k] > 0.5 else OTHER_RGB, -1, cv2.LINE_AA, _SUB)
     if joints is not None:
-        for finger in range(5):
-            chain = [0, *range(1 + 4 * finger, 5 + 4 * finger)]
-            for a, b in pairwise(chain):
-                if np.isfinite(joints[[a, b]]).all():
-                    cv2.line(out, place(joints[a]), place(joints[b]), BONE_RGB, 1, cv2.LINE_AA, _SUB)
+        draw_skeleton(np.asarray(out, np.uint8), (joints + 0.5) * zoom - 0.5)
     return np.asarray(out, dtype=np.uint8)
+
+
+def draw_skeleton(picture: Image, joints: Array, thickness: int = 1) -> None:
+    """Draw the bones between `joints` (21, 2) px into `picture` (H, W, 3) RGB; those that are not finite are left
+    out."""
+    places = [(round(float(x) * 2**_SUB), round(float(y) * 2**_SUB)) if np.isfinite([x, y]).all() else None
+              for x, y in np.clip(joints, -1e6, 1e6)]
+    for finger in range(5):
+        for a, b in pairwise([0, *range(1 + 4 * finger, 5 + 4 * finger)]):
+            one, other = places[a], places[b]
+            if one is not None and other is not None:
+                cv2.line(picture, one, other, BONE_RGB, thickness, cv2.LINE_AA, _SUB)

@@ -102,7 +102,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
     spent: list[tuple[int, bool]] = []
     begun = time.perf_counter()
     with contextlib.ExitStack() as stack:
-        table = stack.enter_context(_table(rig, videos[0].path.name, out)) if out is not None else None
+        table = stack.enter_context(open_table(rig, videos[0].path.name, out)) if out is not None else None
         fps = 1e9 / min(video.period_ns for video in videos)
         drawn = stack.enter_context(whole_pictures(pictures, fps)) if pictures is not None else None
         for frames in frame_sets(videos):
@@ -172,11 +172,11 @@ def check_table(video: Path, target: Path, again: bool) -> None:
     check_place(video, target, again)
 
 
-class _Table:
+class StateTable:
     """States on their way to a file, a block at a time."""
 
-    def __init__(self, rig: Rig, name: str, kind: str, path: Path) -> None:
-        self._rig, self._name, self._kind, self._path = rig, name, kind, path
+    def __init__(self, rig: Rig, name: str, kind: str, path: Path, zero_ns: int | None) -> None:
+        self._rig, self._name, self._kind, self._path, self._zero_ns = rig, name, kind, path, zero_ns
         self._waiting: list[HandState] = []
         self._writer: Any = None
 
@@ -201,16 +201,19 @@ class _Table:
         if self._writer is None:
             self._writer = make_writer(self._kind, Plan(
                 self._path, self._rig, "rig", "m" if self._kind == "npz" else "mm", "hand", None, self._name,
-                datetime.now(UTC).isoformat(timespec="seconds"), self._waiting[0].t_master_ns))
+                datetime.now(UTC).isoformat(timespec="seconds"),
+                self._waiting[0].t_master_ns if self._zero_ns is None else self._zero_ns))
         if self._waiting:
             self._writer.add(states_of(self._waiting))
         self._waiting = []
 
 
 @contextlib.contextmanager
-def _table(rig: Rig, name: str, out: Path) -> Iterator[_Table]:
+def open_table(rig: Rig, name: str, out: Path, zero_ns: int | None = None) -> Iterator[StateTable]:
+    """A table of the states of `name`, whole when the context ends. `zero_ns`: master time at which its seconds begin,
+    None for the first state's."""
     with (whole_file(out, lambda: None) as path,
-          contextlib.closing(_Table(rig, name, format_of(None, out), path)) as table):
+          contextlib.closing(StateTable(rig, name, format_of(None, out), path, zero_ns)) as table):
         yield table
 
 

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from rhot_app.sources.frame_sets import CameraVideo
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``rhot bare-hand``."""
-    parser.add_argument("--rig", type=input_file, required=True, metavar="FILE",
+def add_arguments(parser: argparse.ArgumentParser, *, videos_by_option: bool = True) -> None:
+    """Arguments of ``rhot bare-hand``, and of ``rhot track``, which takes videos without an option, too."""
+    parser.add_argument("--rig", type=input_file, required=videos_by_option, metavar="FILE",
                         help="the calibrated rig, with the hand's side")
-    parser.add_argument("--video", action="append", required=True, metavar="NAME=FILE",
+    parser.add_argument("--video", action="append", required=videos_by_option, metavar="NAME=FILE",
                         help="a camera of the rig and its video; once for each camera, also for one alone")
     background = parser.add_mutually_exclusive_group()
     background.add_argument("--background", action="append", default=[], metavar="NAME=FILE",
@@ -42,8 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "before is kept in FILE.history")
     add_force_argument(parser, "write over files that exist")
     parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
-    add_examples(parser, "rhot bare-hand --rig desk.json --video left=left.mp4 --video right=right.mp4 --out hand.csv",
-                 "rhot bare-hand --rig desk.json --video left=left.mp4 --background-seconds 2 --overlay hand.mp4")
+    if videos_by_option:
+        add_examples(parser, "rhot bare-hand --rig desk.json --video left=left.mp4 --video right=right.mp4 --out a.csv",
+                     "rhot bare-hand --rig desk.json --video left=left.mp4 --background-seconds 2 --overlay hand.mp4")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -45,6 +45,9 @@ SIGMA_PX: Final = 0.3
 DIAMETER_PX: Final = 1.0  # a point has none
 _BEGIN_NS, _EXCHANGE_NS = 1_000_000_000_000, 500_000_000
 _BOUND_NS = 10_000  # of the times in a table
+
+FIRST_NS = _BEGIN_NS + 10 * _EXCHANGE_NS
+"""Master time, ns, of the first frame of a log that is made of tables."""
 _SESSION, _LONGEST_S = 1, 86_400.0
 _LARGEST_PX = 16_384.0
 
@@ -126,8 +129,7 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable]) ->
         raise RecordingError(f"rig {rig.name!r} has {len(rig.nodes)} cameras, but the landmark tables are "
                              f"{len(tables)}. Give one table for each, in the rig's order.")
     order, first_s = landmark_order(rig), min(table.times_s[0] for table in tables)
-    begin_ns = _BEGIN_NS + 10 * _EXCHANGE_NS
-    frames_ns = begin_ns + np.rint(1e9 * (np.unique(np.concatenate([table.times_s for table in tables])) - first_s)
+    frames_ns = FIRST_NS + np.rint(1e9 * (np.unique(np.concatenate([table.times_s for table in tables])) - first_s)
                                    ).astype(np.int64)
     exchanges_ns = _near(np.arange(_BEGIN_NS, frames_ns[-1] + _EXCHANGE_NS, _EXCHANGE_NS), frames_ns).tolist()
     stated = [Record(RecordKind.START, 0, _BEGIN_NS - 1, encode(Start(
@@ -136,7 +138,7 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable]) ->
         for sequence, t_ns in enumerate(exchanges_ns):
             stated += _exchange(node, sequence, t_ns)
         for number, t_s in enumerate(table.times_s):
-            stated.append(_datagram(node, rig, number, begin_ns + round(1e9 * (t_s - first_s)),
+            stated.append(_datagram(node, rig, number, FIRST_NS + round(1e9 * (t_s - first_s)),
                                   _observations(node, order, table, number)))
     try:
         with replacing(path) as file:

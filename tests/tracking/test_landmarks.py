@@ -213,3 +213,21 @@ def test_landmarks_of_one_camera_begin_on_the_palms_plane(monkeypatch):
     update = acquisition.update
     monkeypatch.setattr(acquisition, "update", fail_sometimes)
     assert acquisition.pose_on_plane(plane, frame, model.process()) is not None, "of the others, one is right"
+
+
+def test_one_camera_alone_begins_with_a_hand_of_the_files_size():
+    frames = [frame for frame in detected_landmarks(RIG, hand(), 1) if frame.camera == 0]
+    states = states_of(RIG, frames)
+    first = next(state for state in states if state.tracked)
+    assert 1e-9 * (first.t_master_ns - EPOCH_NS) <= MOST_START_S
+    errors, _, _ = off(states, hand())
+    assert np.median(np.linalg.norm(errors - errors.mean(axis=1, keepdims=True), axis=2)) < 0.012
+    line = CameraModel.from_rig(RIG.nodes[0].intrinsics, RIG.nodes[0].pose).camera_from_world[2, :3]
+    assert np.abs(errors @ line).max() < 0.15 * DISTANCE_M
+
+
+def test_a_camera_that_sees_the_hand_a_moment_before_the_other_does_not_begin_alone():
+    frames = [frame for frame in detected_landmarks(RIG, hand(), 1)
+              if frame.camera == 0 or frame.t_row0_master_ns > EPOCH_NS + 10**8]
+    first = next(state for state in states_of(RIG, frames) if state.tracked)
+    assert 1e-9 * (first.t_master_ns - EPOCH_NS) > 0.099

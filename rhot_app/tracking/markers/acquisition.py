@@ -5,14 +5,16 @@ from __future__ import annotations
 import copy
 import math
 from collections import deque
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.filter import update
-from rhot_app.estimation.residual import stack
+from rhot_app.estimation.residual import Residual, stack
 from rhot_app.geometry.camera import pixels_per_metre, project_with_slope, undistort_points
 from rhot_app.geometry.transforms import fit_rigid, rigid
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
@@ -36,6 +38,9 @@ Array = NDArray[np.float64]
 
 LEAST_MARKERS = 4
 """Markers that show where a hand is."""
+
+LEAST_ON_PALM = 5
+"""Landmarks of the palm that show how it is turned: it has six."""
 
 FLATTEST_M2 = 1e-5
 """Least area spanned by three palm markers that show how the palm is turned."""
@@ -170,17 +175,52 @@ def pose_on_plane(plane: PalmOnPlane, frame: MarkerFrame, process: HandProcess) 
     angles, worn = np.clip(process.mean, m.limits[:, 0], m.limits[:, 1]), np.empty((len(seen), 3))
     forward_arrays(m.dh, np.eye(4), angles, empty_frames(m.dh), worn)
     middle = worn[seen].mean(axis=0)
-    frame, turns = copy.copy(frame), plane.turns(TURNS)
-    frame.add_landmark_noise(process.start(rigid(turns[0], place), angles, TRIED_SD)[0])
+    places = [rigid(turn, place - turn @ middle) for turn in plane.turns(TURNS)]
+    return _best_of(places, frame, process, plane)
+
+
+def pose_before_camera(frame: MarkerFrame, process: HandProcess) -> HandPose | None:
+    """The hand whose landmarks one camera's frame shows, as large as its file says; None when they are too few, or are
+    where no hand has them. The palm's landmarks show how it is turned, but for a mirroring along the line of sight:
+    both are tried."""
+    m = frame.markers
+    palm = np.flatnonzero(frame.seen & m.landmark & (m.finger < 0))
+    if len(palm) < LEAST_ON_PALM:
+        return None
+    own = np.array([m.places[k].point for k in palm])
+    rays = undistort_points(frame.pixels[palm], m.intrinsics[frame.camera])
+    _, turns, shifts, _ = cv2.solvePnPGeneric(own, rays, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP)
+    rotation, shift = m.poses[frame.camera][:, :3], m.poses[frame.camera][:, 3]
+    places = []
+    for vector, away in zip(turns, shifts, strict=True):
+        turn, away = cv2.Rodrigues(vector)[0], away.ravel()
+        middle = turn @ own.mean(axis=0) + away
+        line = middle / np.linalg.norm(middle)
+        mirrored = (np.eye(3) - 2.0 * np.outer(line, line)) @ turn @ np.diag([1.0, 1.0, -1.0])
+        for one in (turn, mirrored):
+            places.append(rigid(rotation.T @ one, rotation.T @ (middle - one @ own.mean(axis=0) - shift)))
+    return _best_of([place for place in places if np.isfinite(place).all()], frame, process)
+
+
+def _best_of(places: Sequence[Array], frame: MarkerFrame, process: HandProcess,
+             plane: PalmOnPlane | None = None) -> HandPose | None:
+    """The most probable of the hands that are found from `places` (4, 4) of the palm, each in the posture of the
+    process's prior; None when one of its markers is UNFIT_M off or more."""
+    m = frame.markers
     best: tuple[float, Array] | None = None
-    for turn in turns:
-        prior = process.start(rigid(turn, place - turn @ middle), angles, TRIED_SD)
+    angles = np.clip(process.mean, m.limits[:, 0], m.limits[:, 1])
+    frame = copy.copy(frame)
+    residuals: list[Residual] = [frame] if plane is None else [frame, plane]
+    for number, place in enumerate(places):
+        prior = process.start(place, angles, TRIED_SD)
+        if number == 0:
+            frame.add_landmark_noise(prior[0])
         try:
-            state = update(process, 0.0, prior, [frame, plane]).state
+            state = update(process, 0.0, prior, residuals).state
         except np.linalg.LinAlgError:  # turned so, the hand cannot be where the markers are
             continue
         away = process.difference(state, prior[0])[:POSE]
-        cost = stack([frame.linearise(state), plane.linearise(state)], process.size, weigh=True)[3]
+        cost = stack([one.linearise(state) for one in residuals], process.size, weigh=True)[3]
         cost += float(away @ np.linalg.solve(prior[1][:POSE, :POSE], away))
         if best is None or cost < best[0]:
             best = cost, state
@@ -188,10 +228,10 @@ def pose_on_plane(plane: PalmOnPlane, frame: MarkerFrame, process: HandProcess) 
         return None
     state, world = best[1], np.eye(4)
     world[:3] = state[:ANGLES].reshape(3, 4)
-    _, slopes = project_with_slope(place[None], m.poses[frame.camera], m.intrinsics[frame.camera])
-    metres_per_px = 1.0 / pixels_per_metre(slopes[0])
-    off_px = np.linalg.norm(frame.pixels - frame.expected(state), axis=1)[seen]
-    return HandPose(world, state[ANGLES:VELOCITY].copy()) if np.all(metres_per_px * off_px < UNFIT_M) else None
+    _, slopes = project_with_slope(world[None, :3, 3], m.poses[frame.camera], m.intrinsics[frame.camera])
+    off_px = np.linalg.norm(frame.pixels - frame.expected(state), axis=1)[frame.seen]
+    return (HandPose(world, state[ANGLES:VELOCITY].copy())
+            if np.all(off_px < UNFIT_M * pixels_per_metre(slopes[0])) else None)
 
 
 @njit(cache=True)

@@ -22,7 +22,7 @@ from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.association import GATE, MarkerAssociation, assign
-from rhot_app.tracking.markers.acquisition import Located, Starter, pose_on_plane
+from rhot_app.tracking.markers.acquisition import Located, Starter, pose_before_camera, pose_on_plane
 from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObservations
 from rhot_app.tracking.markers.hand_size import HandSize
 from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
@@ -48,6 +48,9 @@ LOST_AFTER_NS, LOST_AFTER_PERIODS = 500_000_000, 5.0
 
 WRONG_AFTER_NS, WRONG_AFTER_PERIODS = 100_000_000, 3.0
 """Most observations rejected for this long, or for so many frame periods: the estimate is wrong."""
+
+ALONE_FRAMES = 5
+"""Frames in a row in which one camera alone sees landmarks, before the hand is begun without its distance."""
 
 _JUMP_NS = 1_000_000_000  # frames farther apart are of different sessions
 _PENDING = 16
@@ -85,6 +88,7 @@ class Estimator:
             self._size.reset()
             self._resize(*self._size.known)
         self._tracking = self._ever = False
+        self._alone = 0
         self._epoch_ns = self._accepted_ns = self._plausible_ns = 0
         self._rejections = Rejections(len(self._rig.cameras), self._markers)
 
@@ -140,6 +144,10 @@ class Estimator:
                 pose = pose_on_plane(self._plane, frame, self._process)
                 if pose is not None:
                     self._start(frame.t_ns, pose)
+            elif self._alone_with(frame):
+                pose = pose_before_camera(frame, self._process)
+                if pose is not None:
+                    self._start(frame.t_ns, pose)
             return True
         self._update(frame)
         if self._size is not None and (located := self._starter.locate()) is not None:
@@ -151,6 +159,17 @@ class Estimator:
                 or newest_ns - self._plausible_ns > max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns)):
             self._give_up()
         return True
+
+    def _alone_with(self, frame: MarkerFrame) -> bool:
+        """Whether this camera alone has seen landmarks for ALONE_FRAMES: another one would show how far they are."""
+        others = [one for camera, one in enumerate(self._observations.newest) if one is not None
+                  and camera != frame.camera and abs(one.t_row0_master_ns - frame.t_ns) < LOST_AFTER_NS]
+        lost = int(MarkerFlag.LOST)
+        if not (frame.seen & self._markers.landmark).any() or not all((one.flags & lost).all() for one in others):
+            self._alone = 0
+            return False
+        self._alone += 1
+        return self._alone >= ALONE_FRAMES
 
     def _start(self, t_ns: int, pose: HandPose, located: Located | None = None) -> None:
         """Start at a pose and weigh again what was seen since."""
