@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from rhot_node.detect.image import YuvImage
+from rhot_node.errors import CameraError
+from rhot_node.files import read_input
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,3 +88,64 @@ def sleep_until(t_host_ns: int) -> None:
     remaining_ns = t_host_ns - time.monotonic_ns() - WAKE_UP_NS
     if remaining_ns > 0:
         time.sleep(remaining_ns / NS_PER_S)
+
+
+def wait_until(due_ns: int, deadline_ns: int) -> bool:
+    """Sleep until `due_ns`, at most until `deadline_ns`, host monotonic time; True when it is due."""
+    sleep_until(min(due_ns, deadline_ns))
+    return due_ns <= deadline_ns
+
+
+class DelayedStart:
+    """Repeats a recording's first frame, a scene that stands still, until the instant in a file.
+
+    The file holds one integer: the host's monotonic time, ns, of the recording's time 0. The first frame is repeated at
+    the recording's rate while the file does not exist, and until that instant.
+    """
+
+    def __init__(self, file: Path, period_ns: int, delay_ns: int, first_ns: int = 0) -> None:
+        """`delay_ns`: from a frame's mid-exposure until it is available; `first_ns`: the first frame's time."""
+        self._file = file
+        self._period_ns = period_ns
+        self._delay_ns = delay_ns
+        self._first_ns = first_ns
+        self._opened_ns = time.monotonic_ns()
+        self.t0_ns: int | None = None
+        self.repeated = 0  # numbers that the repetitions have used
+
+    def repetition(self) -> tuple[int, int] | None:
+        """Number and mid-exposure (host monotonic ns) of the next repetition; None when the recording is to play.
+
+        Raises CameraError for a bad file.
+        """
+        if self.t0_ns is None:
+            self.t0_ns = read_start_file(self._file)
+        newest = (time.monotonic_ns() - self._delay_ns - self._opened_ns) // self._period_ns
+        number = max(self.repeated, newest)
+        t_mid_ns = self._opened_ns + number * self._period_ns
+        if self.t0_ns is not None and t_mid_ns >= self.t0_ns + self._first_ns - self._period_ns // 2:
+            return None
+        return number, t_mid_ns
+
+    def wait(self, number: int, t_mid_ns: int, deadline_ns: int) -> bool:
+        """Sleep until this repetition is available, at most until `deadline_ns`; True when it is."""
+        if not wait_until(t_mid_ns + self._delay_ns, deadline_ns):
+            return False
+        self.repeated = number + 1
+        return True
+
+
+def read_start_file(path: Path) -> int | None:
+    """Host monotonic ns in a start file, None while it does not exist; write it elsewhere and rename it to `path`."""
+    try:
+        text = read_input(path, 1 << 20).decode("ascii", "replace").strip()
+    except FileNotFoundError:
+        return None
+    except OSError as exc:
+        raise CameraError(f"{path}: the start file cannot be read ({exc.strerror}).") from exc
+    if not text:
+        return None
+    try:
+        return int(text)
+    except ValueError as exc:
+        raise CameraError(f"{path}: a start file holds one integer, host monotonic ns, not {text[:40]!r}.") from exc

@@ -28,8 +28,8 @@ SPEC_HELP = """camera specs:
   /dev/videoN           a webcam by its device
   FILE or FOLDER        a video file, an image, or a folder of images in the order of their names; a video plays at its
                         own rate, images at the settings' fps; with ?rate=max behind it, as fast as possible
-  yuv:FOLDER            a recording of raw YUV420 frames with their times, played in real time from now on, or, with
-                        ?start=FILE behind it, from the instant in FILE (integer ns, monotonic clock) once it exists
+  yuv:FOLDER            a recording of raw YUV420 frames with their times, played in real time
+  ...?start=FILE        any of these three from the instant in FILE (integer ns, monotonic clock) once it exists
   stream:SOCKET         a live twin that sends frames over this Unix socket
   plug:NAME:SPEC        the camera plug-in NAME with what it understands (docs/plugins.md)"""
 
@@ -50,11 +50,19 @@ def open_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera
         return open_plugin_camera(spec, settings, clock)
     if spec.startswith("yuv:"):
         name, options = _split_options(spec.removeprefix("yuv:"), spec, "start")
-        return YuvRecording(Path(name), clock, Path(options["start"]) if "start" in options else None)
-    name, options = _split_options(spec, spec, "rate")
+        return YuvRecording(Path(name), clock, _start_file(options))
+    name, options = _split_options(spec, spec, "rate", "start")
     if options.get("rate", "max") != "max":
         raise CameraError(f"camera {spec!r}: the only rate is max; without it a file plays at its own.")
-    return _files(Path(name), spec, settings, clock, rate_max="rate" in options)
+    if len(options) > 1:
+        raise CameraError(f"camera {spec!r}: a file that starts at an instant plays at its own rate. Leave out "
+                          "rate=max or start=FILE.")
+    source = _files(Path(name), spec)
+    return PacedCamera(source, name, settings, clock, rate_max="rate" in options, start_file=_start_file(options))
+
+
+def _start_file(options: dict[str, str]) -> Path | None:
+    return Path(options["start"]) if "start" in options else None
 
 
 def _require_video(path: Path) -> None:
@@ -72,21 +80,16 @@ def data_set_settings(spec: str) -> bool:
     return not spec.startswith("yuv:")
 
 
-def _files(path: Path, spec: str, settings: CameraSettings, clock: NodeClock, *, rate_max: bool) -> Camera:
-    source: ImageSource
+def _files(path: Path, spec: str) -> ImageSource:
     if path.is_dir():
         images = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in IMAGE_SUFFIXES)
         if not images:
             raise CameraError(f"{path}: a folder without images ({', '.join(sorted(IMAGE_SUFFIXES))}). "
                               "A yuv recording is opened as yuv:FOLDER.")
-        source = ImageFiles(images)
-    elif not path.exists():
+        return ImageFiles(images)
+    if not path.exists():
         raise CameraError(f"camera {spec!r}: no such file or folder. See rhot-node --help for what a camera may be.")
-    elif path.suffix.lower() in IMAGE_SUFFIXES:
-        source = ImageFiles([path])
-    else:
-        source = VideoFile(path)
-    return PacedCamera(source, str(path), settings, clock, rate_max=rate_max)
+    return ImageFiles([path]) if path.suffix.lower() in IMAGE_SUFFIXES else VideoFile(path)
 
 
 def _split_options(text: str, spec: str, *known: str) -> tuple[str, dict[str, str]]:
@@ -96,7 +99,8 @@ def _split_options(text: str, spec: str, *known: str) -> tuple[str, dict[str, st
     for item in filter(None, query.split("&")):
         key, equals, value = item.partition("=")
         if key not in known or not equals or not value:
-            raise CameraError(f"camera {spec!r}: option {item!r} is not known; this source takes ?{known[0]}=...")
+            raise CameraError(f"camera {spec!r}: option {item!r} is not known; this source takes "
+                              f"{' or '.join(f'?{one}=...' for one in known)}")
         options[key] = value
     if not name:
         raise CameraError(f"camera {spec!r}: it names no file.")

@@ -9,7 +9,7 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from rhot_node.capture.camera import NS_PER_S, EndOfRecording, Frame, available_delay_ns, sleep_until
+from rhot_node.capture.camera import NS_PER_S, DelayedStart, EndOfRecording, Frame, available_delay_ns, wait_until
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, YuvImage, from_bgr
@@ -80,13 +80,25 @@ class VideoFile:
         self._capture = self._open()
         fps = self._capture.get(cv2.CAP_PROP_FPS)
         self.fps: float | None = fps if 0.1 < fps < 1000 else None
+        self._frames = self._capture.get(cv2.CAP_PROP_FRAME_COUNT)
+        self._read = 0  # frames that were read
+        self._last: Plane | None = None  # the last frame, when there is none behind it
 
     def advance(self) -> bool:
-        """Go to the next frame without decoding it into an image."""
-        return bool(self._capture.grab())
+        """Go to the next frame without decoding it into an image; behind the last frame, that one stays."""
+        if self._last is not None:
+            return False
+        last = self.image() if self._read and self._read >= self._frames else None  # gone once reading has failed
+        if self._capture.grab():
+            self._read += 1
+            return True
+        self._last = last
+        return False
 
     def image(self) -> Plane:
         """The current frame."""
+        if self._last is not None:
+            return self._last
         ok, image = self._capture.retrieve()
         if not ok or image is None:
             raise CameraError(f"{self._path}: a frame cannot be decoded. Is the file complete?")
@@ -96,6 +108,7 @@ class VideoFile:
         """Open the file again: seeking is not exact in every container."""
         self._capture.release()
         self._capture = self._open()
+        self._read, self._last = 0, None
 
     def close(self) -> None:
         """Close the file."""
@@ -113,11 +126,12 @@ class VideoFile:
 
 
 class PacedCamera:
-    """A file as a camera. Frame k is exposed at T0 + k / rate, T0 being the first read; a reader that comes late
-    gets the newest frame. As fast as possible (`rate_max`), every frame is delivered and has just been exposed."""
+    """A file as a camera. Frame k is exposed at T0 + k / rate, T0 being the first read or the instant in `start_file`
+    (`DelayedStart`); a reader that comes late gets the newest frame. As fast as possible (`rate_max`), every frame is
+    delivered and has just been exposed."""
 
     def __init__(self, source: ImageSource, where: str, settings: CameraSettings, clock: NodeClock, *,
-                 rate_max: bool = False) -> None:
+                 rate_max: bool = False, start_file: Path | None = None) -> None:
         """Decode the first image to learn the size; raises CameraError when there is none."""
         self._source = source
         self._where = where
@@ -128,11 +142,13 @@ class PacedCamera:
         self._period_ns = round(NS_PER_S / (source.fps or settings.fps))
         self._t0_ns: int | None = None
         self._number = 0  # of the frame at which the source stands
+        self._base = 0  # number of frame 0
         if not source.advance():
             raise CameraError(f"{where}: it has no frames.")
         self._pending: YuvImage | None = from_bgr(source.image())
         self._size = self._pending.size
         self._delay_ns = available_delay_ns(self._exposure_ns, self._row_time_ns, self._size[1])
+        self._start = DelayedStart(start_file, self._period_ns, self._delay_ns) if start_file else None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -142,16 +158,18 @@ class PacedCamera:
     def read(self, timeout_s: float) -> Frame | None:
         """The next frame at its time. Raises EndOfRecording, or CameraError when a file is broken."""
         now_ns = time.monotonic_ns()
+        deadline_ns = now_ns + round(timeout_s * NS_PER_S)
+        if self._start is not None:
+            if still := self._start.repetition():
+                return self._frame(self._upcoming(0), *still) if self._start.wait(*still, deadline_ns) else None
+            self._t0_ns, self._base, self._start = self._start.t0_ns, self._start.repeated, None
         if self._rate_max:
             return self._deliver(self._upcoming(0), now_ns - self._delay_ns)
         if self._t0_ns is None:
             self._t0_ns = now_ns - self._delay_ns
-        deadline_ns = now_ns + round(timeout_s * NS_PER_S)
         image = self._upcoming((now_ns - self._delay_ns - self._t0_ns) // self._period_ns)
         t_mid_ns = self._t0_ns + self._number * self._period_ns
-        due_ns = t_mid_ns + self._delay_ns
-        sleep_until(min(due_ns, deadline_ns))
-        return self._deliver(image, t_mid_ns) if due_ns <= deadline_ns else None
+        return self._deliver(image, t_mid_ns) if wait_until(t_mid_ns + self._delay_ns, deadline_ns) else None
 
     def rewind(self) -> None:
         """Play again from the first frame; numbers and times go on."""
@@ -181,9 +199,12 @@ class PacedCamera:
 
     def _deliver(self, image: YuvImage, t_mid_ns: int) -> Frame:
         self._pending = None
+        return self._frame(image, self._base + self._number, t_mid_ns)
+
+    def _frame(self, image: YuvImage, number: int, t_mid_ns: int) -> Frame:
         return Frame(
             image=image,
-            number=self._number,
+            number=number,
             t_node_ns=self._clock.from_host_ns(t_mid_ns),
             t_available_node_ns=self._clock.from_host_ns(t_mid_ns + self._delay_ns),
             exposure_ns=self._exposure_ns,

@@ -19,11 +19,11 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from rhot_node.capture.camera import NS_PER_S, EndOfRecording, Frame, available_delay_ns, sleep_until
+from rhot_node.capture.camera import NS_PER_S, DelayedStart, EndOfRecording, Frame, available_delay_ns, wait_until
 from rhot_node.clock import NodeClock
 from rhot_node.detect.image import Plane, YuvImage, from_i420
 from rhot_node.errors import CameraError
-from rhot_node.files import open_input, read_document, read_input, require_file, write_document
+from rhot_node.files import open_input, read_document, require_file, write_document
 
 FORMAT: Final = "rhot-yuv"
 VERSION: Final = 1
@@ -111,8 +111,7 @@ class YuvWriter:
 class YuvRecording:
     """A recording as a camera: frame k is available at T0 + times[k] + exposure/2 + readout, host monotonic time.
 
-    T0 is the time of opening, or the integer (host monotonic ns) in `start_file` once that file exists; until then
-    frame 0 is repeated at the recording's rate, a scene that stands still. A reader that comes late gets the newest
+    T0 is the time of opening, or the instant in `start_file` (`DelayedStart`). A reader that comes late gets the newest
     frame; the frame number shows the gap. Frames are views of the mapped file, without a copy.
     """
 
@@ -122,13 +121,12 @@ class YuvRecording:
         self._map = _map_frames(folder / FRAMES_NAME, self._header)
         self._frames = np.frombuffer(self._map, dtype=np.uint8).reshape(-1, self._header.frame_bytes)
         self._clock = clock
-        self._start_file = start_file
-        self._opened_ns = time.monotonic_ns()
-        self._t0_ns: int | None = None if start_file else self._opened_ns
+        self._t0_ns: int | None = None if start_file else time.monotonic_ns()
         self._delay_ns = available_delay_ns(self._header.exposure_ns, self._header.row_time_ns, self._header.height)
+        self._start = DelayedStart(start_file, self._header.period_ns, self._delay_ns,
+                                   self._header.times_ns[0]) if start_file else None
         self._next = 0  # index of the next frame of the recording
         self._base = 0  # number of frame 0
-        self._next_still = 0  # index of the next repetition of frame 0 before the start
 
     @property
     def size(self) -> tuple[int, int]:
@@ -138,15 +136,10 @@ class YuvRecording:
     def read(self, timeout_s: float) -> Frame | None:
         """The next frame, waiting for its time. Raises EndOfRecording, or CameraError for a bad start file."""
         deadline_ns = time.monotonic_ns() + round(timeout_s * NS_PER_S)
-        if self._t0_ns is None and self._start_file is not None:
-            self._t0_ns = read_start_file(self._start_file)
-        if self._next == 0 and self._start_file is not None:
-            period = self._header.period_ns
-            newest = (time.monotonic_ns() - self._delay_ns - self._opened_ns) // period
-            index = max(self._next_still, newest)
-            t_mid = self._opened_ns + index * period
-            if self._t0_ns is None or t_mid < self._t0_ns + self._header.times_ns[0] - period // 2:
-                return self._read_still(index, t_mid, deadline_ns)
+        if self._start is not None:
+            if still := self._start.repetition():
+                return self._frame(0, *still) if self._start.wait(*still, deadline_ns) else None
+            self._t0_ns, self._base, self._start = self._start.t0_ns, self._start.repeated, None
         return self._read_playing(self._t0_ns or 0, deadline_ns)
 
     def rewind(self) -> None:
@@ -154,7 +147,7 @@ class YuvRecording:
         times = self._header.times_ns
         end_ns = (self._t0_ns or 0) + times[-1] + self._header.period_ns - times[0]
         self._t0_ns = max(end_ns, time.monotonic_ns())
-        self._start_file = None
+        self._start = None
         self._base += len(times)
         self._next = 0
 
@@ -164,13 +157,6 @@ class YuvRecording:
         with contextlib.suppress(BufferError):
             self._map.close()
 
-    def _read_still(self, index: int, t_mid_ns: int, deadline_ns: int) -> Frame | None:
-        if not _wait(t_mid_ns + self._delay_ns, deadline_ns):
-            return None
-        self._next_still = index + 1
-        self._base = self._next_still
-        return self._frame(0, index, t_mid_ns)
-
     def _read_playing(self, t0_ns: int, deadline_ns: int) -> Frame | None:
         times = self._header.times_ns
         if self._next >= len(times):
@@ -178,7 +164,7 @@ class YuvRecording:
         newest = bisect_right(times, time.monotonic_ns() - t0_ns - self._delay_ns) - 1
         index = max(self._next, newest)
         t_mid = t0_ns + times[index]
-        if not _wait(t_mid + self._delay_ns, deadline_ns):
+        if not wait_until(t_mid + self._delay_ns, deadline_ns):
             return None
         self._next = index + 1
         return self._frame(index, self._base + index, t_mid)
@@ -220,22 +206,6 @@ def read_images(folder: Path) -> Iterator[YuvImage]:
         yield from_i420(np.asarray(frame), header.width, header.height)
 
 
-def read_start_file(path: Path) -> int | None:
-    """Host monotonic ns in a start file, None while it does not exist; write it elsewhere and rename it to `path`."""
-    try:
-        text = read_input(path, 1 << 20).decode("ascii", "replace").strip()
-    except FileNotFoundError:
-        return None
-    except OSError as exc:
-        raise CameraError(f"{path}: the start file cannot be read ({exc.strerror}).") from exc
-    if not text:
-        return None
-    try:
-        return int(text)
-    except ValueError as exc:
-        raise CameraError(f"{path}: a start file holds one integer, host monotonic ns, not {text[:40]!r}.") from exc
-
-
 def _map_frames(path: Path, header: YuvHeader) -> mmap.mmap:
     """Map the frames privately: views are ordinary writable arrays, the file is never changed."""
     expected = header.frame_bytes * len(header.times_ns)
@@ -250,9 +220,3 @@ def _map_frames(path: Path, header: YuvHeader) -> mmap.mmap:
         raise CameraError(f"{path}: cannot be opened ({exc.strerror}).") from exc
     frames.madvise(mmap.MADV_SEQUENTIAL)
     return frames
-
-
-def _wait(due_ns: int, deadline_ns: int) -> bool:
-    """Sleep until `due_ns`, at most until `deadline_ns`; True when it is due."""
-    sleep_until(min(due_ns, deadline_ns))
-    return due_ns <= deadline_ns

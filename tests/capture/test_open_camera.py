@@ -128,13 +128,92 @@ def test_a_timeout_keeps_the_frame(tmp_path: Path) -> None:
     assert frame is not None and frame.number == 1
 
 
-def test_yuv_and_its_start_file(tmp_path: Path) -> None:
+def test_a_yuv_recording_is_played(tmp_path: Path) -> None:
     with YuvWriter(tmp_path / "recording", 32, 16, 0, 0) as writer:
         writer.append(0, np.zeros(32 * 16 * 3 // 2, np.uint8))
     camera = open_camera(f"yuv:{tmp_path / 'recording'}", SETTINGS, CLOCK)
     assert camera.size == (32, 16) and len(read_all(camera)) == 1
-    waiting = open_camera(f"yuv:{tmp_path / 'recording'}?start={tmp_path / 'start'}", SETTINGS, CLOCK)
-    assert [frame.number for frame in (waiting.read(1.0), waiting.read(1.0)) if frame] == [0, 1]
+
+
+def waiting_camera(kind: str, folder: Path, start: Path) -> Camera:
+    """Four frames, 20 ms apart, of the levels 0, 20, 40 and 60, that wait for a start file."""
+    if kind == "yuv":
+        with YuvWriter(folder / "yuv", 64, 48, 4_000_000, 50_000) as writer:
+            for k in range(4):
+                writer.append(k * PERIOD_NS, np.full(64 * 48 * 3 // 2, 20 * k, np.uint8))
+        return open_camera(f"yuv:{folder / 'yuv'}?start={start}", SETTINGS, CLOCK)
+    return open_camera(f"{write_video(folder / 'video.avi', 4, fps=50.0)}?start={start}", SETTINGS, CLOCK)
+
+
+def put(start: Path, text: str) -> None:
+    """Write a start file whole."""
+    written = start.with_suffix(".new")
+    written.write_text(text)
+    written.rename(start)
+
+
+def read(camera: Camera) -> Frame:
+    frame = camera.read(1.0)
+    assert frame is not None
+    return frame
+
+
+KINDS = pytest.mark.parametrize("kind", ["yuv", "video"])
+
+
+@KINDS
+def test_stands_still_until_the_start_file_says_when(tmp_path: Path, kind: str) -> None:
+    start = tmp_path / "start"
+    camera = waiting_camera(kind, tmp_path, start)
+    still = [read(camera) for _ in range(3)]
+    assert still[-1].number >= 2
+    assert all(level(frame) == 0 for frame in still)
+    t0_ns = time.monotonic_ns() + 90_000_000
+    put(start, f"{t0_ns}\n")
+    frames = read_all(camera)
+    t0_node_ns = CLOCK.from_host_ns(t0_ns)
+    playing = [frame for frame in frames if frame.t_node_ns >= t0_node_ns]
+    indices = [round(level(frame) / 20) for frame in playing]
+    assert indices[-1] == 3 and indices == sorted(set(indices)), "a reader that comes late misses frames, no more"
+    assert [frame.t_node_ns - t0_node_ns for frame in playing] == [k * PERIOD_NS for k in indices]
+    assert np.diff([frame.number for frame in playing]).tolist() == np.diff(indices).tolist()
+    standing = [frame for frame in frames if frame.t_node_ns < t0_node_ns]
+    assert standing and standing[-1].t_node_ns < t0_node_ns - PERIOD_NS // 2
+    assert (np.diff([frame.number for frame in still + frames]) > 0).all()
+
+
+@KINDS
+def test_who_waits_too_long_is_in_step_and_gets_the_last_frame(tmp_path: Path, kind: str) -> None:
+    start = tmp_path / "start"
+    camera = waiting_camera(kind, tmp_path, start)
+    read(camera)
+    t0_ns = time.monotonic_ns() - 10 * PERIOD_NS
+    put(start, str(t0_ns))
+    [last] = read_all(camera)
+    assert last.t_node_ns == CLOCK.from_host_ns(t0_ns + 3 * PERIOD_NS) and round(level(last) / 20) == 3
+
+
+def test_a_film_that_is_read_too_late_can_be_played_again(tmp_path: Path) -> None:
+    camera = open_camera(str(write_video(tmp_path / "video.avi", 4, fps=50.0)), SETTINGS, CLOCK)
+    read(camera)
+    for last in (3, 7):
+        time.sleep(5e-9 * PERIOD_NS)
+        frame = read(camera)
+        assert frame.number == last and round(level(frame) / 20) == 3
+        with pytest.raises(EndOfRecording):
+            camera.read(0.1)
+        camera.rewind()  # type: ignore[attr-defined]
+
+
+@KINDS
+def test_an_absurd_start_file_is_named(tmp_path: Path, kind: str) -> None:
+    start = tmp_path / "start"
+    camera = waiting_camera(kind, tmp_path, start)
+    start.write_text("")
+    assert read(camera).number == 0, "an empty file is one that is being written"
+    start.write_text("tomorrow")
+    with pytest.raises(CameraError, match="tomorrow"):
+        camera.read(0.1)
 
 
 def test_recordings_and_twins_bring_their_own_settings() -> None:
@@ -184,7 +263,9 @@ def test_what_cannot_be_opened_is_named(tmp_path: Path) -> None:
         str(tmp_path / "gone.avi"): "no such file", str(tmp_path / "empty"): "a folder without images",
         str(tmp_path / "text.avi"): r"text\.avi: not a video", str(tmp_path / "cut.png"): r"cut\.png is not a picture",
         str(tmp_path / "zero.avi"): r"zero\.avi", f"yuv:{tmp_path / 'gone'}": "no such folder",
-        f"yuv:{tmp_path}?rate=max": "takes \\?start=", f"{tmp_path / 'empty'}?start=x": "takes \\?rate=",
+        f"yuv:{tmp_path}?rate=max": "takes \\?start=", f"{tmp_path / 'empty'}?begin=x": "takes .*rate=.*start=",
+        f"{tmp_path / 'empty'}?start=": "is not known", f"{tmp_path / 'gone.avi'}?start=x": "no such file",
+        f"{tmp_path / 'empty'}?start=x&rate=max": "Leave out",
         f"{tmp_path / 'empty'}?rate=2": "the only rate is max", "": "names no file", "?rate=max": "names no file",
     }
     for spec, sentence in wrong.items():

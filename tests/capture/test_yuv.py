@@ -72,38 +72,6 @@ def test_read_returns_none_when_nothing_is_due_in_time(tmp_path: Path) -> None:
     assert quickest(lambda: camera.read(0.02) is None or pytest.fail("a frame came"), 0.2, times=3) < 0.2
 
 
-def test_stands_still_until_the_start_file_says_when(tmp_path: Path) -> None:
-    start = tmp_path / "start"
-    camera = YuvRecording(record(tmp_path / "recording", 4), NodeClock(), start)
-    still = [read(camera) for _ in range(3)]
-    assert still[-1].number >= 2
-    assert all(int(frame.image.y[0, 0]) == 0 for frame in still)
-    t0_ns = time.monotonic_ns() + 90_000_000
-    (tmp_path / "start.new").write_text(f"{t0_ns}\n")
-    (tmp_path / "start.new").rename(start)
-    frames = []
-    with pytest.raises(EndOfRecording):
-        while True:
-            frames.append(read(camera))
-    playing = [frame for frame in frames if frame.t_node_ns >= t0_ns]
-    indices = [int(frame.image.y[0, 0]) for frame in playing]
-    assert indices[-1] == 3 and indices == sorted(set(indices)), "a reader that comes late misses frames, no more"
-    assert [frame.t_node_ns - t0_ns for frame in playing] == [k * PERIOD_NS for k in indices]
-    standing = [frame for frame in frames if frame.t_node_ns < t0_ns]
-    assert standing and standing[-1].t_node_ns < t0_ns - PERIOD_NS // 2
-    assert (np.diff([frame.number for frame in frames]) > 0).all()
-
-
-def test_an_absurd_start_file_is_named(tmp_path: Path) -> None:
-    start = tmp_path / "start"
-    camera = YuvRecording(record(tmp_path / "recording", 4), NodeClock(), start)
-    start.write_text("")
-    assert read(camera).number == 0, "an empty file is one that is being written"
-    start.write_text("tomorrow")
-    with pytest.raises(CameraError, match="tomorrow"):
-        camera.read(0.1)
-
-
 def test_rewind_goes_on_without_a_pause(tmp_path: Path) -> None:
     camera = YuvRecording(record(tmp_path, 3), NodeClock())
     first = read(camera)
