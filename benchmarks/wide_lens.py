@@ -76,17 +76,21 @@ def scene_of(seed: int, lens: Array, turned_deg: float) -> Scene:
 
 
 def rig_by(figures: StereoFigures | None, rig: Rig) -> Rig:
-    """The rig as calibrated, its left camera where it truly is; None: the exact one."""
+    """The rig with the lenses as calibrated, and with the calibration's error in how its cameras stand to each other;
+    None: the exact one. Cameras that are turned stand otherwise than the calibrated ones did, so the error is added in
+    the right camera's frame."""
     if figures is None:
         return rig
-    found, true = calibrated_rig(rig, figures), rig.nodes[0]
-    left = CameraModel.from_rig(true.intrinsics, true.pose).world_from_camera
-    nodes = []
-    for node in found.nodes:
-        pose = left @ CameraModel.from_rig(node.intrinsics, node.pose).world_from_camera
-        nodes.append(msgspec.structs.replace(node, pose=CameraPose(
-            tuple(float(q) for q in quaternion_from_rotation(pose[:3, :3])), tuple(float(x) for x in pose[:3, 3]))))
-    return msgspec.structs.replace(found, nodes=tuple(nodes))
+    left, right = (CameraModel.from_rig(node.intrinsics, node.pose) for node in calibrated_rig(rig, figures).nodes)
+    error = right.camera_from_world @ left.world_from_camera @ np.linalg.inv(RIGHT_FROM_LEFT)
+    true = CameraModel.from_rig(rig.nodes[1].intrinsics, rig.nodes[1].pose)
+    pose = true.world_from_camera @ np.linalg.inv(error)
+    place = CameraPose(tuple(float(q) for q in quaternion_from_rotation(pose[:3, :3])),
+                       tuple(float(x) for x in pose[:3, 3]))
+    one, other = calibrated_rig(rig, figures).nodes
+    return msgspec.structs.replace(rig, nodes=(
+        msgspec.structs.replace(rig.nodes[0], intrinsics=one.intrinsics),
+        msgspec.structs.replace(rig.nodes[1], intrinsics=other.intrinsics, pose=place)))
 
 
 def track(scene: Scene, figures: StereoFigures | None, seconds: float, folder: Path) -> dict[str, Figures]:

@@ -58,8 +58,8 @@ class HandFollower:
         self.tracker.foreground, self._learns_skin = list(foreground), False
 
     def start(self, pose: HandPose, t_ns: int) -> None:
-        """Start a confirmed track at a pose (`BareHandTracker.start`)."""
-        self.tracker.start(pose, t_ns)
+        """Start a confirmed track at a pose that somebody has shown (`BareHandTracker.start`)."""
+        self.tracker.start(pose, t_ns, verified=True)
         self._following, self._image_ns = True, t_ns
         self._started()
 

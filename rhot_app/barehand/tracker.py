@@ -160,7 +160,7 @@ class BareHandTracker:
         self.constraints: list[Residual] = [JointLimits(self.model.limits)]
         if self.plane is not None:
             self.constraints.append(self.plane)
-        self.tracking = False
+        self.tracking = self.verified = False
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
         self._sequence, self._epoch_ns, self._first_update, self.begun_anew = 0, 0, False, 0
@@ -168,9 +168,11 @@ class BareHandTracker:
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
     def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD,
-              size: Array | None = None) -> None:
+              size: Array | None = None, verified: bool = False) -> None:
         """Start a track at a pose whose position, rotation and angles have standard deviations `place_sd`, m, rad and
-        rad. `size` (SHAPE,): the shape to start with, 0 by default."""
+        rad. `size` (SHAPE,): the shape to start with, 0 by default. `verified`: something else than contours shows the
+        pose, a person or markers; only then is the state ever TRACKING, as contours also fit what is no hand."""
+        self.verified = verified
         self._epoch_ns = t_ns
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, place_sd[:2])
         known = np.linalg.inv(covariance[6:POSE, 6:POSE]) + np.eye(POSE - 6) / place_sd[2] ** 2
@@ -352,7 +354,8 @@ class BareHandTracker:
         t_ns = self._epoch_ns + round(1e9 * knot.t_s)
         return HandState(
             sequence=self._sequence - 1, t_master_ns=t_ns, t_receive_ns=t_ns,
-            condition=Condition.TRACKING if np.all(observing[[*range(6)]] >= 1) else Condition.PARTIAL,
+            condition=(Condition.TRACKING if self.verified and np.all(observing[[*range(6)]] >= 1)
+                       else Condition.PARTIAL),
             marker_ids=(), marker_positions=no_markers, marker_raw_positions=no_markers,
             marker_covariances=np.empty((0, 3, 3)), marker_knowledge=np.empty(0, np.uint8), camera_names=self.names,
             camera_pixels=np.empty((cameras, 0, 2)), camera_flags=np.empty((cameras, 0), np.uint16),

@@ -84,7 +84,7 @@ class Observer:
         if state is None or rate_hz == 0.0:
             return Condition.LOST if self._ever_tracked else Condition.SEARCHING
         condition = condition_of(state)
-        self._ever_tracked |= condition is Condition.TRACKING
+        self._ever_tracked |= condition in (Condition.TRACKING, Condition.PARTIAL)
         return condition
 
     def _diagnosed(self, now_ns: int) -> list[Diagnostic]:

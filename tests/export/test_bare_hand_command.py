@@ -351,5 +351,6 @@ def test_real_videos_run_and_states_without_a_hand_have_no_numbers(tmp_path: Pat
     assert json.loads(capsys.readouterr().out)["frame_sets"] == 2
     with (tmp_path / "hand.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
-            assert (row["condition"] in ("TRACKING", "PARTIAL")) == bool(row["joint_wrist_x_mm"])
+            assert (row["condition"] == "PARTIAL") == bool(row["joint_wrist_x_mm"])
+            assert row["condition"] != "TRACKING", "contours alone have shown it"
     assert len(list((tmp_path / "pictures").iterdir())) == 2

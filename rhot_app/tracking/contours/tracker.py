@@ -157,9 +157,10 @@ class ContourEstimator:
         """Longest time between simultaneous maps, ns."""
         return self._maps.simultaneous_ns
 
-    def start(self, pose: HandPose, t_ns: int) -> None:
-        """Start a track, not yet confirmed, at a pose of master time `t_ns`."""
-        self._hand.start(pose, t_ns)
+    def start(self, pose: HandPose, t_ns: int, *, verified: bool = False) -> None:
+        """Start a track, not yet confirmed, at a pose of master time `t_ns`; `verified`: see `BareHandTracker.start`.
+        """
+        self._hand.start(pose, t_ns, verified=verified)
         self._hand.relocaliser.average_odds = 0.0
         self._finder.reset()
         self.key_frames.clear()
@@ -349,9 +350,9 @@ class ContourEstimator:
             return
         pose, t_ns = found
         if self._tracking and same_hand(self._hand, self._hand.filter.newest.state, pose):
-            self._agreed_ns = t_ns
+            self._agreed_ns, self._hand.verified = t_ns, True
         else:
-            self.start(pose, t_ns)
+            self.start(pose, t_ns, verified=True)
 
     # -- times and states ----------------------------------------------------------------------------------------------
 

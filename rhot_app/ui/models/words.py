@@ -38,7 +38,8 @@ CONDITIONS: dict[str, Look] = {
                                     "The nodes stream, but the hand has not been found yet."),
     Condition.TRACKING.value: Look("TRACKING", "disc", "good", "The hand is tracked and every marker is seen."),
     Condition.PARTIAL.value: Look("PARTIAL", "half", "caution",
-                                  "The hand is tracked, but some markers are not seen by enough cameras."),
+                                  "The hand is tracked, but some markers are not seen by enough cameras, or only its "
+                                  "contours have shown it."),
     Condition.LOST.value: Look("LOST", "cross", "bad", "The hand was tracked and is out of sight now."),
     Condition.FAULT.value: Look("FAULT", "octagon", "fault", "Something is broken; the sentence below says what."),
 }
