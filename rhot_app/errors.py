@@ -83,6 +83,14 @@ def positive_number(text: str) -> float:
     return value
 
 
+def not_negative(text: str) -> float:
+    """Type of a command's argument that is a number, 0 or above, for argparse."""
+    value = finite(text)
+    if not 0.0 <= value < 1e6:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 on")
+    return value
+
+
 def whole(text: str) -> int:
     """Type of a command's argument that is a whole number, for argparse: of at most 32 bits, so that it fits wherever
     numbers are counted."""
@@ -105,6 +113,22 @@ def refuse_existing(path: Path, error: type[RhotError], option: str = "--out", *
     """Raise `error` when something stands at `path`, which `option` named, unless it is to be written over."""
     if path.exists() and not force:
         raise error(f"{path} exists already; choose another {option}, or write over it with --force.")
+
+
+def count(text: str) -> int:
+    """Type of a command's argument that is a whole number, 0 or above, for argparse."""
+    value = whole(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number from 0 on")
+    return value
+
+
+def positive_count(text: str) -> int:
+    """Type of a command's argument that is a whole number above 0, for argparse."""
+    value = whole(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number above 0")
+    return value
 
 
 _losses: dict[str, str] = {}  # by file

@@ -11,7 +11,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import CertificateError, finite, input_file, whole
+from rhot_app.errors import CertificateError, count, input_file, positive_number
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
 
@@ -37,12 +37,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--facing", choices=("palm", "back"), default=None,
                         help="which side of the hand faced the cameras in the static step (default: no hand)")
     parser.add_argument("--marker", default=None, metavar="ID", help="the marker that was held along the ruler")
-    parser.add_argument("--rod-mm", type=finite, default=None, metavar="MM", help="the rod, from marker to marker")
+    parser.add_argument("--rod-mm", type=positive_number, default=None, metavar="MM",
+                        help="the rod, from marker to marker")
     parser.add_argument("--rod-markers", default=None, metavar="A,B", help="the rod's markers, the upper one first")
     parser.add_argument("--simulated", action="store_true",
                         help="the whole protocol on the simulated rig, unattended; --rig is then optional")
     parser.add_argument("--sketched", action="store_true", help="the simulated rig without pictures, much faster")
-    parser.add_argument("--seed", type=whole, default=1, metavar="N", help="seed of the simulated rig (default 1)")
+    parser.add_argument("--seed", type=count, default=1, metavar="N", help="seed of the simulated rig (default 1)")
     parser.add_argument("--keep", type=Path, default=None, metavar="DIR", help="new folder that keeps the recordings")
     parser.add_argument("--out", type=Path, default=None, metavar="DIR",
                         help="new folder for certificate.html, .pdf and .json (default: certificate-DATE-TIME)")

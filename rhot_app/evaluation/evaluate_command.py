@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from rhot_app.errors import finite, whole
+from rhot_app.errors import not_negative, positive_count, positive_number
 from rhot_app.simulator.scene.scene_arguments import SECONDS_MAX, add_scene_arguments, scene_of
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
@@ -23,9 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot evaluate``."""
     add_scene_arguments(parser)
     parser.set_defaults(motion=None)  # so that one that --compare would pass over is seen
-    parser.add_argument("--seconds", type=finite, default=None, metavar="S",
+    parser.add_argument("--seconds", type=positive_number, default=None, metavar="S",
                         help="length of a run; its first second is not judged (default 20, with --compare 8)")
-    parser.add_argument("--loss", type=finite, default=0.0, metavar="P",
+    parser.add_argument("--loss", type=not_negative, default=0.0, metavar="P",
                         help="probability 0..1 that a datagram of observations is lost (default 0)")
     parser.add_argument("--detector", default="fast", choices=("fast", "reference"),
                         help="the nodes' detector: fast, or reference, the thesis's pipeline")
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                        help="motions to compare on (default rest,wave,grasp,pinch,fast)")
     group.add_argument("--recording", metavar="FILE", default=None,
                        help="compare on this recording as well (Qualisys .tsv, Leap Motion .csv)")
-    group.add_argument("--seeds", type=whole, default=None, metavar="N",
+    group.add_argument("--seeds", type=positive_count, default=None, metavar="N",
                        help="how many seeds, beginning with --seed (default 5)")
     group.add_argument("--trackers", metavar="T,T,...", default=None,
                        help="which trackers (default classic,estimator); the ratio is the last one's to the first's")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import add_force_argument, whole
+from rhot_app.errors import add_force_argument, positive_count
 from rhot_app.export.export_command import READ_WITH_LOSSES, add_export_arguments, options_of
 from rhot_node.terminal import add_examples
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "each folder of recordings that rhot certify or the app made")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR",
                         help="folder of the results, named after their logs; batch.json in it lists what is done")
-    parser.add_argument("--workers", type=whole, default=None, metavar="N",
+    parser.add_argument("--workers", type=positive_count, default=None, metavar="N",
                         help="processes (default: one per processor)")
     parser.add_argument("--scheduler", default=None, metavar="ADDRESS",
                         help="let the workers of this Dask scheduler do it, such as tcp://host:8786; they must see the "
@@ -49,8 +49,6 @@ def run(args: argparse.Namespace) -> int:
     options = options_of(args)
     check_options(None if name == CERTIFICATE else name, options)
     workers = _processors() if args.workers is None else args.workers
-    if workers < 1:
-        raise ExportError(f"--workers is 1 or more, not {workers}.")
     if args.scheduler is not None and args.workers is not None:
         raise ExportError("--workers is of this computer and --scheduler of a cluster; leave one of them out.")
     jobs = jobs_of(args.paths, args.out, name, args.rig, options)

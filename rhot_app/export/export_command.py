@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import add_force_argument, finite, input_file
+from rhot_app.errors import add_force_argument, input_file, positive_number
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -
                         help="track with this rig instead of the one the log was recorded with")
     parser.add_argument("--tracker", choices=("classic", "estimator"), default=None,
                         help="track with this tracker instead of the one that the rig asks for")
-    parser.add_argument("--rate", type=finite, default=None, metavar="HZ",
+    parser.add_argument("--rate", type=positive_number, default=None, metavar="HZ",
                         help="states at equal intervals (default: each at its own time; trc, c3d and bvh: the cameras' "
                              "rate)")
     parser.add_argument("--frame", choices=("rig", "wrist"), default="rig",

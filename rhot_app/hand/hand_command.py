@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import RigError, finite, input_file
+from rhot_app.errors import RigError, input_file, positive_number
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot hand``."""
     parser.add_argument("file", type=input_file, nargs="?", metavar="HAND",
                         help="a rhot-hand or rhot-articulated file; without it, the rig's hand or the shipped one")
-    parser.add_argument("--length", type=finite, metavar="MM",
+    parser.add_argument("--length", type=positive_number, metavar="MM",
                         help="hand length to scale to, mm, from the wrist to the tip of the stretched middle finger")
     parser.add_argument("--proportions", choices=("table", "file"),
                         help="with --length: bones as published parts of it (the default), or as in the file")

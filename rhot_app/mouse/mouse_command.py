@@ -20,6 +20,7 @@ from rhot_app.errors import (
     OutputError,
     RecordingError,
     SimulatorError,
+    count,
     input_file,
     positive_number,
     whole,
@@ -78,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cameras", type=whole, choices=(1, 2), default=2, metavar="N",
                         help="with --simulated or --measure: 1 leaves one camera, and the palm on a known plane "
                              "(default 2)")
-    parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="of the simulated rig (default 1)")
+    parser.add_argument("--seed", type=count, default=1, metavar="N", help="of the simulated rig (default 1)")
     parser.add_argument("--seconds", type=positive_number, default=None, metavar="S", help="end after so long")
     parser.add_argument("--gain", type=positive_number, default=None, metavar="G",
                         help="metres of the cursor per metre of the palm (default 3)")
@@ -95,7 +96,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="print speed, coupling, resolution, buttons, latency, target test and pick-and-place on "
                              "the twin, of --bare or --cameras 1 beside those of markers with two cameras; takes "
                              "minutes, a bare hand an hour")
-    parser.add_argument("--places", type=_seed, default=None, metavar="N",
+    parser.add_argument("--places", type=count, default=None, metavar="N",
                         help=f"how often --measure picks and places (default {PLACES})")
     parser.add_argument("--pictures", action="store_true",
                         help="let --measure render all images of markers; else only those of the speeds are rendered")
@@ -377,10 +378,3 @@ def _measure(args: argparse.Namespace) -> int:
                for one in dict.fromkeys((SetUp(pictures=args.pictures), chosen))]
     print(json.dumps(figures) if args.json else report(figures))
     return 0
-
-
-def _seed(text: str) -> int:
-    value = int(text) if text.isdecimal() else -1
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"{text} is not a whole number of 0 or more")
-    return value

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import finite, whole
+from rhot_app.errors import not_negative, positive_count, positive_number
 from rhot_app.simulator.scene.scene_arguments import (
     SECONDS_MAX,
     add_scene_arguments,
@@ -31,15 +31,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot simulate``."""
     add_scene_arguments(parser)
     add_show_arguments(parser)
-    parser.add_argument("--seconds", type=finite, default=10.0, metavar="S",
+    parser.add_argument("--seconds", type=positive_number, default=10.0, metavar="S",
                         help="length of the recording (default 10)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR",
                         help="new folder for the frames (DIR/left, DIR/right), truth.npz and shot.json; to play it to "
                              "two nodes on this machine, their settings (left.json, right.json) and rig.json")
-    parser.add_argument("--pictures", type=whole, default=None, metavar="N",
+    parser.add_argument("--pictures", type=positive_count, default=None, metavar="N",
                         help="N pictures per camera (DIR/left/000.png ...) instead of a recording: of a board, one at "
                              "each place where it is held still")
-    parser.add_argument("--points", type=finite, nargs="?", const=POINT_SIGMA_PX, default=None, metavar="PX",
+    parser.add_argument("--points", type=not_negative, nargs="?", const=POINT_SIGMA_PX, default=None, metavar="PX",
                         help="no pictures: a raw log (DIR/points.log) of every marker's position in both, with a noise "
                              f"of PX (default {POINT_SIGMA_PX:g}); only --hide hides anything, and no cube's tags")
     parser.add_argument("--depth-table", default=None, metavar="CM,CM,...",

@@ -7,7 +7,7 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import SourceError, finite
+from rhot_app.errors import SourceError, positive_number
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -18,7 +18,8 @@ SECONDS_MAX = 60.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot nodes``."""
-    parser.add_argument("--seconds", type=finite, default=3.0, metavar="S", help="how long to look (default: 3)")
+    parser.add_argument("--seconds", type=positive_number, default=3.0, metavar="S",
+                        help="how long to look (default: 3)")
     parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
     add_examples(parser, "rhot nodes", "rhot nodes --seconds 10 --json")
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import PairingError, whole
+from rhot_app.errors import PairingError, positive_count
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("node", metavar="NODE",
                         help="ADDRESS or ADDRESS:PORT of the node, or with --rig its name in the rig")
     parser.add_argument("--rig", type=Path, metavar="FILE", help="write the node's key into this rig file")
-    parser.add_argument("--port", type=whole, default=None, metavar="N",
+    parser.add_argument("--port", type=positive_count, default=None, metavar="N",
                         help="the node's pairing port (default: the rig's, or 47803)")
     parser.add_argument("--code", metavar="CODE", help="the code that `rhot-node pair` shows; asked for when missing")
     add_examples(parser, "rhot pair left --rig desk.json", "rhot pair 192.168.0.21 --code 1234-5678")

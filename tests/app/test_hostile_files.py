@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import importlib
 import json
 import os
 import signal
@@ -14,7 +16,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from rhot_app.__main__ import main
+from rhot_app.__main__ import SUBCOMMANDS, main
+from rhot_app.errors import RhotError
 from rhot_app.project import load_rig, save_rig
 from rhot_node.files import TABLE_LINES_MAX, resource_path
 from rhot_node.markers import load_markers
@@ -157,21 +160,56 @@ def test_no_input_takes_a_gigabyte_or_twenty_seconds(landmark_rig: Path, tmp_pat
             assert used.ru_maxrss < 1_000_000 and used.ru_utime + used.ru_stime < PATIENCE_S, (words, used)
 
 
-NUMBERS = [["simulate", "--out", "FOLDER/out", "--distance"], ["simulate", "--out", "FOLDER/out", "--seed"],
-           ["export", "FILE", "--out", "FOLDER/a.csv", "--rate"], ["hand", "--length"], ["evaluate", "--loss"],
-           ["calibrate", "alignment", "--foreign", "FILE", "--rig-points", "FILE", "--search"],
-           ["calibrate", "depth", "--table", "FILE", "--baseline-mm"], ["poses", "--source", "udp:0", "--seconds"],
-           ["fit-hand", "--rig", "FILE", "--pictures", "FILE", "--at"], ["batch", "FILE", "--do", "track", "--out",
-                                                                        "FOLDER/out", "--workers"]]
+# -- numbers of options ------------------------------------------------------------------------------------------------
+
+NOT_FINITE = ("nan", "inf", "-inf", "1e999", "9" * 5000, "x\x1b[31m")
+MAY_BE_ZERO = {"--seed", "--at", "--loss", "--worn", "--uneven", "--lamp", "--mains", "--points", "--places"}
+"""Options that mean something with 0. None does with a number below."""
 
 
-@pytest.mark.parametrize("number", ["nan", "inf", "-inf", "1e999", "9" * 5000, "x\x1b[31m"])
-@pytest.mark.parametrize("arguments", NUMBERS, ids=lambda words: f"{words[0]} {words[-1]}")
-def test_no_number_is_more_than_a_sentence(arguments: list[str], number: str, tmp_path: Path,
+def parsers(parser: argparse.ArgumentParser, words: tuple[str, ...]) -> Iterator[
+        tuple[tuple[str, ...], argparse.ArgumentParser]]:
+    """A command's parser and those of its subcommands, each with the words that lead to it."""
+    yield words, parser
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for name, inner in action.choices.items():
+                yield from parsers(inner, (*words, name))
+
+
+def takes_a_number(action: argparse.Action) -> bool:
+    """Whether an option's type makes a number of "1"."""
+    try:
+        return bool(action.option_strings and callable(action.type) and isinstance(action.type("1"), int | float))
+    except (RhotError, ValueError, argparse.ArgumentTypeError):
+        return False
+
+
+def numeric_options() -> list[tuple[tuple[str, ...], str]]:
+    """Every option of every command that takes a number."""
+    found = []
+    for name, command in SUBCOMMANDS.items():
+        whole = argparse.ArgumentParser()
+        importlib.import_module(command.module).add_arguments(whole)
+        found += [(words, action.option_strings[0]) for words, parser in parsers(whole, (name,))
+                  for action in parser._actions if takes_a_number(action)]
+    return found
+
+
+def test_every_option_that_takes_a_number_is_found() -> None:
+    options = numeric_options()
+    assert len(options) > 60 and (("calibrate", "depth"), "--baseline-mm") in options
+
+
+@pytest.mark.parametrize(("words", "option"), numeric_options(), ids=lambda part: part if isinstance(part, str) else
+                         " ".join(part))
+def test_no_number_is_more_than_a_sentence(words: tuple[str, ...], option: str,
                                            capsys: pytest.CaptureFixture[str]) -> None:
-    assert code_of(words_of([*arguments[:-1], f"{arguments[-1]}={number}"], RIG, tmp_path)) == 2
-    said = capsys.readouterr().err
-    assert arguments[-1] in said and "\x1b" not in said and list(tmp_path.iterdir()) == []
+    senseless = ["-1", *([] if option in MAY_BE_ZERO else ["0"])]
+    for number in (*NOT_FINITE, *senseless):
+        assert code_of([*words, f"{option}={number}"]) == 2, number
+        said = capsys.readouterr().err
+        assert option in said and "\x1b" not in said and "Traceback" not in said, number
 
 
 WRITERS = {

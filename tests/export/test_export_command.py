@@ -79,7 +79,7 @@ def test_the_file_is_named_as_the_log(log: Path, tmp_path: Path) -> None:
     ((), "the format is missing"),
     (("--out", "a.xlsx"), "no format has the ending '.xlsx'; give the file one of .csv"),
     (("--out", "a.csv", "--format", "trc"), "a trc file ends in .trc"),
-    (("--out", "a.csv", "--rate", "0"), "the rate 0 Hz is out of range"),
+    (("--out", "a.csv", "--rate", "2000"), "the rate 2000 Hz is out of range"),
     (("--out", "a.csv", "--smooth", "--tracker", "classic"), "only the estimator smooths"),
     (("--out", "a.glb", "--units", "mm"), "gltf files are in m"),
     (("--out", "a.bvh", "--hand", "other_hand"), "has no other_hand to export"),

@@ -70,7 +70,6 @@ def test_a_hand_goes_to_a_rig_which_keeps_the_former(tmp_path):
 @pytest.mark.parametrize(("arguments", "complaint"), [
     (["--length", "19"], "100 to 260 mm"),
     (["--length", "1900", "--proportions", "file"], "100 to 260 mm"),
-    ([DIGITEYES, "--length", "0"], "positive"),
     ([DIGITEYES, "--length", "200", "--proportions", "table"], "--proportions file"),
     (["--proportions", "file"], "--length"),
     ([DIGITEYES, "--rig", str(RIG)], "a rig tracks a rhot-hand"),

@@ -129,7 +129,7 @@ def test_the_last_line_says_whether_enough_states_came(every_s: float, slow: boo
     (("--bare",), "--simulated and --measure"), (("--rig", "rig.json"), "for a --log"),
     (("--places", "3"), "for --measure"), (("--pictures", "--simulated"), "for --measure"),
     (("--seconds", "abc"), "abc is not a finite number"), (("--gain", "-1"), "-1 is not a number above 0"),
-    (("--seed", "1.5"), "1.5 is not a whole number of 0 or more"), (("--log", "NONE"), "none"),
+    (("--seed", "1.5"), "1.5 is not a whole number"), (("--log", "NONE"), "none"),
     (("--directory", "NONE"), "no engine is heard")])
 def test_contradictory_options_end_with_a_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path,
                                                    monkeypatch: pytest.MonkeyPatch,

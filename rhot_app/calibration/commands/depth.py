@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
-from rhot_app.errors import CalibrationError, finite, input_file
+from rhot_app.errors import CalibrationError, input_file, positive_number
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -26,9 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rig", type=input_file, metavar="FILE", help="the rig whose two cameras were used")
     parser.add_argument("--out", type=Path, metavar="FILE",
                         help="write the rig with this law as its way to find distance")
-    parser.add_argument("--baseline-mm", type=finite, metavar="B",
+    parser.add_argument("--baseline-mm", type=positive_number, metavar="B",
                         help="distance of the cameras, to compare with theory (default: the rig's, or 75)")
-    parser.add_argument("--view-angle-deg", type=finite, metavar="A",
+    parser.add_argument("--view-angle-deg", type=positive_number, metavar="A",
                         help="horizontal view angle of both cameras (default: the rig's, or 62.2)")
     add_json_argument(parser)
     add_examples(parser, "rhot calibrate depth --table distances.csv",

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, show
-from rhot_app.errors import CalibrationError, finite, input_file
+from rhot_app.errors import CalibrationError, input_file, positive_number
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -24,9 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rig", type=input_file, required=True, metavar="FILE", help="the rig, calibrated")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the rig with the proposed filters")
     parser.add_argument("--per-marker", action="store_true", help="write each marker's own settings too")
-    parser.add_argument("--jitter-mm", type=finite, default=None, metavar="J",
+    parser.add_argument("--jitter-mm", type=positive_number, default=None, metavar="J",
                         help="jitter at rest that is allowed, mm rms (default 0.4)")
-    parser.add_argument("--lag-ms", type=finite, default=None, metavar="L",
+    parser.add_argument("--lag-ms", type=positive_number, default=None, metavar="L",
                         help="lag of fast movement that is allowed, ms (default 1)")
     add_json_argument(parser)
     add_examples(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, SQUARE_MM
 from rhot_app.calibration.verdict import Verdict
-from rhot_app.errors import finite
+from rhot_app.errors import positive_number
 
 if TYPE_CHECKING:
     from rhot_app.calibration.board.boards import Board
@@ -89,10 +89,11 @@ def add_board_arguments(parser: argparse.ArgumentParser) -> None:
     board.add_argument("--board", metavar="COLSxROWS",
                        help=f"inner corners of the chessboard (default {BOARD}); with --marker-mm squares of a ChArUco "
                        f"board (default {CHARUCO})")
-    board.add_argument("--square-mm", type=finite, default=SQUARE_MM, metavar="S",
+    board.add_argument("--square-mm", type=positive_number, default=SQUARE_MM, metavar="S",
                        help=f"side of a square, as measured (default {SQUARE_MM:g}, as rhot target draws it; printers "
                        "scale)")
-    board.add_argument("--marker-mm", type=finite, metavar="M", help="side of a marker: the board is a ChArUco board")
+    board.add_argument("--marker-mm", type=positive_number, metavar="M",
+                       help="side of a marker: the board is a ChArUco board")
     board.add_argument("--dictionary", default="", metavar="NAME", help="its markers (default DICT_4X4_50)")
     board.add_argument("--legacy-pattern", action="store_true", help="it was drawn by OpenCV before 4.6")
 

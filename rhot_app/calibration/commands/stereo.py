@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
-from rhot_app.errors import CalibrationError, finite
+from rhot_app.errors import CalibrationError, positive_number
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -117,9 +117,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     lenses.add_argument("--refine-intrinsics", action="store_true",
                         help="let given lenses change within their standard deviations")
     checks = parser.add_argument_group("a second known length, which alone can tell a wrong square size")
-    checks.add_argument("--baseline-mm", type=finite, metavar="B",
+    checks.add_argument("--baseline-mm", type=positive_number, metavar="B",
                         help="distance of the first two cameras, measured by hand from lens to lens (75 as built)")
-    checks.add_argument("--ruler-mm", type=finite, metavar="L", help="length of a ruler that the cameras saw")
+    checks.add_argument("--ruler-mm", type=positive_number, metavar="L", help="length of a ruler that the cameras saw")
     checks.add_argument("--ruler", action="append", default=[], metavar="NAME=x,y,x,y",
                         help="its two ends in a camera's picture, px from the upper left; for two cameras")
     rig = parser.add_argument_group("rig")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
 from rhot_app.calibration.commands.output import require_folder
-from rhot_app.errors import finite
+from rhot_app.errors import positive_number
 from rhot_node.terminal import add_examples
 
 
@@ -17,9 +17,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--board", default=None, metavar=BOARD,
                         help=f"inner corners of a chessboard (default {BOARD}), squares of a ChArUco board (default "
                         f"{CHARUCO})")
-    parser.add_argument("--square-mm", type=finite, default=SQUARE_MM, metavar="S",
+    parser.add_argument("--square-mm", type=positive_number, default=SQUARE_MM, metavar="S",
                         help=f"side of a square (default {SQUARE_MM:g})")
-    parser.add_argument("--marker-mm", type=finite, metavar="M",
+    parser.add_argument("--marker-mm", type=positive_number, metavar="M",
                         help="side of a ChArUco marker (default three quarters of the square)")
     parser.add_argument("--dictionary", default="DICT_4X4_50", help="the markers' dictionary (default DICT_4X4_50)")
     parser.add_argument("--legacy-pattern", action="store_true", help="the ChArUco layout of OpenCV before 4.6")

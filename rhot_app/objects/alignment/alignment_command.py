@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
-from rhot_app.errors import CalibrationError, finite, input_file
+from rhot_app.errors import CalibrationError, input_file, positive_number
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="the other tracker's poses, t,x,y,z,qw,qx,qy,qz in s and m, with that header")
     parser.add_argument("--rig-points", type=input_file, required=True, metavar="CSV",
                         help="positions of a fingertip or tag on that tracker, t,x,y,z in s and m, rig frame")
-    parser.add_argument("--search", type=finite, default=1.0, metavar="S",
+    parser.add_argument("--search", type=positive_number, default=1.0, metavar="S",
                         help="search the time offset within this, either way (default: 1 s)")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the alignment")
     parser.add_argument("--check", type=input_file, metavar="FILE",

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, SQUARE_MM
-from rhot_app.errors import finite, whole
+from rhot_app.errors import count, not_negative, positive_number
 
 if TYPE_CHECKING:
     from rhot_app.simulator.scene.scene import Scene
@@ -29,10 +29,10 @@ def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
                         help="name of a motion (still, rest, wave, brisk, grasp, pinch, point, spread, tap, fast, "
                              "sweep, cross, roam, mouse), a motion file (.json), or a recording (Qualisys .tsv, Leap "
                              "Motion .csv); default grasp")
-    parser.add_argument("--seed", type=whole, default=1, metavar="N", help="seed of all that is random (default 1)")
+    parser.add_argument("--seed", type=count, default=1, metavar="N", help="seed of all that is random (default 1)")
     parser.add_argument("--preset", default=None, choices=("wide", "fast"),
                         help="camera preset: wide (62.2 degrees, 40 fps) or fast (26.5 degrees, 120 fps)")
-    parser.add_argument("--distance", type=finite, default=None, metavar="M",
+    parser.add_argument("--distance", type=positive_number, default=None, metavar="M",
                         help="distance of the hand from the cameras in metres (default 0.6)")
     parser.add_argument("--background", default=None, choices=("cloth", "clutter", "skin"),
                         help="what stands behind the hand: cloth (default), clutter, or skin, clutter with things of "
@@ -42,17 +42,17 @@ def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
                              "(.json)")
     parser.add_argument("--back", action="store_const", const="back", default=None,
                         help="the back of the hand faces the cameras (default: the palm does)")
-    parser.add_argument("--worn", type=finite, default=None, metavar="P",
+    parser.add_argument("--worn", type=not_negative, default=None, metavar="P",
                         help="share 0..0.9 of the paint that has come off, in pieces of 2 mm (default 0)")
-    parser.add_argument("--uneven", type=finite, default=None, metavar="P",
+    parser.add_argument("--uneven", type=not_negative, default=None, metavar="P",
                         help="share 0..0.9 by which the paint's brightness varies over the patch (default 0)")
     parser.add_argument("--glove", default=None, metavar="R,G,B",
                         help="a glove of this colour, 0..255 each, instead of skin (default: none)")
-    parser.add_argument("--lamp", type=finite, default=None, metavar="F",
+    parser.add_argument("--lamp", type=not_negative, default=None, metavar="F",
                         help="brightness of the lamp, a factor on its light (default 1)")
-    parser.add_argument("--kelvin", type=finite, default=None, metavar="K",
+    parser.add_argument("--kelvin", type=positive_number, default=None, metavar="K",
                         help="colour temperature of the lamp; 6500, the default, is neutral, 3000 a warm bulb")
-    parser.add_argument("--mains", type=finite, default=None, metavar="HZ",
+    parser.add_argument("--mains", type=not_negative, default=None, metavar="HZ",
                         help="let the lamp flicker with mains of 50 or 60 Hz (default: steady)")
 
 
@@ -106,22 +106,22 @@ def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     room.add_argument("--show", default="hand", choices=("hand", "board", "ruler", "marker", "empty"),
                       help="what stands before the cameras (default hand)")
     room.add_argument("--bare", action="store_true", help="the hand wears no markers: skin, nails and a forearm")
-    room.add_argument("--tone", type=finite, default=None, metavar="T",
+    room.add_argument("--tone", type=positive_number, default=None, metavar="T",
                       help="skin tone of a bare hand, 1 (light) to 10 on the Monk scale (default: drawn from the seed)")
     room.add_argument("--sleeve", action="store_true", help="the arm of a bare hand wears a sleeve")
     room.add_argument("--board", default=None, metavar="COLSxROWS",
                       help=f"inner corners of a chessboard (default {BOARD}), squares of a ChArUco board (default "
                       f"{CHARUCO})")
-    room.add_argument("--square-mm", type=finite, default=SQUARE_MM, metavar="S",
+    room.add_argument("--square-mm", type=positive_number, default=SQUARE_MM, metavar="S",
                       help=f"side of its squares (default {SQUARE_MM:g})")
     room.add_argument("--charuco", action="store_true", help="a ChArUco board (DICT_4X4_50) instead of a chessboard")
-    room.add_argument("--marker-mm", type=finite, default=None, metavar="S",
+    room.add_argument("--marker-mm", type=positive_number, default=None, metavar="S",
                       help="side of the ChArUco board's markers (default 3/4 of a square)")
     room.add_argument("--dictionary", default=None, metavar="NAME", help="family of the ChArUco board's markers")
     room.add_argument("--legacy-pattern", "--legacy", dest="legacy", action="store_true",
                       help="ChArUco layout of OpenCV before 4.6")
     room.add_argument("--on-table", action="store_true", help="the board lies on the table below")
-    room.add_argument("--ruler-mm", type=finite, default=200.0, metavar="L",
+    room.add_argument("--ruler-mm", type=positive_number, default=200.0, metavar="L",
                       help="distance of the ruler's crosses (default 200)")
     room.add_argument("--marker", default=None, metavar="ID",
                       help="which marker's colour the single ball has, at --distance (default: the set's first)")

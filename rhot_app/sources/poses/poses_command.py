@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import SourceError, add_force_argument, finite, refuse_existing
+from rhot_app.errors import SourceError, add_force_argument, positive_number, refuse_existing
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="openvr, libsurvive, run:PROGRAM, tcp:HOST:PORT, udp:PORT, or a CSV file")
     parser.add_argument("--tracker", default="", metavar="NAME",
                         help="the tracker's serial number or role (default: the only one)")
-    parser.add_argument("--seconds", type=finite, default=20.0, metavar="N",
+    parser.add_argument("--seconds", type=positive_number, default=20.0, metavar="N",
                         help="how long to listen (default: 20); a CSV file is read whole")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the tracked poses as CSV")
     add_force_argument(parser)

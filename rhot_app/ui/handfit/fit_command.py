@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import CalibrationError, finite, input_file
+from rhot_app.errors import CalibrationError, input_file, not_negative
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pictures", nargs="+", action="append", required=True, metavar="[NAME=]FILE",
                         help="pictures or videos of one instant, in the order of the rig's cameras or with their "
                              "names; give it again for another instant")
-    parser.add_argument("--at", type=finite, nargs="+", default=[], metavar="S",
+    parser.add_argument("--at", type=not_negative, nargs="+", default=[], metavar="S",
                         help="of videos: the second of each instant, from the first moment that all videos show "
                              "(default 0)")
     parser.add_argument("--hand", type=input_file, metavar="HAND",
