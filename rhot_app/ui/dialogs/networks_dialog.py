@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app.ui.common.job import Job, Progress
+from rhot_app.ui.common.sentence import Sentence
 from rhot_node.errors import KeypointError
 from rhot_node.landmarks.install import FILES, LICENCE, PACKAGE, install_networks, read_network, user_folder
 
@@ -36,10 +36,7 @@ class NetworksDialog(QDialog):
         meaning = QLabel(_MEANING)
         meaning.setWordWrap(True)
         meaning.setProperty("muted", True)
-        self.sentence = QLabel()
-        self.sentence.setWordWrap(True)
-        self.sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.sentence.setMinimumHeight(_LINES * self.fontMetrics().lineSpacing())
+        self.sentence = Sentence(_LINES)
         self.bar = QProgressBar()
         self.bar.setRange(0, 100)
         self.bar.setTextVisible(False)

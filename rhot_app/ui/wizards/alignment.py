@@ -125,7 +125,7 @@ class TogetherPage(Page):
         self.column.addWidget(self.button)
         self.column.addStretch(1)
         self.first_field = self.button
-        self.twin_facts = "Simulated hand does, Moves and turns."
+        self.twin_facts = "Moves and turns."
 
     def entered(self) -> None:
         """Hear the hand from now on; have a resting engine track."""

@@ -34,7 +34,7 @@ def make_plan(kit: Kit) -> Plan:
     entry = EntryStep(kit.rig.hand)
     page = movements.page("Move freely", "Press Record, then bend and stretch every finger and turn the hand.", SECONDS,
                           lambda: make_coach(kit.rig))
-    page.twin_facts = "Simulated hand does, Moves every joint: all of them within the minute."
+    page.twin_facts = "Moves every joint: all of them within the minute."
     page.movement.unneeded = lambda: "Press Next: the bones were entered." if entry.report is not None else ""
     hand = HandStep(entry, page.movement, kit.rig)
     accept = AcceptStep(lambda: propose(hand.report, kit.rig, kit.rig_path), "Record the movement first.")
@@ -54,7 +54,7 @@ _ALPHA = {"measured": 150, "inferred": 60, "guessed": 110}
 
 
 class EntryPage(Page):
-    """A number for each bone that was measured; 0 shows as "not measured"."""
+    """A number for each bone that was measured; 0 shows as a dash."""
 
     def __init__(self, step: EntryStep) -> None:
         super().__init__(step)
@@ -102,7 +102,7 @@ class EntryPage(Page):
         box.setRange(0.0, _LONGEST_MM)
         box.setDecimals(1)
         box.setSuffix(" mm")
-        box.setSpecialValueText("not measured")
+        box.setSpecialValueText("–")
         box.setKeyboardTracking(False)
         box.setAccessibleName(name)
         box.setMinimumWidth(_BOX_PX)

@@ -89,7 +89,7 @@ class DistancePage(Page):
         shrinkable(self.table)
         self.column.addWidget(self.remove_button)
         self.first_field = self.distance
-        self.twin_facts = "Simulated hand does, Shows one marker at, holds one at the distance that you choose."
+        self.twin_facts = "Shows one marker at: choose the distance that you enter here."
         self._show_removable()
 
     def entered(self) -> None:

@@ -46,7 +46,7 @@ def make_plan(kit: Kit) -> Plan:
 
     still = page("Hold still", "Rest the hand before both cameras, then press Record.", STILL_S, StillCoach)
     fast = page("Move fast", "Press Record, then wave the hand briskly, 20 cm wide.", FAST_S, FastCoach)
-    still.twin_facts, fast.twin_facts = "Simulated hand does, Holds still.", "Simulated hand does, Waves briskly."
+    still.twin_facts, fast.twin_facts = "Holds still.", "Waves briskly."
     tune = TuneStep(lambda: (still.movement.log, fast.movement.log), kit.rig)
     accept = AcceptStep(lambda: propose(tune.report, kit.rig, kit.rig_path, per_marker=tune.per_marker),
                         "Record both movements first.")

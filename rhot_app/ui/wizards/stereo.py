@@ -52,8 +52,7 @@ class KnownPage(Page):
         super().__init__(step)
         self._known = step
         self.pickable = True
-        self.twin_facts = (f"the crosses of its ruler are {RulerShow().length_mm:g} mm apart. Simulated hand does, "
-                           "Shows a ruler.")
+        self.twin_facts = f"Shows a ruler: its crosses are {RulerShow().length_mm:g} mm apart."
         self.baseline = _length("The distance between the middles of the two lenses, measured by hand. 75 mm on the "
                                 "frame that the thesis describes.")
         self.ruler = _length("The distance between two marks on a ruler, 200 mm for instance, that both cameras see.")

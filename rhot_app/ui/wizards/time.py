@@ -14,7 +14,7 @@ def make_plan(kit: Kit) -> Plan:
     movements = Movements(kit)
     wave = movements.page("Wave", "Press Record, then wave your hand up and down before the cameras for 20 seconds.",
                           SECONDS, WaveCoach)
-    wave.twin_facts = "Simulated hand does, Waves briskly."
+    wave.twin_facts = "Waves briskly."
     movement = wave.movement
 
     def task() -> Task | None:

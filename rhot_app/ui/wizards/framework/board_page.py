@@ -70,8 +70,10 @@ class BoardPage(Page):
         self.column.addWidget(self.note)
         self.column.addStretch(1)
         self.first_field = self.square
-        self.twin_facts = (f"its board is a chessboard of {BOARD} inner corners; a square measures {SQUARE_MM:g} mm. "
-                           "Simulated hand does, Shows a board.")
+        self.twin_facts = f"Shows a board: {BOARD} inner corners, squares of {SQUARE_MM:g} mm."
+        for box in (self.kind, self.dictionary):  # in a small window a bar of scrolling stands beside
+            box.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+            box.setMinimumContentsLength(8)
         self._fill(step.fields)
         self._connect_fields()
 

@@ -44,7 +44,7 @@ class WizardFrame:
     """The widgets, laid out in `parent`."""
 
     def __init__(self, plan: Plan, cameras: tuple[str, ...], work: Work, scheme: Scheme, parent: QWidget) -> None:
-        self._plan = plan
+        self._shown: Page | None = None
         self.steps = StepList([page.step.title for page in plan.pages], scheme)
         self.wall = PictureWall(cameras, scheme)
         self.middle = QStackedWidget()
@@ -74,6 +74,7 @@ class WizardFrame:
         self.twin_button = QPushButton("Simulated hand does …")
         self.twin_button.setToolTip("The simulated rig only: what stands before its cameras.")
         self.twin_button.hide()
+        self.twin_facts = Sentence(2, muted=True)
         for button in (self.close_button, self.back_button, self.twin_button):
             button.setAutoDefault(False)
         policy = self.close_button.sizePolicy()
@@ -120,7 +121,7 @@ class WizardFrame:
         buttons = QHBoxLayout()
         buttons.addWidget(self.close_button)
         buttons.addWidget(self.twin_button)
-        buttons.addStretch(1)
+        buttons.addWidget(self.twin_facts, 1)
         buttons.addWidget(self.back_button)
         buttons.addWidget(self.next_button)
         layout = QVBoxLayout(parent)
@@ -134,12 +135,13 @@ class WizardFrame:
         """A button for what the simulated hand does; None on a real rig, where a person does it."""
         if menu is not None:
             self.twin_button.setMenu(menu)
-            for page in self._plan.pages:
-                page.tell_twin_facts()
         self.twin_button.setVisible(menu is not None)
+        self.twin_facts.setText(self._shown.twin_facts if menu is not None and self._shown is not None else "")
 
     def show_page(self, page: Page, number: int) -> None:
         """Another step: its controls, and its own middle or the pictures."""
+        self._shown = page
+        self.twin_facts.setText(page.twin_facts if self.twin_button.menu() is not None else "")
         self.pages.setCurrentIndex(number)
         self.middle.setCurrentWidget(page.centre if page.centre is not None else self.wall)
         self.wall.set_pickable(page.pickable)

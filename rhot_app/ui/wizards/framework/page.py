@@ -36,8 +36,8 @@ class Page(QWidget):
     `changed` tells the window that the person changed something, so that it asks the step anew. `centre` is a widget
     that takes the middle instead of the live pictures; None leaves the pictures there. `first_field` has the keyboard
     when the page opens. `pickable` lets the person click and drag in the pictures, see `pick`. `one_large` shows one
-    picture as large as fits and the others small; a click on a small one makes it the large one. `twin_facts`: what a
-    person would measure or do here, for the simulated rig, which has nobody.
+    picture as large as fits and the others small; a click on a small one makes it the large one. `twin_facts`: what the
+    simulated rig should show here, as its menu says it, and the sizes that a person would measure.
     """
 
     changed = Signal()
@@ -53,14 +53,6 @@ class Page(QWidget):
         self.column = QVBoxLayout(self)
         self.column.setContentsMargins(0, 0, 0, 0)
         self.column.setSpacing(8)
-
-    def tell_twin_facts(self) -> None:
-        """Say what the simulated rig has to be told, below everything else."""
-        if self.twin_facts:
-            facts = QLabel(f"The simulated rig: {self.twin_facts}")
-            facts.setWordWrap(True)
-            last = self.column.itemAt(self.column.count() - 1) if self.column.count() else None
-            self.column.insertWidget(self.column.count() - (last is not None and last.spacerItem() is not None), facts)
 
     def entered(self) -> None:
         """The step is the current one now."""

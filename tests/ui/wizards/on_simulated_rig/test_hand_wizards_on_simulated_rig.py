@@ -23,7 +23,7 @@ def test_the_time_of_the_cameras_is_found(simulated_rig, open_on_rig):
     truth = simulated_rig.truth
     late = msgspec.structs.replace(truth.nodes[1], time_offset_s=0.02)
     simulated_rig.use(msgspec.structs.replace(truth, nodes=(truth.nodes[0], late)))
-    simulated_rig.twin.show(HandShow("wave"))
+    simulated_rig.twin.show(HandShow("brisk"))
     hands = open_on_rig("time")
     hands.record(15.0, "time-wave")
     hands.next()
