@@ -133,7 +133,9 @@ def test_a_far_charuco_board_is_read_or_called_too_small() -> None:
     view = detect(image, board)
     assert view is not None and len(view.ids) > 20 and off(view, truth).max() < 0.3
     far, _ = photo(board, 8.0)
-    assert detect(far, board) is None and "too small" in why_missing(far, board)
+    for picture_or_negative in (far, 255 - far):
+        assert detect(picture_or_negative, board) is None
+        assert "markers have" in (why := why_missing(picture_or_negative, board)) and "too small" in why
 
 
 def test_a_charuco_board_of_which_little_is_seen_is_called_hidden() -> None:

@@ -110,6 +110,15 @@ def test_a_lens_that_no_model_describes_is_refused_by_its_name() -> None:
 RIG = resource_path("rigs", "two_pis.json")
 
 
+def test_a_lens_that_reaches_the_end_of_its_model_is_called_a_fisheye() -> None:
+    """215 degrees: nearly every place has a ray, which is none of the lens."""
+    rig, report = load_rig(RIG), left_of(wide_views(np.random.default_rng(2), focal_px(215.0)))
+    node = msgspec.structs.replace(rig.nodes[0], intrinsics=report.intrinsics)
+    found = check_cameras(msgspec.structs.replace(rig, nodes=(node, *rig.nodes[1:])))
+    first = next(finding for finding in found if finding.code != "nominal")
+    assert first.grade is Grade.POOR and "fisheye" in first.cause and "another picture size" not in first.cause
+
+
 def test_rigs_of_five_coefficients_are_written_as_they_were(tmp_path: Path) -> None:
     rig = load_rig(RIG)
     save_rig(tmp_path / "rig.json", rig)

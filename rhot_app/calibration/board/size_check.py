@@ -127,9 +127,10 @@ def _no_chessboard(gray: Gray, board: Board) -> str:
 
 
 def _no_charuco(gray: Gray, board: CharucoBoard) -> str:
-    plain, negative = read_markers(gray, board, 2.0), read_markers(negated(gray), board, 2.0)
+    either = (gray, negated(gray))
+    plain, negative = (read_markers(each, board, 2.0) for each in either)
     seen = max(plain, negative, key=lambda one: len(one.ids))
-    flipped = np.ascontiguousarray((gray if seen is plain else negated(gray))[:, ::-1])
+    flipped = np.ascontiguousarray(either[0 if seen is plain else 1][:, ::-1])
     if len(read_markers(flipped, board, 2.0).ids) > len(seen.ids):  # a few are read by chance either way
         return "the picture is mirrored: its markers can be read only when it is flipped; switch the mirroring off"
     count, least = len(seen.ids), _CELL_LEAST_PX * (board.marker_family().markerSize + 2)
@@ -140,7 +141,8 @@ def _no_charuco(gray: Gray, board: CharucoBoard) -> str:
     if count >= _FEW_MARKERS and not _fit_the_board(seen, board):
         return (f"{count} markers of {board.dictionary}, but not as on a board of {board.size_text} squares "
                 "(squares counted, not corners)")
-    side_px = _marker_px(seen) if count >= _FEW_MARKERS else _expected_marker_px(gray, board)
+    by_squares = (px for each in either if (px := _expected_marker_px(each, board)) is not None)
+    side_px = _marker_px(seen) if count >= _FEW_MARKERS else next(by_squares, None)
     if side_px is not None and side_px < least:
         return (f"the board is too small in the picture: its markers have {side_px:.0f} px, and {least} are needed; "
                 "come nearer, or use larger squares")
@@ -150,7 +152,7 @@ def _no_charuco(gray: Gray, board: CharucoBoard) -> str:
     if side_px is not None:
         return (f"a board of {board.size_text} squares without markers of {board.dictionary}: wrong dictionary, a "
                 "plain chessboard, or blurred")
-    return f"no markers of {board.dictionary}: not in view, wrong dictionary, or blurred"
+    return f"no markers of {board.dictionary}: not in view, too small, wrong dictionary, or blurred"
 
 
 def _marker_px(seen: MarkersSeen) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.check.camera_calibration import calibration_finding
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
-from rhot_app.geometry.camera import CameraModel, is_wide, lens_parameters
+from rhot_app.geometry.camera import FARTHEST_DEG, CameraModel, is_wide, lens_parameters
 from rhot_app.geometry.transforms import inverse
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.places import ROLES
@@ -91,10 +91,13 @@ def lens_findings(node: RigNode, figures: LensFigures) -> list[Finding]:
             f"{lens.width}x{lens.height} px.", "It should be near the middle; the intrinsics may be of another picture "
             "size, or of views that were all alike.", _CALIBRATE))
     if figures.usable < 1.0:
+        wide = is_wide(lens_parameters(lens))
+        cause = ("The coefficients were fitted to views that do not reach the picture's corners" +
+                 (f", or it is a fisheye lens that sees more than {FARTHEST_DEG:.0f} degrees aside." if wide else "."))
         found.append(Finding(
             "distortion", Grade.POOR if figures.usable < 0.95 else Grade.FAIR,
             f"The distortion of {name} turns over inside the picture: {100 * (1 - figures.usable):.0f} % of it has no "
-            "direction.", "The coefficients were fitted to views that do not reach the picture's corners.", _CALIBRATE))
+            "direction.", cause, f"{_CALIBRATE} {_NARROWER}" if wide else _CALIBRATE))
     return [each for each in found if each is not None]
 
 
@@ -122,21 +125,26 @@ def all_pairs(rig: Rig) -> list[PairGeometry]:
 
 
 _CALIBRATE = "Calibrate the intrinsics of this camera."
+_NARROWER = "Use a lens of less than 150 degrees, or a mode of the camera that shows less."
 _STEREO = "Run the stereo calibration."
 
 
 def _view_finding(node: RigNode, figures: LensFigures) -> Finding | None:
     degrees = float(np.degrees(figures.view_rad[0]))
-    widest = (_POSSIBLE_VIEW_DEG if is_wide(lens_parameters(node.intrinsics)) else _USUAL_VIEW_DEG)[1]
+    wide = is_wide(lens_parameters(node.intrinsics))
+    widest = (_POSSIBLE_VIEW_DEG if wide else _USUAL_VIEW_DEG)[1]
     if _USUAL_VIEW_DEG[0] <= degrees <= widest:
         return None
     as_pinhole = np.degrees(2.0 * np.arctan(0.5 * node.intrinsics.width / node.intrinsics.fx))
     possible = all(_POSSIBLE_VIEW_DEG[0] <= each <= _POSSIBLE_VIEW_DEG[1] for each in (degrees, as_pinhole))
-    return Finding(
-        "field_of_view", Grade.FAIR if possible else Grade.POOR,
-        f"{node.name.capitalize()} sees {degrees:.0f} degrees across (f {node.intrinsics.fx:.0f} px, picture "
-        f"{node.intrinsics.width} px wide).", "The focal length may be of another picture size, or in millimetres.",
-        _CALIBRATE)
+    figure = (f"{node.name.capitalize()} sees {degrees:.0f} degrees across (f {node.intrinsics.fx:.0f} px, picture "
+              f"{node.intrinsics.width} px wide).")
+    if wide and degrees > widest:
+        return Finding("field_of_view", Grade.POOR, figure, "It is a fisheye lens: the model of a lens ends "
+                       f"{FARTHEST_DEG:.0f} degrees from the lens's axis.",
+                       _NARROWER)
+    return Finding("field_of_view", Grade.FAIR if possible else Grade.POOR, figure,
+                   "The focal length may be of another picture size, or in millimetres.", _CALIBRATE)
 
 
 def _overlap_findings(pairs: list[PairGeometry]) -> list[Finding]:
