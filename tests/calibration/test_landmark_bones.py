@@ -86,3 +86,11 @@ def test_smoothed_landmarks_are_about_as_near_as_filtered_ones_and_calmer():
     assert np.median(smoothed) < 1.1 * np.median(filtered)
     assert np.percentile(smoothed, 95) < 1.15 * np.percentile(filtered, 95)
     assert recording().jitter(hand, smooth=True) < 0.4 * recording().jitter(hand)
+
+
+@needs_recording
+@pytest.mark.parametrize("frame", range(JUDGED.start + 5, JUDGED.stop, 12))
+def test_a_hand_that_is_held_still_is_found_with_all_its_fingers(frame):
+    """One frame for a second, with the shipped bones: no finger stays where it began."""
+    off = recording().held_still(frame)
+    assert np.median(off) < 10.0 and off.max() < 30.0

@@ -18,7 +18,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettings
-from rhot_app.recording.landmark_log import read_landmark_table, write_landmark_log
+from rhot_app.recording.landmark_log import LandmarkTable, read_landmark_table, write_landmark_log
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.smoothing import SmoothedTracker
@@ -98,6 +98,14 @@ class Recording:
             if state.tracked and frame in self._frames:
                 found[np.searchsorted(self._frames, frame)] = state.joint_positions
         return found
+
+    def held_still(self, frame: int, seconds: float = 1.0) -> np.ndarray:
+        """(21,) mm: how far the joints are off after a frame of WHOLE on was held so long; NaN when no hand is found."""
+        count = round(seconds * FPS)
+        tables = [LandmarkTable(np.arange(count) / FPS, np.repeat(pixels[frame][None], count, axis=0),
+                                np.full(count, 0.9), np.full(count, 0.5)) for pixels in self._pixels]
+        last = list(_states(self.rig, tables, False))[-1][1]
+        return 1e3 * np.linalg.norm(last.joint_positions - self.places[frame], axis=1)
 
     def errors(self, hand=None, smooth: bool = False) -> np.ndarray:
         """(T, 21) mm of the joints in the judged frames."""

@@ -6,6 +6,7 @@ import copy
 import math
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import cv2
@@ -41,6 +42,9 @@ LEAST_MARKERS = 4
 
 LEAST_ON_PALM = 5
 """Landmarks of the palm that show how it is turned: it has six."""
+
+EXTENT_M = 0.1
+"""Greatest extent of a hand's landmarks: a fist's, so that no noise is taken for too small."""
 
 FLATTEST_M2 = 1e-5
 """Least area spanned by three palm markers that show how the palm is turned."""
@@ -86,7 +90,18 @@ class Starter:
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in."""
-        self._waiting.append(observations)
+        self._waiting.append(self._with_landmark_noise(observations))
+
+    def _with_landmark_noise(self, observations: CameraObservations) -> CameraObservations:
+        """The frame with the noise of landmarks, of a hand as far as its image is large: what a detector states is less
+        than by how much two cameras' landmarks miss each other."""
+        own = self._markers.landmark & np.isfinite(observations.pixels[:, 0])
+        if np.count_nonzero(own) < LEAST_ON_PALM:
+            return observations
+        extent_px = float(np.ptp(observations.pixels[own], axis=0).max())
+        covariances = observations.covariances.copy()
+        covariances[own] += (NOISE_M / EXTENT_M * extent_px) ** 2 * np.eye(2)
+        return replace(observations, covariances=covariances)
 
     def locate(self) -> Located | None:
         """Where the markers were at the newest instant; None: none is due."""

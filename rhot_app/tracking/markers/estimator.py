@@ -33,6 +33,7 @@ from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Indices = NDArray[np.int64]
 
 START_SD = 0.03, 0.5
 """m and rad: standard deviation of the palm's pose as it is first found."""
@@ -262,14 +263,19 @@ class Rejections:
 
 
 def associate(frame: MarkerFrame, pixels: Array, covariances: Array, distances: Array) -> MarkerFrame:
-    """The frame with the blob of each marker, predicted at `pixels` (M, 2) with `covariances` (M, 2, 2) px^2."""
-    if frame.observations.further is None and not np.any(distances > GATE):
-        return frame
+    """The frame with the blob of each marker, predicted at `pixels` (M, 2) with `covariances` (M, 2, 2) px^2. A
+    landmark is always its own: a detector that errs does not mean another joint, and its kernel weighs it."""
     landmark = frame.markers.landmark
-    return frame.associated(lambda listed, listed_covariances, own: assign(
-        np.nan_to_num(pixels), np.where(np.isfinite(pixels[:, :1, None]), covariances, np.eye(2)), listed,
-        listed_covariances, np.where(own, 0.0, np.where(landmark[:, None] | own[landmark].any(axis=0), np.inf,
-                                                        -2.0 * np.log(CONFUSION))))[0])
+    if frame.observations.further is None and not np.any(distances[~landmark] > GATE):
+        return frame
+
+    def chosen(listed: Array, listed_covariances: Array, own: Mask) -> Indices:
+        taken = own[landmark].any(axis=0)
+        blobs = assign(np.nan_to_num(pixels), np.where(np.isfinite(pixels[:, :1, None]), covariances, np.eye(2)), listed,
+                       listed_covariances, np.where(own, 0.0, np.where(landmark[:, None] | taken, np.inf,
+                                                                       -2.0 * np.log(CONFUSION))))[0]
+        return np.where(landmark, np.where(own.any(axis=1), own.argmax(axis=1), -1), blobs)
+    return frame.associated(chosen)
 
 
 def distances_of(frame: MarkerFrame, pixels: Array, covariances: Array) -> Array:
