@@ -105,7 +105,7 @@ class NodesDialog(QDialog):
         layout.addWidget(default)
         layout.addWidget(self.verdict)
         layout.addLayout(buttons)
-        self.resize(820, 560)
+        self.resize(820, 640)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Look for nodes as soon as somebody sees the dialog."""
