@@ -100,7 +100,7 @@ class Recording:
         return found
 
     def held_still(self, frame: int, seconds: float = 1.0) -> np.ndarray:
-        """(21,) mm: how far the joints are off after a frame of WHOLE on was held so long; NaN when no hand is found."""
+        """(21,) mm: how far the joints are off after a frame was held so long; NaN when no hand is found."""
         count = round(seconds * FPS)
         tables = [LandmarkTable(np.arange(count) / FPS, np.repeat(pixels[frame][None], count, axis=0),
                                 np.full(count, 0.9), np.full(count, 0.5)) for pixels in self._pixels]

@@ -271,9 +271,9 @@ def associate(frame: MarkerFrame, pixels: Array, covariances: Array, distances: 
 
     def chosen(listed: Array, listed_covariances: Array, own: Mask) -> Indices:
         taken = own[landmark].any(axis=0)
-        blobs = assign(np.nan_to_num(pixels), np.where(np.isfinite(pixels[:, :1, None]), covariances, np.eye(2)), listed,
-                       listed_covariances, np.where(own, 0.0, np.where(landmark[:, None] | taken, np.inf,
-                                                                       -2.0 * np.log(CONFUSION))))[0]
+        known = np.where(np.isfinite(pixels[:, :1, None]), covariances, np.eye(2))
+        confused = np.where(landmark[:, None] | taken, np.inf, -2.0 * np.log(CONFUSION))
+        blobs = assign(np.nan_to_num(pixels), known, listed, listed_covariances, np.where(own, 0.0, confused))[0]
         return np.where(landmark, np.where(own.any(axis=1), own.argmax(axis=1), -1), blobs)
     return frame.associated(chosen)
 
