@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import project
 from rhot_app.barehand.surface import FOREARM, Surface, place_capsules
-from rhot_app.geometry.camera import pixels_per_metre
+from rhot_app.geometry.camera import pixels_per_metre_facing
 from rhot_app.hand.kinematics import move
 
 Array = NDArray[np.float64]
@@ -88,10 +88,10 @@ def _project_capsule(c0, c1, r0, r1, pose, intrinsics, step, a, b, slope, circle
     not in front of the camera."""
     if not (project(c0[0], c0[1], c0[2], pose, intrinsics, a, slope)):
         return False
-    circles[_R0] = r0 * pixels_per_metre(slope) / step
+    circles[_R0] = r0 * pixels_per_metre_facing(slope, pose) / step
     if not (project(c1[0], c1[1], c1[2], pose, intrinsics, b, slope)):
         return False
-    circles[_R1] = r1 * pixels_per_metre(slope) / step
+    circles[_R1] = r1 * pixels_per_metre_facing(slope, pose) / step
     circles[_U0], circles[_V0] = (a[0] + 0.5) / step - 0.5, (a[1] + 0.5) / step - 0.5
     circles[_U1], circles[_V1] = (b[0] + 0.5) / step - 0.5, (b[1] + 0.5) / step - 0.5
     circles[_DU], circles[_DV] = circles[_U1] - circles[_U0], circles[_V1] - circles[_V0]
@@ -154,7 +154,7 @@ def _arm(world, wrist, thick, bend, inside, step, pose, intrinsics, mask, a, b, 
         if begun:
             du, dv = u - b[0], v - b[1]
             length = np.sqrt(du * du + dv * dv)
-            wide = pixels_per_metre(slope) * (thick + s * FOREARM_SPREAD) / step
+            wide = pixels_per_metre_facing(slope, pose) * (thick + s * FOREARM_SPREAD) / step
             for j in range(-2, 3):
                 across = 0.4 * j * wide / max(length, 1e-9)
                 row, column = int(np.floor(v + across * du + 0.5)), int(np.floor(u - across * dv + 0.5))

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from rhot_app.barehand.silhouette import CORRELATED, LogOddsMaps, log_odds_maps, score, score_steps, search
 from rhot_app.barehand.surface import SHAPE, Surface
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.camera import CameraModel, pixels_per_metre_facing, project_with_slope
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
@@ -211,16 +211,22 @@ def _palm_centres(maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraM
         camera = cameras[0]
         for peak in peaks[0]:
             ray = camera.world_from_camera[:3, :3] @ np.append(camera.undistort(peak[None, :2])[0], 1.0)
-            place = camera.centre + camera.pixels_per_metre(camera.centre + ray)[0] * breadth / peak[2] * ray
+            place = camera.centre + _scale(camera, camera.centre + ray) * breadth / peak[2] * ray
             if np.isfinite(place).all():
                 found.append((0.0, place))
     found.sort(key=lambda one: one[0])
     return [place for _, place in found[:PALMS]]
 
 
+def _scale(camera: CameraModel, place: Array) -> float:
+    """px per m of what faces the camera at a position; NaN where it sees nothing."""
+    _, slopes = project_with_slope(place[None], camera.camera_from_world, camera.intrinsics)
+    return pixels_per_metre_facing(slopes[0], camera.camera_from_world)
+
+
 def _size_error(camera: CameraModel, place: Array, radius: float, breadth: float) -> float:
     """Absolute log ratio of a radius px to that of a palm at a position; inf beyond _PALM_RADIUS."""
-    ratio = radius / (camera.pixels_per_metre(place)[0] * breadth)
+    ratio = radius / (_scale(camera, place) * breadth)
     return abs(float(np.log(ratio))) if _PALM_RADIUS[0] < ratio < _PALM_RADIUS[1] else np.inf
 
 

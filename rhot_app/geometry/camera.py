@@ -240,6 +240,18 @@ def pixels_per_metre(slope: Array) -> float:
 
 
 @njit(cache=True)
+def pixels_per_metre_facing(slope: Array, camera_from_world: Array) -> float:
+    """The same of a square that faces along the camera's axis: the focal length by the depth, for a plain lens."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        a += slope[0, k] * camera_from_world[0, k]
+        b += slope[0, k] * camera_from_world[1, k]
+        c += slope[1, k] * camera_from_world[0, k]
+        d += slope[1, k] * camera_from_world[1, k]
+    return math.sqrt(abs(a * d - b * c))
+
+
+@njit(cache=True)
 def project_with_slope(points: Array, camera_from_world: Array, intrinsics: Array) -> tuple[Array, Array]:
     """Raw pixels (N, 2) of world points (N, 3) m and their slopes (N, 2, 3) px/m; NaN where the camera sees nothing."""
     count = len(points)

@@ -10,6 +10,7 @@ from rhot_app.geometry.camera import (
     lens_parameters,
     linearise_lenses,
     pixels_per_metre,
+    pixels_per_metre_facing,
     project_with_slope,
     rig_intrinsics,
     undistort_point,
@@ -178,3 +179,18 @@ def test_the_field_of_view_of_a_wide_lens_is_that_of_its_rays():
     assert np.degrees(across) == pytest.approx(120.0, abs=1.0)  # equidistant, f 306 px: 640 / 306 rad
     assert np.degrees(down) == pytest.approx(90.0, abs=1.0)
     assert camera("none").field_of_view[0] == pytest.approx(2.0 * np.arctan(320.0 / 531.0), abs=1e-3)
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_what_faces_the_camera_is_as_large_as_a_square_across_its_axis(lens):
+    model, side = camera(lens), 1e-4
+    for local in ([0.0, 0.0, 0.6], [0.2, -0.1, 0.6]):
+        corners = np.array(local) + side * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+        place = corners @ model.world_from_camera[:3, :3].T + model.centre
+        pixels = model.project(place)
+        area = abs(np.linalg.det(pixels[1:] - pixels[0]))
+        _, slopes = project_with_slope(place[:1], model.camera_from_world, model.intrinsics)
+        facing = pixels_per_metre_facing(slopes[0], model.camera_from_world)
+        assert facing == pytest.approx(np.sqrt(area) / side, rel=1e-3)
+        if lens == "none":
+            assert facing == pytest.approx(np.sqrt(531.0 * 529.0) / 0.6)
