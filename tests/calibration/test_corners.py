@@ -157,7 +157,8 @@ def test_pictures_without_a_board_are_no_trouble(shape: tuple[int, ...]) -> None
 def test_why_a_chessboard_was_not_found() -> None:
     gray = picture("left", 1)
     assert "seems to have 9x6" in why_missing(gray, Chessboard(12, 9, 0.03))
-    assert "all of them must be visible" in why_missing(gray[:, :330], BOARD)
+    cut = why_missing(gray[:, :330], BOARD)  # OpenCV sees a smaller board in some runs, and none in most
+    assert "all of them must be visible" in cut or "part of the board is hidden" in cut
     assert "one brightness" in why_missing(np.full_like(gray, 3), BOARD)
 
 
