@@ -2,8 +2,8 @@
 
     python benchmarks/landmarks.py [--data ../shared/data/bare_hand_stereo] [--unit-mm 38.5] [--seeds 2] [--json FILE]
 
-First the recorded hand, if it is there: the errors of its landmarks about the hand that fits them (the source of the
-constants in `hand.landmarks`), then reprojection, jitter and lag of the tracked hand against plain triangulation of
+First the recorded hand, if it is there: the errors of its landmarks about the hand that fits them (the source of
+`simulator.nodes.landmark_detector.LandmarkErrors`), then reprojection, jitter and lag of the tracked hand against plain triangulation of
 the same landmarks. The recording's unit of length is unknown: `--unit-mm` makes its hand as large as the rig's.
 Then synthetic hands with landmarks that err as much: errors of the joints against triangulation, NEES and the part of
 errors within three sigma. The jitter is the rms of third differences, divided by sqrt(20), of a point's coordinates.
@@ -167,12 +167,12 @@ def landmark_errors(rig: Rig, cameras: list[CameraModel], times_s: Array, pixels
     return {
         "ANATOMY_SD_M: mean place about the joint, mm": 1e3 * float(np.sqrt(np.mean(offsets**2))),
         "beside the mean, all, mm": math.sqrt(variance),
-        "LASTING_M: the part that lasts, mm": math.sqrt(lasting * variance),
+        "the part that lasts, mm": math.sqrt(lasting * variance),
         "LASTING_S: its correlation time, s": below / FPS,
         "what is new in a frame, mm": math.sqrt((1.0 - lasting) * variance),
-        "NOISE_M: what is new within two, mm": math.sqrt(max(1.0 - kept[1], 0.0) * variance),
+        "what is new within two, mm": math.sqrt(max(1.0 - kept[1], 0.0) * variance),
         "of all landmarks together, robust, mm": scale * 1.4826 * float(np.median(np.abs(common))),
-        "COMMON_M: the same, rms, with dropped frames, mm": scale * float(np.sqrt(np.mean(common**2))),
+        "the same, rms, with dropped frames, mm": scale * float(np.sqrt(np.mean(common**2))),
         "beside the mean, by the hand's image size": math.sqrt(variance) / scale / extent,
         "beyond three robust deviations, %": 100.0 * float(np.mean(np.abs(rest) > 3.0 * robust)),
     }, fit.unknowns.anatomy(fit.bundle.vector)

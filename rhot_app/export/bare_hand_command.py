@@ -107,18 +107,19 @@ def _check_empty(videos: Sequence[CameraVideo], seconds: float) -> None:
 
 
 def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:
-    """What an option says of each camera, as NAME=VALUE. Raises RecordingError."""
+    """What an option, or a word without one (""), says of each camera, as NAME=VALUE. Raises RecordingError."""
     names = [node.name for node in rig.nodes]
+    option = f"{option} " if option else ""
     found: dict[str, str] = {}
     for text in given:
         name = max((name for name in names if text.startswith(f"{name}=")), key=len, default=text.partition("=")[0])
         value = text[len(name) + 1:]
         if not value:
-            raise RecordingError(f"{option} {text}: give a camera and its value, as in {option} {names[0]}=...")
+            raise RecordingError(f"{option}{text}: give a camera and its value, as in {option}{names[0]}=...")
         if name not in names:
-            raise RecordingError(f"{option} {text}: there is no camera {name!r} here; there are {', '.join(names)}.")
+            raise RecordingError(f"{option}{text}: there is no camera {name!r} here; there are {', '.join(names)}.")
         if name in found:
-            raise RecordingError(f"{option} {text}: camera {name} is named twice.")
+            raise RecordingError(f"{option}{text}: camera {name} is named twice.")
         found[name] = value
     return found
 

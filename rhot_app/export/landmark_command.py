@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write_log(args: argparse.Namespace) -> int:
-    from rhot_app.export.landmark_track import MEDIAN_M, summarise, with_measured_bones
+    from rhot_app.export.landmark_track import MEDIAN_M, states_of_log, summarise, with_measured_bones
     from rhot_app.project import load_rig, with_tracker
     from rhot_app.recording.landmark_log import landmark_order, read_landmark_table, write_landmark_log
     from rhot_node.compiled import announce_compilation
@@ -76,7 +76,8 @@ def _write_log(args: argparse.Namespace) -> int:
     if args.bones == "measured":
         rig, bones = with_measured_bones(rig, args.out)
         write_landmark_log(args.out, rig, tables)
-    summary: dict[str, Any] = {"log": str(args.out), "frames": frames, "bones": bones} | summarise(rig, args.out)
+    summary: dict[str, Any] = {"log": str(args.out), "frames": frames, "bones": bones} | summarise(
+        rig, list(states_of_log(rig, args.out)))
     if args.json:
         print(json.dumps(summary))
         return 0

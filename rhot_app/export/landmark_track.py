@@ -48,7 +48,7 @@ MEDIAN_M = math.sqrt(2.0 * math.log(2.0) * (ANATOMY_SD_M**2 + NOISE_M**2))
 """m: median distance of a landmark from its joint (`hand.landmarks`): a Rayleigh distribution's."""
 
 LARGE = 1.7
-"""Times MEDIAN_M from which the rig or its hand is wrong. Chosen: between 1.4 of the
+"""Times MEDIAN_M from which the rig or its hand is wrong. Chosen: between 1.2 of the
 recorded hand in docs/landmarks.md with the shipped bones, and 1.8 with a wrong side or unit."""
 
 FOUND_RGB: Final = (255, 220, 0)
@@ -160,7 +160,7 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, measure: bool = 
             write_landmark_log(log, rig, tables)
         progress("tracking", 0.92)
         states = list(_one_of_each_instant(states_of_log(rig, log, smooth), round(1e9 * half_s)))
-        figures = summarise(rig, log)
+        figures = summarise(rig, states)
     times_s = np.array([first_s + 1e-9 * (state.t_master_ns - FIRST_NS) for state in states])
     with contextlib.ExitStack() as stack:
         if out is not None:
@@ -203,14 +203,13 @@ def states_of_log(rig: Rig, log: Path, smooth: bool = False) -> Iterator[HandSta
         yield from smoother.finish()
 
 
-def summarise(rig: Rig, path: Path) -> dict[str, Any]:
-    """What the estimator makes of a landmark log. `tracked`: part of the states with a hand; `start_s`: of the first of
+def summarise(rig: Rig, states: Sequence[HandState]) -> dict[str, Any]:
+    """What the estimator has made of landmarks. `tracked`: part of the states with a hand; `start_s`: of the first of
     them, after the first frame; `reprojection_px`, `reprojection_mm`: median distance of the landmarks from their
     joints' images, and as long at the hand; `reprojection_large`: whether that is more than LARGE of MEDIAN_M."""
     joints, order = [], np.array(landmark_order(rig))
     cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
     errors, errors_m, first_ns = [], [], None
-    states = list(states_of_log(rig, path))
     for state in states:
         first_ns = state.t_master_ns if first_ns is None else first_ns
         if state.tracked:

@@ -65,10 +65,11 @@ def with_names(args: argparse.Namespace, rig: Rig) -> list[str]:
     given = [*args.videos, *(args.video or [])]
     if not given:
         raise RecordingError(f"give a video of a camera, as in {names[0]}=hand.mp4.")
-    alone = [text for text in given if not any(text.startswith(f"{name}=") for name in names)]
-    if len(alone) == len(given) and len(given) <= len(names) and all(Path(text).exists() for text in given):
-        return [f"{name}={text}" for name, text in zip(names, given, strict=False)]
-    return given
+    if any("=" in text and not Path(text).exists() for text in given):
+        return given
+    if len(given) > len(names):
+        raise RecordingError(f"{len(given)} videos, but the rig has {len(names)} cameras: {', '.join(names)}.")
+    return [f"{name}={text}" for name, text in zip(names, given, strict=False)]
 
 
 def _by_landmarks(args: argparse.Namespace) -> int:

@@ -21,13 +21,14 @@ from rhot_node.keypoints.card import load_card
 from rhot_node.markers import MarkerSet, load_markers
 
 ANATOMY_SD_M = 3e-3
-"""m: standard deviation of a landmark's place about its joint."""
+"""m: standard deviation of a landmark's place about its joint: 2.4 mm on a recorded hand that fits it best."""
 
 LASTING_S = 0.3
 """s: correlation time of that place."""
 
 NOISE_M = 3e-3
-"""m: standard deviation of a landmark's own error in a frame, beside what its detector states."""
+"""m: standard deviation of a landmark's own error in a frame, beside what its detector states. Chosen: of 1.5 to 6 mm
+it leaves the joints of a recorded hand nearest to triangulation, by median and 95 %."""
 
 
 # -- the master's part of a model card (docs/landmarks.md) -------------------------------------------------------------

@@ -125,6 +125,10 @@ def test_what_is_missing_is_said(drawn, monkeypatch, capsys):
     assert "--rig" in capsys.readouterr().err
     assert main(["track", *words[3:]]) == 2
     assert "give a video" in capsys.readouterr().err
+    for given, says in (["none.mp4"], "none.mp4: no such file"), (["x=none.mp4"], "no camera 'x'"), (
+            [word.partition("=")[2] for word in (*words[1:3], words[1])], "3 videos, but the rig has 2"):
+        assert main(["track", *given, *words[3:]]) == 2
+        assert says in capsys.readouterr().err
     (folder / "text.mp4").write_text("no video")
     assert main(["track", str(folder / "text.mp4")]) == 2
     assert "text.mp4" in capsys.readouterr().err
