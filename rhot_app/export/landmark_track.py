@@ -80,12 +80,12 @@ class LandmarkSummary:
 
 
 def landmark_rig_of(rig: Rig, cameras: Sequence[str]) -> Rig:
-    """The rig with these cameras alone, whose hand is tracked by landmarks."""
+    """The rig with these cameras alone, whose hand is tracked by landmarks; what holds of its markers is left out."""
     nodes = tuple(node for node in rig.nodes if node.name in cameras)
     return msgspec.structs.replace(
         rig, nodes=nodes, markers=load_markers(resource_path("markers", "landmarks21.json")), depth=type(rig.depth)(),
-        other_hand=None, objects=(), tracker=msgspec.structs.replace(rig.tracker, kind="estimator",
-                                                                     observe="landmarks"))
+        filters=type(rig.filters)(), other_hand=None, objects=(),
+        tracker=msgspec.structs.replace(rig.tracker, kind="estimator", observe="landmarks"))
 
 
 def find_landmarks(video: CameraVideo, right: bool, progress: Progress = silent) -> LandmarkTable:

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 from recorded_landmarks import FOLDER, FPS, JUDGED, WHOLE, needs_recording, recording
@@ -15,9 +16,10 @@ from rhot_app.__main__ import main
 from rhot_app.export import landmark_track
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import JOINTS
-from rhot_app.project import save_rig
+from rhot_app.project import load_rig, save_rig
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
 from rhot_node.errors import KeypointError
+from rhot_node.files import resource_path
 from rhot_node.landmarks import networks
 from rhot_node.landmarks.install import installed_folder
 from rhot_node.landmarks.networks import DetectedHand, Region
@@ -108,6 +110,14 @@ def test_paths_alone_take_the_cameras_in_order(drawn, capsys):
     _, words, _ = drawn
     assert main(["track", *(word.partition("=")[2] for word in words[1:3]), *words[3:], "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["tracked"] > 0.8
+
+
+def test_a_painted_rig_with_filters_of_its_own_tracks_a_bare_hand() -> None:
+    painted = load_rig(resource_path("rigs", "two_pis.json"))
+    one = painted.markers.ids[0]
+    own = msgspec.structs.replace(painted.filters, position_markers={one: painted.filters.position})
+    rig = landmark_track.landmark_rig_of(msgspec.structs.replace(painted, filters=own), [painted.nodes[0].name])
+    assert len(rig.markers.ids) == 21 and len(rig.nodes) == 1 and not rig.filters.position_markers
 
 
 @pytest.mark.parametrize(("words", "says"), [
