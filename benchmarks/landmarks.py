@@ -3,8 +3,9 @@
     python benchmarks/landmarks.py [--data ../shared/data/bare_hand_stereo] [--unit-mm 38.5] [--seeds 2] [--json FILE]
 
 First the recorded hand, if it is there: the errors of its landmarks about the hand that fits them (the source of
-`simulator.nodes.landmark_detector.LandmarkErrors`), then reprojection, jitter and lag of the tracked hand against plain triangulation of
-the same landmarks. The recording's unit of length is unknown: `--unit-mm` makes its hand as large as the rig's.
+`simulator.nodes.landmark_detector.LandmarkErrors`), then reprojection, jitter and lag of the tracked hand against
+plain triangulation of the same landmarks. The recording's unit of length is unknown: `--unit-mm` makes its hand as
+large as the rig's.
 Then synthetic hands with landmarks that err as much: errors of the joints against triangulation, NEES and the part of
 errors within three sigma. The jitter is the rms of third differences, divided by sqrt(20), of a point's coordinates.
 """
