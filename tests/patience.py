@@ -31,16 +31,18 @@ def settled(condition: Callable[[], Any], seconds: float = 0.3) -> bool:
     return False
 
 
-def quickest(call: Callable[[], Any], enough_s: float = 0.0, times: int = 5) -> float:
+def quickest(call: Callable[[], Any], enough_s: float = 0.0, times: int = 5,
+             clock: Callable[[], float] = time.perf_counter) -> float:
     """Seconds that `call` took at its quickest: whatever else a machine does, it only makes things longer.
 
-    Ends as soon as a call took less than `enough_s`, which is what the test demands of it.
+    Ends as soon as a call took less than `enough_s`, which is what the test demands of it. `clock`: of what only
+    computes, `time.process_time`, which does not count what other programs do in between.
     """
     best = float("inf")
     for _ in range(times):
-        begun = time.perf_counter()
+        begun = clock()
         call()
-        best = min(best, time.perf_counter() - begun)
+        best = min(best, clock() - begun)
         if best < enough_s:
             break
     return best

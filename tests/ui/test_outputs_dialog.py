@@ -57,7 +57,7 @@ class Page:
         self.until(lambda: all(word in self.dialog.sentence.text() for word in words))
 
     def press(self, button):
-        assert button.isEnabled() and button.isVisible()
+        self.until(lambda: button.isEnabled() and button.isVisible())
         QTest.mouseClick(button, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
                          QPoint(12, button.height() // 2))
 
