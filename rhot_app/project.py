@@ -17,8 +17,8 @@ from rhot_app.errors import ObjectError, RigError
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import ANGLES
 from rhot_app.objects.object_file import Name, ObjectModel, load_object, require_distinct
-from rhot_node.files import decode_document, read_document, read_json, write_document
-from rhot_node.markers import MarkerSet
+from rhot_node.files import decode_document, read_document, read_json, resource_path, write_document
+from rhot_node.markers import MarkerSet, load_markers
 
 FORMAT: Final = "rhot-rig"
 VERSION: Final = 1
@@ -318,6 +318,9 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     version: Literal[1] = VERSION
 
     def __post_init__(self) -> None:
+        if self.tracker.kind == "classic" and not self.painted:
+            msgspec.structs.force_setattr(self, "tracker", msgspec.structs.replace(
+                self.tracker, kind="estimator", observe="landmarks"))
         fields: tuple[tuple[str, list[int | str]], ...] = (
             ("node_id", [node.node_id for node in self.nodes]), ("name", [node.name for node in self.nodes]),
             ("data_port", [node.data_port for node in self.nodes if node.data_port]),
@@ -335,6 +338,14 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             unknown = sorted(set(getattr(self.filters, field)) - known)
             if unknown:
                 raise ValueError(f"filters.{field} names a marker {unknown[0]!r} that the marker set does not have")
+
+    @property
+    def painted(self) -> bool:
+        """Whether a marker that is no landmark is on a hand, or none is a landmark. A hand of which there are landmarks
+        only is tracked by them: the classic tracker knows painted markers."""
+        landmarks = [marker.shape == "landmark" for marker in self.markers.markers]
+        return not any(landmarks) or any(marker.role is not None and not landmark
+                                         for marker, landmark in zip(self.markers.markers, landmarks, strict=True))
 
     @property
     def models(self) -> tuple[ObjectModel, ...]:
@@ -396,6 +407,16 @@ def estimator_obstacle(rig: Rig) -> Obstacle | None:
                         "carry none.", "Run rhot-node there and take text_datagrams out of the rig file, or use the "
                         "classic tracker (tracker.kind).")
     return None
+
+
+def landmark_markers(both: bool = False) -> MarkerSet:
+    """The landmarks of a hand as markers, or those of `both` hands of a rig."""
+    one = load_markers(resource_path("markers", "landmarks21.json"))
+    if not both:
+        return one
+    others = tuple(msgspec.structs.replace(marker, id=f"{OTHER_HAND}{marker.id}", role=f"{OTHER_HAND}{marker.role}")
+                   for marker in one.markers)
+    return msgspec.structs.replace(one, markers=one.markers + others, name="landmarks of both hands")
 
 
 def observation_obstacle(rig: Rig) -> Obstacle | None:

@@ -89,13 +89,17 @@ def node_advice(facts: NodeFacts, marker_ids: Sequence[str], running: bool, *, v
     return found
 
 
-def no_marker_advice(all_facts: Sequence[NodeFacts], running: bool) -> list[Advice]:
+def no_marker_advice(all_facts: Sequence[NodeFacts], running: bool, painted: bool = True) -> list[Advice]:
     """The one sentence that replaces all others about visibility when no camera sees anything; none while a picture is
-    black, which is said of each camera."""
+    black, which is said of each camera. `painted`: whether the rig has painted markers, not landmarks alone."""
     if any(facts.black for facts in all_facts):
         return []
     seconds = min((min(facts.unseen_s) for facts in all_facts), default=0.0)
     if running and seconds > UNSEEN_S and any(facts.recent.accepted for facts in all_facts):
+        if not painted:
+            return [Advice("warning", f"No camera has seen the hand for {seconds:.0f} s. Hold it into the pictures. "
+                                      "Each node needs the hand networks (`rhot-node landmarks install`) and "
+                                      "\"detector\": \"landmarks\" in its settings.", subject="sight")]
         return [Advice("warning", f"No camera has seen a marker for {seconds:.0f} s. Hold the hand into both pictures; "
                                   "if the markers are visible there, calibrate their colours.", subject="sight")]
     return []

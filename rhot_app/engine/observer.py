@@ -95,7 +95,7 @@ class Observer:
         facts = [replace(self._facts(camera, status, now_ns), black=black(status.node_id))
                  for camera, status in enumerate(nodes)]
         bare = self.rig.tracker.observe == "contours"  # nobody wears the markers
-        nowhere = [] if bare else no_marker_advice(facts, running)
+        nowhere = [] if bare else no_marker_advice(facts, running, self.rig.painted)
         marker_ids = self.rig.markers.ids
         visibility = not (nowhere or bare)
         found = [advice for one in facts for advice in node_advice(one, marker_ids, running, visibility=visibility)]

@@ -1,4 +1,4 @@
-"""``rhot bare-hand``: the hand without markers in recorded videos, as a table and as pictures of what was found."""
+"""The bare hand in recorded videos by its contours: `rhot track --observe contours`, as a table and as pictures."""
 
 from __future__ import annotations
 
@@ -10,41 +10,38 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.errors import RecordingError, add_force_argument, input_file, positive_number
-from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
     from rhot_app.sources.frame_sets import CameraVideo
 
 
-def add_arguments(parser: argparse.ArgumentParser, *, videos_by_option: bool = True) -> None:
-    """Arguments of ``rhot bare-hand``, and of ``rhot track``, which takes videos without an option, too."""
-    parser.add_argument("--rig", type=input_file, required=videos_by_option, metavar="FILE",
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments that landmarks and contours share."""
+    parser.add_argument("--rig", type=input_file, metavar="FILE",
                         help="the calibrated rig, with the hand's side")
-    parser.add_argument("--video", action="append", required=videos_by_option, metavar="NAME=FILE",
+    parser.add_argument("--video", action="append", metavar="NAME=FILE",
                         help="a camera of the rig and its video; once for each camera, also for one alone")
     background = parser.add_mutually_exclusive_group()
     background.add_argument("--background", action="append", default=[], metavar="NAME=FILE",
-                            help="a video of the same scene without a hand; once for each camera")
+                            help="for contours: a video of the same scene without a hand; once for each camera")
     background.add_argument("--background-seconds", default=None, metavar="S",
-                            help="the videos show no hand for so long at their beginning (default: the background is "
-                                 "not known, the hand is found by the colour of skin)")
+                            help="for contours: the videos show no hand for so long at their beginning (default: the "
+                                 "background is not known, the hand is found by the colour of skin)")
     parser.add_argument("--fps", type=positive_number, default=None, metavar="N",
-                        help="frames per second of ordinary videos, instead of what the files say")
+                        help="frames per second of ordinary videos, instead of what the files say, and of pictures")
     parser.add_argument("--offset-s", action="append", default=[], metavar="NAME=S",
                         help="seconds to add to a camera's times, where the videos did not begin together")
-    parser.add_argument("--unknown-size", action="store_true", help="estimate the hand's size, too")
+    parser.add_argument("--unknown-size", action="store_true",
+                        help="estimate the hand's size, too, unless all its bones are measured")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the states as .csv, .parquet or .npz")
     parser.add_argument("--overlay", type=Path, metavar="PLACE",
                         help="draw what was found: a film (.avi, .mp4), or a new folder for PNG files")
     parser.add_argument("--adapt", type=Path, metavar="FILE",
-                        help="adapt the rig's hand to the one in the videos and write it as a hand file; what FILE was "
+                        help="write the hand in the videos, measured or adapted, as a hand file; what FILE was "
                              "before is kept in FILE.history")
     add_force_argument(parser, "write over files that exist")
     parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
-    if videos_by_option:
-        add_examples(parser, "rhot bare-hand --rig desk.json --video left=left.mp4 --video right=right.mp4 --out a.csv",
-                     "rhot bare-hand --rig desk.json --video left=left.mp4 --background-seconds 2 --overlay hand.mp4")
 
 
 def run(args: argparse.Namespace) -> int:

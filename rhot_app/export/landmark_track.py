@@ -1,6 +1,7 @@
-"""A bare hand tracked through recorded videos by the landmarks that networks find in each picture.
+"""Bare hands tracked through recorded videos by the landmarks that networks find in each picture.
 
-The landmarks become a raw log, so that a film is tracked as a live hand is, and the hand's bones are measured first.
+What the networks find becomes a raw log, so that a film is tracked as live hands are, and the hands' bones are measured
+first.
 """
 
 from __future__ import annotations
@@ -23,24 +24,28 @@ from rhot_app.barehand.overlay import draw_skeleton
 from rhot_app.calibration.hand.landmark_bones import are_landmarks, measure_bones
 from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.calibration.recorded_observations import read_instants
-from rhot_app.errors import CalibrationError, RecordingError
+from rhot_app.errors import CalibrationError, RecordingError, note_loss
 from rhot_app.export.bare_hand import check_outputs, lost_intervals, open_table
 from rhot_app.export.pictures import whole_pictures
 from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.landmarks import ANATOMY_SD_M, NOISE_M
 from rhot_app.progress import Progress, silent
-from rhot_app.project import Rig
-from rhot_app.recording.landmark_log import FIRST_NS, LandmarkTable, landmark_order, write_landmark_log
+from rhot_app.project import Rig, landmark_markers
+from rhot_app.recording.landmark_log import FIRST_NS, HandFilm, landmark_order, write_hand_log
 from rhot_app.recording.raw_log import LogReader
+from rhot_app.rig_history import accept_hand
 from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
+from rhot_app.tracking.rig_arrays import rigs_of_hands
 from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
-from rhot_node.landmarks.networks import HAND_SIGMA, DetectedHand, open_hand_networks
-from rhot_node.markers import load_markers
+from rhot_node.landmark_search import landmarked
+from rhot_node.landmarks.networks import open_hand_networks
+from rhot_node.wire.messages import LandmarkedHand
 
 Image = NDArray[np.uint8]
 
@@ -51,114 +56,142 @@ LARGE = 1.7
 """Times MEDIAN_M from which the rig or its hand is wrong. Chosen: between 1.2 of the
 recorded hand in docs/landmarks.md with the shipped bones, and 1.8 with a wrong side or unit."""
 
+REASON: Final = "bones measured by landmarks"
+"""Why a hand file is replaced."""
+
 FOUND_RGB: Final = (255, 220, 0)
 TEXT_RGB: Final = (255, 255, 255)
 
 
 @dataclass(frozen=True, slots=True)
 class LandmarkSummary:
-    """What came of a run. `states` of them `tracked` show the hand; `lost`: intervals without a hand, s of the film;
-    `found`: part of each camera's pictures in which the networks found the hand; `bones`: a sentence on the bones;
-    `seconds`: the whole run. `figures`: see `summarise`."""
+    """What came of a run. `states` of them `tracked` show the rig's hand, `other_tracked` its other one, None without;
+    `lost`: intervals without the hand, s of the film; `found`, `foreign`: part of each camera's pictures in which the
+    networks found a hand of the rig, and in which they found hands, but none of the rig's side; `bones`: a sentence on
+    the bones; `side`: that of the rig's hand; `seconds`: the whole run; `figures`: see `summarise`; `adapted`: whether
+    a hand file was written."""
 
     states: int
     tracked: int
+    other_tracked: int | None
     lost: tuple[tuple[float, float], ...]
     found: dict[str, float]
+    foreign: dict[str, float]
     bones: str
+    side: str
     seconds: float
     left_out: int
     figures: dict[str, Any]
+    adapted: bool
 
     def document(self) -> dict[str, Any]:
         """The same for JSON."""
-        return {"frame_sets": self.states, "tracked": self.tracked / max(self.states, 1),
-                "found": self.found, "bones": self.bones, "computed_per_s": self.states / self.seconds,
+        count = max(self.states, 1)
+        return {"frame_sets": self.states, "tracked": self.tracked / count,
+                "other_tracked": None if self.other_tracked is None else self.other_tracked / count,
+                "found": self.found, "foreign": self.foreign, "bones": self.bones, "side": self.side,
+                "computed_per_s": self.states / self.seconds,
                 "lost_s": [list(one) for one in self.lost], "frames_left_out": self.left_out,
                 "reprojection_px": self.figures["reprojection_px"], "reprojection_mm": self.figures["reprojection_mm"],
                 "reprojection_large": self.figures["reprojection_large"], "joint_sd_mm": self.figures["joint_sd_mm"]}
 
 
 def landmark_rig_of(rig: Rig, cameras: Sequence[str]) -> Rig:
-    """The rig with these cameras alone, whose hand is tracked by landmarks; what holds of its markers is left out."""
+    """The rig with these cameras alone, whose hands are tracked by landmarks; what holds of its markers is left out."""
     nodes = tuple(node for node in rig.nodes if node.name in cameras)
     return msgspec.structs.replace(
-        rig, nodes=nodes, markers=load_markers(resource_path("markers", "landmarks21.json")), depth=type(rig.depth)(),
-        filters=type(rig.filters)(), other_hand=None, objects=(),
+        rig, nodes=nodes, markers=landmark_markers(rig.other_hand is not None), depth=type(rig.depth)(),
+        filters=type(rig.filters)(), objects=(),
         tracker=msgspec.structs.replace(rig.tracker, kind="estimator", observe="landmarks"))
 
 
-def find_landmarks(video: CameraVideo, right: bool, progress: Progress = silent) -> LandmarkTable:
-    """The landmarks of a right or left hand in each picture of a video, NaN where there is none. Raises KeypointError
-    without networks, RecordingError for a video that cannot be read."""
-    networks, times, places, scores, sigmas = open_hand_networks(), [], [], [], []
+def find_hands(video: CameraVideo, progress: Progress = silent) -> HandFilm:
+    """The hands in each picture of a video. Raises KeypointError without networks, RecordingError for a video that
+    cannot be read."""
+    networks, times, hands = open_hand_networks(), [], []
     for t_ns, picture in video.frames():
-        hand = _of_side(networks.find(np.ascontiguousarray(picture[..., ::-1])), right)
+        size = picture.shape[1], picture.shape[0]
         times.append(1e-9 * t_ns)
-        places.append(np.full((21, 2), np.nan) if hand is None else hand.landmarks)
-        scores.append(0.0 if hand is None else hand.presence)
-        sigmas.append(1.0 if hand is None else HAND_SIGMA * hand.region.side)
-        progress(f"looking for the hand in {video.path.name}", len(times) / max(len(video.times_ns), 1))
+        hands.append(tuple(landmarked(hand, size) for hand in networks.find(np.ascontiguousarray(picture[..., ::-1]))))
+        progress(f"looking for hands in {video.path.name}", len(times) / max(len(video.times_ns), 1))
     if not times:
         raise RecordingError(f"{video.path}: no picture of it can be read.")
-    return LandmarkTable(np.array(times), np.array(places), np.array(scores), np.array(sigmas))
-
-
-def _of_side(hands: Sequence[DetectedHand], right: bool) -> DetectedHand | None:
-    """The hand of that side that is there most probably; None without."""
-    own = [hand for hand in hands if (hand.right >= 0.5) == right]
-    return max(own, key=lambda hand: hand.presence, default=None)
+    return HandFilm(np.array(times), hands)
 
 
 def with_measured_bones(rig: Rig, path: Path) -> tuple[Rig, str]:
-    """The rig with the bones that the landmarks of a log show, if they are usable, and a sentence on them."""
+    """The rig with the bones of its hands that the landmarks of a log show, as far as they are usable, and a sentence
+    on them."""
     if len(rig.nodes) < 2:
         return rig, "The bones are the rig's: one camera does not show how long they are, nor how far the hand is."
-    roles = {marker.id: marker.role for marker in rig.markers.markers if marker.role is not None}
     try:
         _, instants = read_instants(path, rig)
-        tracks = tracks_of(instants.times_s, instants.positions, rig.markers.ids, roles)
-        if not are_landmarks(tracks):
-            return rig, "The bones are the rig's, as not all joints have a landmark."
-        report = measure_bones(tracks, rig.hand)
-    except (CalibrationError, RecordingError) as exc:
+    except RecordingError as exc:
         return rig, f"The bones are the rig's: {exc}"
+    found = [_measured_hand(one, instants.times_s, instants.positions[:, columns], path)
+             for one, columns in rigs_of_hands(rig)]
+    if rig.other_hand is None:
+        return msgspec.structs.replace(rig, hand=found[0][0]), found[0][1]
+    return (msgspec.structs.replace(rig, hand=found[0][0], other_hand=found[1][0]),
+            " ".join(f"{hand.side.capitalize()} hand: {sentence}" for hand, sentence in found))
+
+
+def _measured_hand(rig: Rig, times_s: NDArray[np.float64], positions: NDArray[np.float64],
+                   path: Path) -> tuple[HandAnatomy, str]:
+    """The hand of a rig of one hand, with the bones that the `positions` (T, M, 3) m of its markers show, and a
+    sentence."""
+    roles = {marker.id: marker.role for marker in rig.markers.markers if marker.role is not None}
+    try:
+        tracks = tracks_of(times_s, positions, rig.markers.ids, roles)
+        if not are_landmarks(tracks):
+            return rig.hand, "The bones are the rig's, as not all joints have a landmark."
+        report = measure_bones(tracks, rig.hand)
+    except CalibrationError as exc:
+        return rig.hand, f"The bones are the rig's: {exc}"
     if not report.verdict.acceptable:
-        return rig, f"The bones are the rig's. Those that the landmarks show: {report.verdict.sentence}"
+        return rig.hand, f"The bones are the rig's. Those that the landmarks show: {report.verdict.sentence}"
     hand = msgspec.structs.replace(report.hand, name=f"measured from {path.name}")
-    return msgspec.structs.replace(rig, hand=hand), f"Bones measured from the landmarks. {report.verdict.sentence}"
+    return hand, f"Bones measured from the landmarks. {report.verdict.sentence}"
 
 
-def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, measure: bool = True, smooth: bool = False,
-                    out: Path | None = None, pictures: Path | None = None, again: bool = False,
+def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: bool = False, measure: bool = True,
+                    unknown_size: bool = False, smooth: bool = False, out: Path | None = None,
+                    pictures: Path | None = None, again: bool = False, hand_file: Path | None = None,
                     progress: Progress = silent) -> LandmarkSummary:
-    """Track the hand of `rig`, whose nodes are the videos' cameras in their order.
+    """Track the hands of `rig`, whose nodes are the videos' cameras in their order.
 
-    `measure`: measure the hand's bones first, and use them if they can be a hand's. `out`: a table of the states
-    (docs/export.md), one of every frame set, whose times are the film's. `pictures`: an .avi or .mp4 file, or a folder
-    of PNG files, with the landmarks and the hand. Files appear when they are whole. Raises KeypointError without
-    networks, RecordingError, ExportError.
+    `either_side`: the hand is a shipped one of the side that the networks find more often. `measure`: measure the
+    hands' bones first, and use them if they can be a hand's. `unknown_size`: where they are not
+    measured, estimate the hands' size. `out`: a table of the states (docs/export.md), one of every frame set, whose
+    times are the film's. `pictures`: an .avi or .mp4 file, or a folder of PNG files, with the landmarks and the hands.
+    `hand_file`: where the rig's hand is written with its measured bones; what was there is kept beside it, and a loss
+    is noted where they were not measured (`errors.note_loss`). Files appear when they are whole. Raises KeypointError
+    without networks, RecordingError, ExportError, RigError.
     """
-    check_outputs(videos, out, pictures, again, None)
-    begun, share = time.perf_counter(), 0.9 / len(videos)
-    tables = []
+    check_outputs(videos, out, pictures, again, hand_file)
+    begun, share, base = time.perf_counter(), 0.9 / len(videos), rig
+    films = []
     for number, video in enumerate(videos):
         def report(text: str, part: float, number: int = number) -> None:
             progress(text, share * (number + part))
 
-        tables.append(find_landmarks(video, rig.hand.side == "right", report))
-    found = {video.camera: float(np.mean(np.isfinite(table.pixels[:, 0, 0])))
-             for video, table in zip(videos, tables, strict=True)}
-    first_s, half_s = min(float(table.times_s[0]) for table in tables), 0.5e-9 * min(one.period_ns for one in videos)
+        films.append(find_hands(video, report))
+    if either_side:
+        rig = base = msgspec.structs.replace(rig, hand=load_hand(resource_path("hands", f"{_side_of(films)}.json")))
+    first_s, half_s = min(float(film.times_s[0]) for film in films), 0.5e-9 * min(one.period_ns for one in videos)
     bones = "The bones are the rig's."
     with tempfile.TemporaryDirectory(prefix="rhot-") as folder:
         log = Path(folder) / videos[0].path.with_suffix(".rhotlog").name
-        write_landmark_log(log, rig, tables)
-        if measure:
-            progress("measuring the hand's bones", 0.9)
+        write_hand_log(log, rig, films)
+        if measure and any(video.still for video in videos):
+            bones = "The bones are the rig's: where nothing moves, nothing shows how well they are measured."
+        elif measure:
+            progress("measuring the bones", 0.9)
             rig, bones = with_measured_bones(rig, log)
-            write_landmark_log(log, rig, tables)
+        if unknown_size and rig.hand == base.hand:
+            rig = msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, float_scale=True))
         progress("tracking", 0.92)
+        seen = _seen(rig, log)
         states = list(_one_of_each_instant(states_of_log(rig, log, smooth), round(1e9 * half_s)))
         figures = summarise(rig, states)
     times_s = np.array([first_s + 1e-9 * (state.t_master_ns - FIRST_NS) for state in states])
@@ -175,12 +208,48 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, measure: bool = 
             for frames in frame_sets(videos):
                 nearest = int(np.argmin(np.abs(times_s - 1e-9 * frames.first_ns)))
                 drawn.add(_side_by_side(cameras, frames.images, [
-                    table.pixels[int(np.argmin(np.abs(table.times_s - 1e-9 * t)))]
-                    for table, t in zip(tables, frames.t_ns, strict=True)], states[nearest]))
+                    film.hands[int(np.argmin(np.abs(film.times_s - 1e-9 * t)))]
+                    for film, t in zip(films, frames.t_ns, strict=True)], states[nearest]))
     spent = [(round(1e9 * t), state.tracked) for t, state in zip(times_s, states, strict=True)]
     lost = tuple((1e-9 * spent[0][0] + begin, 1e-9 * spent[0][0] + end) for begin, end in lost_intervals(spent))
-    return LandmarkSummary(len(states), sum(state.tracked for state in states), lost, found, bones,
-                           time.perf_counter() - begun, frames_left_out(videos), figures)
+    return LandmarkSummary(
+        states=len(states), tracked=sum(state.tracked for state in states),
+        other_tracked=None if rig.other_hand is None else sum(
+            state.other is not None and state.other.tracked for state in states),
+        lost=lost, found={video.camera: float(own.mean()) for video, own in zip(videos, seen, strict=True)},
+        foreign={video.camera: float(np.mean([bool(hands) and not there
+                                              for hands, there in zip(film.hands, own, strict=True)]))
+                 for video, film, own in zip(videos, films, seen, strict=True)},
+        bones=bones, side=rig.hand.side, seconds=time.perf_counter() - begun, left_out=frames_left_out(videos),
+        figures=figures,
+        adapted=hand_file is not None and _adapted(hand_file, rig.hand, rig.hand != base.hand, bones))
+
+
+def _side_of(films: Sequence[HandFilm]) -> str:
+    """The side of most hands in films; the right one where there are none."""
+    right = [hand.right for film in films for hands in film.hands for hand in hands]
+    return "left" if right and np.mean(right) < 0.5 else "right"
+
+
+def _adapted(path: Path, hand: HandAnatomy, measured: bool, bones: str) -> bool:
+    """Write a measured hand; note a loss instead where it was not. Raises RigError."""
+    if measured:
+        accept_hand(path, hand, REASON)
+    else:
+        note_loss(str(path), f"{path}: not written, the hand's bones were not measured. {bones}")
+    return measured
+
+
+def _seen(rig: Rig, log: Path) -> list[NDArray[np.bool_]]:
+    """Of each camera, in which of its frames (T,) a hand of the rig was found."""
+    validator = LogValidator(rig)
+    seen: list[list[bool]] = [[] for _ in rig.nodes]
+    with contextlib.closing(LogReader(log)) as reader:
+        for record in reader:
+            frame = validator.feed(record)
+            if isinstance(frame, CameraObservations):
+                seen[frame.camera].append(bool(np.isfinite(frame.pixels).any()))
+    return [np.array(one, np.bool_) for one in seen]
 
 
 def states_of_log(rig: Rig, log: Path, smooth: bool = False) -> Iterator[HandState]:
@@ -205,27 +274,32 @@ def states_of_log(rig: Rig, log: Path, smooth: bool = False) -> Iterator[HandSta
 
 def summarise(rig: Rig, states: Sequence[HandState]) -> dict[str, Any]:
     """What the estimator has made of landmarks. `tracked`: part of the states with a hand; `start_s`: of the first of
-    them, after the first frame; `reprojection_px`, `reprojection_mm`: median distance of the landmarks from their
-    joints' images, and as long at the hand; `reprojection_large`: whether that is more than LARGE of MEDIAN_M."""
-    joints, order = [], np.array(landmark_order(rig))
+    them, after the first frame; `reprojection_px`, `reprojection_mm`: median distance of the landmarks of all hands
+    from their joints' images, and as long at the hand; `reprojection_large`: whether that is more than LARGE of
+    MEDIAN_M."""
     cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
-    errors, errors_m, first_ns = [], [], None
+    hands = [(own, columns, np.array(landmark_order(own))) for own, columns in rigs_of_hands(rig)]
+    errors, errors_m, variances = [], [], []
     for state in states:
-        first_ns = state.t_master_ns if first_ns is None else first_ns
-        if state.tracked:
-            joints.append(state)
-            for camera, pixels in zip(cameras, state.camera_pixels, strict=True):
-                expected = camera.project(state.joint_positions)
-                errors.append(np.linalg.norm(expected[order[order >= 0]] - pixels[order >= 0], axis=1))
-                errors_m.append(errors[-1] / camera.pixels_per_metre(state.joint_positions[order[order >= 0]]))
-    if not joints:
+        for number, (_, columns, order) in enumerate(hands):
+            hand = state if number == 0 else state.other
+            if hand is None or not hand.tracked:
+                continue
+            variances.append(np.einsum("jii->ji", hand.joint_covariances))
+            for camera, pixels in zip(cameras, state.camera_pixels[:, columns], strict=True):
+                expected = camera.project(hand.joint_positions)[order[order >= 0]]
+                errors.append(np.linalg.norm(expected - pixels[order >= 0], axis=1))
+                errors_m.append(errors[-1] / camera.pixels_per_metre(hand.joint_positions[order[order >= 0]]))
+    if not errors:
         return {"tracked": 0.0, "start_s": None, "reprojection_px": None, "reprojection_mm": None,
                 "reprojection_large": None, "joint_sd_mm": None}
-    variances = np.array([np.einsum("jii->ji", state.joint_covariances) for state in joints])
-    error_m = float(np.nanmedian(errors_m))
-    return {"tracked": len(joints) / len(states), "start_s": 1e-9 * (joints[0].t_master_ns - (first_ns or 0)),
-            "reprojection_px": float(np.nanmedian(errors)), "reprojection_mm": 1e3 * error_m,
-            "reprojection_large": error_m > LARGE * MEDIAN_M, "joint_sd_mm": 1e3 * float(np.sqrt(variances.mean()))}
+    own = [state for state in states if state.tracked]
+    error_m = float(np.nanmedian(np.concatenate(errors_m)))
+    return {"tracked": len(own) / len(states),
+            "start_s": 1e-9 * (own[0].t_master_ns - states[0].t_master_ns) if own else None,
+            "reprojection_px": float(np.nanmedian(np.concatenate(errors))), "reprojection_mm": 1e3 * error_m,
+            "reprojection_large": error_m > LARGE * MEDIAN_M,
+            "joint_sd_mm": 1e3 * float(np.sqrt(np.mean(variances)))}
 
 
 def _one_of_each_instant(states: Iterator[HandState], half_ns: int) -> Iterator[HandState]:
@@ -244,16 +318,19 @@ def _one_of_each_instant(states: Iterator[HandState], half_ns: int) -> Iterator[
 
 
 def _side_by_side(cameras: Sequence[CameraModel], images: Sequence[Image | None],
-                  landmarks: Sequence[NDArray[np.float64]], state: HandState) -> Image:
-    """All cameras' pictures beside each other, with the landmarks, the hand and the state's condition."""
-    shown = []
-    for camera, image, found in zip(cameras, images, landmarks, strict=True):
+                  found: Sequence[tuple[LandmarkedHand, ...]], state: HandState) -> Image:
+    """All cameras' pictures beside each other, with the landmarks, the hands and the state's condition."""
+    shown, hands = [], [state] if state.other is None else [state, state.other]
+    for camera, image, seen in zip(cameras, images, found, strict=True):
         picture = np.zeros((camera.height, camera.width, 3), np.uint8) if image is None else image.copy()
-        for x, y in found[np.isfinite(found[:, 0])]:
-            cv2.circle(picture, (round(float(x)), round(float(y))), 3, FOUND_RGB, -1, cv2.LINE_AA)
-        if state.tracked:
-            draw_skeleton(picture, camera.project(state.joint_positions), 2)
-        cv2.putText(picture, state.condition.value, (8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, TEXT_RGB, 2, cv2.LINE_AA)
+        for x, y, variance, *_ in [point for hand in seen for point in hand.points]:
+            if variance > 0.0:
+                cv2.circle(picture, (round(float(x)), round(float(y))), 3, FOUND_RGB, -1, cv2.LINE_AA)
+        for hand in hands:
+            if hand.tracked:
+                draw_skeleton(picture, camera.project(hand.joint_positions), 2)
+        cv2.putText(picture, " ".join(hand.condition.value for hand in hands), (8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7,
+                    TEXT_RGB, 2, cv2.LINE_AA)
         shown.append(picture)
     height = max(picture.shape[0] for picture in shown)
     return np.hstack([np.pad(picture, ((0, height - picture.shape[0]), (0, 0), (0, 0))) for picture in shown])

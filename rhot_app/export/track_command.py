@@ -19,44 +19,39 @@ if TYPE_CHECKING:
 ASSUMED_DEG: Final = 60.0
 """Horizontal field of view of a camera of which nothing is known: webcams have 55 to 70 degrees."""
 
-CONTOUR_OPTIONS: Final = ("background", "background_seconds", "unknown_size", "adapt")
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``rhot track``."""
+    """Arguments of ``rhot track``, whose former name is ``rhot bare-hand``."""
     parser.add_argument("videos", nargs="*", default=[], metavar="CAMERA=VIDEO",
-                        help="a camera of the rig and its video; paths alone take the rig's cameras in order")
-    bare_hand_command.add_arguments(parser, videos_by_option=False)
-    parser.add_argument("--observe", choices=("landmarks", "contours"), default="landmarks",
-                        help="what is looked for: the landmarks of the installed hand networks (default), or the "
-                             "hand's contours")
+                        help="a camera of the rig and its video; paths alone take the rig's cameras in order. A video "
+                             "is a film, a picture, or a folder of pictures or of raw frames")
+    bare_hand_command.add_arguments(parser)
+    parser.add_argument("--observe", choices=("landmarks", "contours"), default=None,
+                        help="what is looked for: the landmarks of the installed hand networks, or the hand's contours "
+                             "(default: contours where the rig's tracker observes these alone, else landmarks)")
     parser.add_argument("--bones", choices=("measured", "rig"), default="measured",
                         help="the hand's bones: measured from the landmarks of two cameras (default), or as the rig "
                              "has them")
     parser.add_argument("--smooth", action="store_true", help="every state uses what came after it as well")
-    add_examples(parser, "rhot track left=left.mp4 right=right.mp4 --rig desk.json --out hand.csv --overlay hand.mp4",
-                 "rhot track hand.mp4 --overlay hand-tracked.mp4")
+    name = parser.prog
+    add_examples(parser, f"{name} left=left.mp4 right=right.mp4 --rig desk.json --out hand.csv --overlay hand.mp4",
+                 f"{name} hand.mp4 --overlay hand-tracked.mp4")
 
 
 def run(args: argparse.Namespace) -> int:
     """Track, and say what came of it. Raises KeypointError, RecordingError, ExportError and RigError."""
-    if args.observe == "contours":
-        if args.rig is None:
-            raise RecordingError("--observe contours needs a calibrated rig; give it with --rig.")
-        if args.smooth:
-            raise RecordingError("--smooth: only landmarks are smoothed; leave --observe contours or --smooth out.")
-        args.video = with_names(args, _rig(args))
-        return bare_hand_command.run(args)
-    wrong = next((option for option in CONTOUR_OPTIONS if getattr(args, option)), None)
-    if wrong is not None:
-        raise RecordingError(f"--{wrong.replace('_', '-')} is of contours: give --observe contours with it.")
-    return _by_landmarks(args)
-
-
-def _rig(args: argparse.Namespace) -> Rig:
     from rhot_app.project import load_rig
 
-    return load_rig(args.rig)
+    rig = None if args.rig is None else load_rig(args.rig)
+    observe = args.observe or ("contours" if rig is not None and rig.tracker.observe == "contours" else "landmarks")
+    if observe == "landmarks":
+        return _by_landmarks(args, rig)
+    if rig is None:
+        raise RecordingError("--observe contours needs a calibrated rig; give it with --rig.")
+    if args.smooth:
+        raise RecordingError("--smooth: only landmarks are smoothed; take --observe landmarks, or leave --smooth out.")
+    args.video = with_names(args, rig)
+    return bare_hand_command.run(args)
 
 
 def with_names(args: argparse.Namespace, rig: Rig) -> list[str]:
@@ -65,14 +60,29 @@ def with_names(args: argparse.Namespace, rig: Rig) -> list[str]:
     given = [*args.videos, *(args.video or [])]
     if not given:
         raise RecordingError(f"give a video of a camera, as in {names[0]}=hand.mp4.")
-    if any("=" in text and not Path(text).exists() for text in given):
+    if args.video or any("=" in text and not Path(text).exists() for text in given):
         return given
     if len(given) > len(names):
         raise RecordingError(f"{len(given)} videos, but the rig has {len(names)} cameras: {', '.join(names)}.")
     return [f"{name}={text}" for name, text in zip(names, given, strict=False)]
 
 
-def _by_landmarks(args: argparse.Namespace) -> int:
+def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
+    said = []
+    if args.adapt is not None and args.bones == "rig":
+        raise RecordingError("--adapt writes the bones that are measured; leave --bones rig out.")
+    if args.background or args.background_seconds is not None:
+        said.append("Landmarks need no background: what was given of it is not used.")
+    if rig is None:
+        rig = assumed_rig([*args.videos, *(args.video or [])])
+        lens = rig.nodes[0].intrinsics
+        said.append(f"Without --rig the lens is assumed to see {ASSUMED_DEG:.0f} degrees across (focal length "
+                    f"{lens.fx:.0f} px) and the hand to be of usual size; distances are as wrong as these.")
+        given = {rig.nodes[0].name: next(iter([*args.videos, *(args.video or [])]))}
+    else:
+        given = named(with_names(args, rig), "--video" if args.video else "", rig)
+    for path in given.values():
+        input_file(path)  # refused before numba is loaded
     from rhot_app.export.landmark_track import landmark_rig_of, track_landmarks
     from rhot_app.progress import ProgressLine
     from rhot_app.sources.frame_sets import FPS, checked_seconds, on_one_clock
@@ -81,18 +91,6 @@ def _by_landmarks(args: argparse.Namespace) -> int:
 
     if args.fps is not None and not FPS[0] <= args.fps <= FPS[1]:
         raise RecordingError(f"--fps {args.fps:g}: give the frames per second, from {FPS[0]:g} to {FPS[1]:g}.")
-    said = []
-    if args.rig is None:
-        rig = assumed_rig([*args.videos, *(args.video or [])])
-        lens = rig.nodes[0].intrinsics
-        said.append(f"Without --rig the lens is assumed to see {ASSUMED_DEG:.0f} degrees across (focal length "
-                    f"{lens.fx:.0f} px) and the hand to be of usual size; distances are as wrong as these.")
-        given = {rig.nodes[0].name: next(iter([*args.videos, *(args.video or [])]))}
-    else:
-        rig = _rig(args)
-        given = named(with_names(args, rig), "", rig)
-    for path in given.values():
-        input_file(path)
     open_hand_networks()  # without them nothing is begun
     rig = landmark_rig_of(rig, tuple(given))
     videos = on_one_clock(open_all(rig, given, args.fps), {
@@ -100,34 +98,56 @@ def _by_landmarks(args: argparse.Namespace) -> int:
         for name, text in named(args.offset_s, "--offset-s", rig).items()})
     announce_compilation()
     line = ProgressLine("tracking")
-    summary = track_landmarks(rig, videos, measure=args.bones == "measured", smooth=args.smooth, out=args.out,
-                              pictures=args.overlay, again=args.force, progress=line.report)
+    summary = track_landmarks(rig, videos, either_side=args.rig is None, measure=args.bones == "measured",
+                              unknown_size=args.unknown_size, smooth=args.smooth, out=args.out,
+                              pictures=args.overlay, again=args.force, hand_file=args.adapt, progress=line.report)
     line.finish()
+    if args.rig is None:
+        said.append(f"The hand is taken for a {summary.side} one, as the networks find more of these.")
     document = summary.document() | {"out": args.out and str(args.out), "overlay": args.overlay and str(args.overlay),
-                                     "assumed": said}
+                                     "hand_file": str(args.adapt) if summary.adapted else None,
+                                     "notes": said}
     print(json.dumps(document) if args.json else "\n".join([*said, *sentences(document)]))
     return 0
 
 
 def assumed_rig(videos: list[str]) -> Rig:
     """A rig of one camera whose lens is assumed, for one video. Raises RecordingError."""
-    import cv2
-
-    from rhot_app.errors import RhotError
     from rhot_app.hand.anatomy import load_hand
-    from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
-    from rhot_node.errors import PictureError
+    from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, landmark_markers
     from rhot_node.files import resource_path
-    from rhot_node.markers import load_markers
-    from rhot_node.pictures import open_video
 
     if len(videos) != 1:
         raise RecordingError(f"{len(videos)} videos need a calibrated rig with a camera for each; give it with --rig. "
-                             "One video alone is tracked without.")
+                             "One video alone is tracked without." if videos else
+                             "give a video, or a rig with --rig and a video of each camera.")
+    width, height = picture_size(input_file(videos[0]))
+    focal = 0.5 * width / math.tan(0.5 * math.radians(ASSUMED_DEG))
+    lens = Intrinsics(width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1), (0.0, 0.0, 0.0, 0.0, 0.0))
+    node = RigNode(1, "camera", lens, CameraPose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    return Rig("one assumed camera", (node,), landmark_markers(), load_hand(resource_path("hands", "right.json")))
+
+
+def picture_size(path: Path) -> tuple[int, int]:
+    """Width and height, px, of a video's pictures. Raises RecordingError."""
+    import cv2
+
+    from rhot_app.sources.frame_sets import picture_files
+    from rhot_node.capture.yuv import HEADER_NAME, read_header
+    from rhot_node.errors import CameraError, PictureError
+    from rhot_node.pictures import open_video, read_picture
+
     try:
-        path = input_file(videos[0])
+        if pictures := picture_files(path):
+            height, width = read_picture(pictures[0]).shape[:2]
+            return width, height
+        if (path / HEADER_NAME).exists():
+            header = read_header(path)
+            return header.width, header.height
+        if path.is_dir():
+            raise RecordingError(f"{path}: this folder has neither pictures nor a recording of raw frames.")
         capture = open_video(path)
-    except (RhotError, PictureError) as exc:
+    except (CameraError, PictureError) as exc:
         raise RecordingError(str(exc)) from exc
     try:
         width, height = (int(capture.get(what)) for what in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
@@ -135,11 +155,7 @@ def assumed_rig(videos: list[str]) -> Rig:
         capture.release()
     if not (width > 0 and height > 0):
         raise RecordingError(f"{path}: no frame of it can be decoded. Is it a video, and complete?")
-    focal = 0.5 * width / math.tan(0.5 * math.radians(ASSUMED_DEG))
-    lens = Intrinsics(width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1), (0.0, 0.0, 0.0, 0.0, 0.0))
-    node = RigNode(1, "camera", lens, CameraPose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    return Rig("one assumed camera", (node,), load_markers(resource_path("markers", "landmarks21.json")),
-               load_hand(resource_path("hands", "right.json")))
+    return width, height
 
 
 def sentences(document: dict[str, Any]) -> list[str]:
@@ -148,10 +164,17 @@ def sentences(document: dict[str, Any]) -> list[str]:
            "videos show.",
            "The networks found the hand in " + ", ".join(f"{100 * part:.0f} % of {camera}'s pictures"
                                                          for camera, part in document["found"].items()) + "."]
-    if not document["tracked"]:
+    foreign = max(document["foreign"].values())
+    if foreign > max(document["found"].values()) and document["other_tracked"] is None:
+        other = "left" if document["side"] == "right" else "right"
+        out.append(f"In {100 * foreign:.0f} % they found a {other} hand, which is not tracked: the rig's hand is a "
+                   f"{document['side']} one. Give a rig with a {other} hand (resources/hands/{other}.json).")
+    if not (document["tracked"] or document["other_tracked"]):
         return [*out, "No hand was tracked. Is the rig's hand of the right side, and are the videos in its cameras' "
                       "order?"]
-    out += [f"A hand in {100 * document['tracked']:.0f} % of the frame sets.", document["bones"],
+    both = document["other_tracked"]
+    out += [f"A hand in {100 * document['tracked']:.0f} % of the frame sets"
+            + ("." if both is None else f", the other hand in {100 * both:.0f} %."), document["bones"],
             f"Reprojection error of the joints: median {document['reprojection_px']:.1f} px, at the hand "
             f"{document['reprojection_mm']:.1f} mm."]
     if document["reprojection_large"]:
@@ -160,4 +183,4 @@ def sentences(document: dict[str, Any]) -> list[str]:
     out.append(f"Computed: {document['computed_per_s']:.1f} frame sets a second overall.")
     if document["lost_s"]:
         out.append("No hand at " + ", ".join(f"{a:.2f} to {b:.2f}" for a, b in document["lost_s"]) + " s.")
-    return [*out, *(f"Written: {document[key]}" for key in ("out", "overlay") if document[key])]
+    return [*out, *(f"Written: {document[key]}" for key in ("out", "overlay", "hand_file") if document[key])]

@@ -1,4 +1,6 @@
-"""Landmark tables, one per camera, as a raw log. Then every command that takes a log takes landmarks.
+"""Landmark tables, or the hands that networks find in films, one per camera, as a raw log.
+
+Then every command that takes a log takes landmarks.
 
 A table is a CSV file with a header. docs/landmarks.md describes its columns.
 """
@@ -9,7 +11,7 @@ import csv
 import io
 import math
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -26,6 +28,8 @@ from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
+    HandLandmarks,
+    LandmarkedHand,
     MarkerFlag,
     MarkerObservation,
     NodeState,
@@ -61,6 +65,14 @@ class LandmarkTable:
     pixels: Array
     scores: Array
     sigma_px: Array
+
+
+@dataclass(frozen=True, slots=True)
+class HandFilm:
+    """The hands that networks find in T frames of one camera: `times_s` (T,), ascending; `hands` of each frame."""
+
+    times_s: Array
+    hands: Sequence[tuple[LandmarkedHand, ...]]
 
 
 def read_landmark_table(path: Path, fps: float | None) -> LandmarkTable:
@@ -128,25 +140,50 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable]) ->
     if len(tables) != len(rig.nodes):
         raise RecordingError(f"rig {rig.name!r} has {len(rig.nodes)} cameras, but the landmark tables are "
                              f"{len(tables)}. Give one table for each, in the rig's order.")
-    order, first_s = landmark_order(rig), min(table.times_s[0] for table in tables)
-    frames_ns = FIRST_NS + np.rint(1e9 * (np.unique(np.concatenate([table.times_s for table in tables])) - first_s)
-                                   ).astype(np.int64)
+    order = landmark_order(rig)
+
+    def frames(node: RigNode, table: LandmarkTable, times_ns: Times) -> Iterator[Record]:
+        for number, t_ns in enumerate(times_ns.tolist()):
+            yield _datagram(node, rig, number, t_ns, _observations(node, order, table, number))
+
+    return _write(path, rig, [table.times_s for table in tables],
+                  lambda c, times_ns: frames(rig.nodes[c], tables[c], times_ns))
+
+
+def write_hand_log(path: Path, rig: Rig, films: Sequence[HandFilm]) -> int:
+    """Write what networks find in one film per node as their nodes would send it; returns the number of frames. Raises
+    RecordingError when the file cannot be written."""
+    def frames(node: RigNode, film: HandFilm, times_ns: Times) -> Iterator[Record]:
+        lens = node.intrinsics
+        for number, t_ns in enumerate(times_ns.tolist()):
+            yield Record(RecordKind.DATAGRAM, node.node_id, t_ns, encode(HandLandmarks(
+                node_id=node.node_id, session=_SESSION, sequence=number, t_frame_node_ns=t_ns, t_send_node_ns=t_ns,
+                processing_ns=0, exposure_ns=0, row_time_ns=0, width=lens.width, height=lens.height,
+                frame_number=number, hands=film.hands[number])))
+
+    return _write(path, rig, [film.times_s for film in films],
+                  lambda c, times_ns: frames(rig.nodes[c], films[c], times_ns))
+
+
+def _write(path: Path, rig: Rig, times_s: Sequence[Array], frames: Callable[[int, Times], Iterator[Record]]) -> int:
+    """A log of the `frames` of each camera, which are called for with its number and their master times."""
+    first_s = min(float(times[0]) for times in times_s)
+    times_ns = [FIRST_NS + np.rint(1e9 * (times - first_s)).astype(np.int64) for times in times_s]
+    frames_ns = np.unique(np.concatenate(times_ns))
     exchanges_ns = _near(np.arange(_BEGIN_NS, frames_ns[-1] + _EXCHANGE_NS, _EXCHANGE_NS), frames_ns).tolist()
     stated = [Record(RecordKind.START, 0, _BEGIN_NS - 1, encode(Start(
         _SESSION, 0, tuple(StartEntry(node.node_id, 1, 0) for node in rig.nodes))))]
-    for node, table in zip(rig.nodes, tables, strict=True):
+    for c, node in enumerate(rig.nodes):
         for sequence, t_ns in enumerate(exchanges_ns):
             stated += _exchange(node, sequence, t_ns)
-        for number, t_s in enumerate(table.times_s):
-            stated.append(_datagram(node, rig, number, FIRST_NS + round(1e9 * (t_s - first_s)),
-                                  _observations(node, order, table, number)))
+        stated += frames(c, times_ns[c])
     try:
         with replacing(path) as file:
             file.writelines(encode_log(rig, begun_now(_BEGIN_NS),
                                        sorted(stated, key=lambda record: record.t_master_ns)))
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be written ({exc.strerror}). Choose another --out.") from exc
-    return sum(len(table.times_s) for table in tables)
+    return sum(len(times) for times in times_s)
 
 
 def _near(times_ns: Times, frames_ns: Times) -> Times:

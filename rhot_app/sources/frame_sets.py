@@ -1,8 +1,8 @@
 """Recorded videos of several cameras as frame sets: a picture of each camera near one instant, with its own time.
 
 In ordinary videos the time of a frame follows from its number; the twin's recordings of raw frames state it. The nodes'
-own recordings state it too, and the log beside them takes it to the master's clock. Frames are decoded as they are
-asked for; no video is kept in memory.
+own recordings state it too, and the log beside them takes it to the master's clock. Pictures of a folder are a video,
+and one picture is a video in which nothing moves. Frames are decoded as they are asked for; no video is kept in memory.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 import cv2
 import numpy as np
@@ -23,11 +24,12 @@ from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import video_path
 from rhot_app.sources.clock import ClockEstimate
 from rhot_app.sources.replay import LogValidator
+from rhot_node.capture.paced import IMAGE_SUFFIXES
 from rhot_node.capture.yuv import HEADER_NAME, read_header, read_images
 from rhot_node.detect.image import to_bgr
 from rhot_node.errors import CameraError, PictureError, VideoError
 from rhot_node.files import open_input, require_file, why
-from rhot_node.pictures import decode_picture
+from rhot_node.pictures import decode_picture, read_picture
 from rhot_node.pictures import open_video as decoder
 from rhot_node.video.avi import Stamp, pictures_of, read_stamps
 
@@ -37,19 +39,30 @@ Times = NDArray[np.int64]
 FPS = 1.0, 1000.0
 """frames/s that a video can have; what a file says beyond them is not a rate but missing."""
 
+STILL_FPS: Final = 30.0
+STILL_FRAMES: Final = 30
+"""What one picture is shown for: a second, in which a tracker settles."""
+
 _CLOCK_EVERY_NS = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraVideo:
     """One camera's video. `times_ns` (N,): mid-exposure of the middle row of every frame. `stamped`: the node wrote
-    these times, by its own clock until `on_master_clock`; else they are of a clock that all videos have."""
+    these times, by its own clock until `on_master_clock`; else they are of a clock that all videos have. `pictures`:
+    the picture files of its frames, where it is no one file."""
 
     camera: str
     path: Path
     lens: Intrinsics
     times_ns: Times
     stamped: bool
+    pictures: tuple[Path, ...] = ()
+
+    @property
+    def still(self) -> bool:
+        """Whether all frames are one picture."""
+        return len(set(self.pictures)) == 1
 
     @property
     def period_ns(self) -> int:
@@ -60,8 +73,8 @@ class CameraVideo:
         """(time ns, picture (H, W, 3) RGB) of every frame, or of those that are `wanted` (N,). Raises RecordingError
         where a frame has another size; a video that ends too early is noted as a loss."""
         chosen = np.ones(len(self.times_ns), np.bool_) if wanted is None else wanted
-        decode = (self._raw_pictures if self.path.is_dir() else self._stamped_pictures if self.stamped
-                  else self._pictures)
+        decode = (self._picture_files if self.pictures else self._raw_pictures if self.path.is_dir()
+                  else self._stamped_pictures if self.stamped else self._pictures)
         read = 0
         for k, picture in decode(chosen):
             read = k + 1
@@ -80,6 +93,16 @@ class CameraVideo:
                     return
                 picture = capture.retrieve()[1] if keep else None
                 yield k, None if picture is None else np.asarray(picture, np.uint8)
+
+    def _picture_files(self, chosen: NDArray[np.bool_]) -> Iterator[tuple[int, Image | None]]:
+        read: tuple[Path, Image] | None = None
+        for k, path in enumerate(self.pictures):
+            if chosen[k] and (read is None or read[0] != path):
+                try:
+                    read = path, read_picture(path)
+                except PictureError as exc:
+                    raise RecordingError(str(exc)) from exc
+            yield k, read[1] if chosen[k] and read is not None else None
 
     def _raw_pictures(self, chosen: NDArray[np.bool_]) -> Iterator[tuple[int, Image | None]]:
         for k, image in enumerate(read_images(self.path)):
@@ -107,11 +130,13 @@ class CameraVideo:
 
 
 def open_video(node: RigNode, path: Path, fps: float | None = None) -> CameraVideo:
-    """The video of a camera of the rig, a file or a folder of raw frames (``rhot-yuv``). `fps`: of an ordinary video,
-    instead of the rate that its file says.
+    """The video of a camera of the rig: a file, a picture, or a folder of pictures or of raw frames (``rhot-yuv``).
+    `fps`: of an ordinary video, instead of the rate that its file says, and of the pictures of a folder.
 
     Raises RecordingError: no video, a picture of another size than the lens's, or no frame rate.
     """
+    if pictures := picture_files(path):
+        return _open_pictures(node, path, pictures, fps)
     if path.is_dir():
         return _open_raw(node, path, fps)
     try:
@@ -140,6 +165,31 @@ def open_video(node: RigNode, path: Path, fps: float | None = None) -> CameraVid
         raise RecordingError(f"{path}: it does not say how many frames it has. Write it anew with a video program.")
     times = np.round(1e9 / rate * np.arange(count)).astype(np.int64)
     return CameraVideo(node.name, path, node.intrinsics, times, False)
+
+
+def picture_files(path: Path) -> tuple[Path, ...]:
+    """The pictures that a path names: itself, or those of a folder in the order of their names; none for a video and
+    for a recording of raw frames."""
+    if not path.is_dir():
+        return (path,) if path.suffix.lower() in IMAGE_SUFFIXES else ()
+    if (path / HEADER_NAME).exists():
+        return ()
+    return tuple(sorted(one for one in path.iterdir() if one.suffix.lower() in IMAGE_SUFFIXES))
+
+
+def _open_pictures(node: RigNode, path: Path, pictures: tuple[Path, ...], fps: float | None) -> CameraVideo:
+    """One picture for a second, or those of a folder. Raises RecordingError."""
+    try:
+        height, width = read_picture(pictures[0]).shape[:2]
+    except PictureError as exc:
+        raise RecordingError(str(exc)) from exc
+    _check_size(pictures[0], node.name, (width, height), node.intrinsics)
+    if path.is_dir() and fps is None:
+        raise RecordingError(f"{path}: pictures do not say how many of them were taken a second; give it with --fps.")
+    if not path.is_dir():
+        pictures = pictures * STILL_FRAMES
+    times = np.round(1e9 / (fps or STILL_FPS) * np.arange(len(pictures))).astype(np.int64)
+    return CameraVideo(node.name, path, node.intrinsics, times, False, pictures)
 
 
 def _open_raw(node: RigNode, folder: Path, fps: float | None) -> CameraVideo:

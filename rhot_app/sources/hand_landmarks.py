@@ -1,9 +1,12 @@
-"""Hand landmarks of a node as observations of the rig's markers that are landmarks."""
+"""Hand landmarks of a camera as observations of the rig's markers that are landmarks, live and from films."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +16,69 @@ from rhot_app.project import OTHER_HAND, Rig
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import HandLandmarks, LandmarkedHand, MarkerFlag
 
+Array = NDArray[np.float64]
+
 DIAMETER_PX = 1.0
 """A landmark has none."""
 
-_HALF = 0.5  # below it, a hand is rather of the other side
+SIDE_S: Final = 0.2
+"""s: over which the networks' word on a hand's side is averaged, so that a flicker turns no hand into the other one.
+Chosen: it holds against four wrong frames of 30 a second, and is turned round within half a second."""
+
+MOST_SURE: Final = 0.98
+"""Probability of a side beyond which a frame counts no more."""
+
+NEAR: Final = 0.5
+"""Mean distance of landmarks from where a hand is predicted, as a part of its extent, from which it is another one."""
+
+FORGOTTEN_NS: Final = 500_000_000
+"""A hand that was not seen for so long is another one when it comes (`estimator.LOST_AFTER_NS`)."""
+
+STAYS: Final = 1.0
+"""Log odds by which another hand must be likelier to take a hand's place: 73 to 27 %."""
+
+
+@dataclass(slots=True, eq=False)
+class _Track:
+    """One hand in the frames of a camera. `points` (21, 2) px at `t_ns`, NaN where there is none; `velocity` (2,)
+    px/ns; `right`: mean log odds that it is a right one; `hand`: which of the rig's it was last, None: none."""
+
+    t_ns: int
+    points: Array
+    velocity: Array
+    right: float
+    hand: int | None = None
+
+    def distance(self, points: Array, t_ns: int) -> float:
+        """Mean distance of landmarks (21, 2) px from where they are expected, as a part of their extent."""
+        off = np.linalg.norm(points - self.points - self.velocity * (t_ns - self.t_ns), axis=1)
+        shared = np.isfinite(off)
+        if not shared.any():
+            return math.inf
+        extent = float(np.ptp(points[np.isfinite(points[:, 0])], axis=0).max())
+        return float(off[shared].mean()) / max(extent, 1.0)
+
+    def follow(self, points: Array, right: float, t_ns: int) -> None:
+        """Take what a later frame shows of the hand."""
+        since_ns = t_ns - self.t_ns
+        if since_ns > 0:
+            shared = np.isfinite(points[:, 0] + self.points[:, 0])
+            self.velocity = (points - self.points)[shared].mean(axis=0) / since_ns
+            self.right += (1.0 - math.exp(-1e-9 * since_ns / SIDE_S)) * (right - self.right)
+            self.t_ns, self.points = t_ns, points
 
 
 class LandmarkMarkers:
-    """Which of a rig's markers are landmarks, and of which hand."""
+    """Which of a rig's markers are landmarks, and of which hand. The frames of one camera, in the order of time.
+
+    Hands are followed from frame to frame by their landmarks; those of the rig are told by the side that the networks
+    have said of them lately.
+    """
 
     def __init__(self, rig: Rig) -> None:
         self._count = len(rig.markers.markers)
         self._hands: list[tuple[bool, NDArray[np.intp], NDArray[np.intp]]] = []  # right; markers; their landmarks
+        self._tracks: list[_Track] = []
         for hand, prefix in ((rig.hand, ""), (rig.other_hand, OTHER_HAND)):
             roles = [f"{prefix}{role}" for role in LANDMARK_ROLES]
             rows = [(k, roles.index(marker.role)) for k, marker in enumerate(rig.markers.markers)
@@ -42,7 +96,7 @@ class LandmarkMarkers:
         pixels, covariances = np.full((self._count, 2), np.nan), np.zeros((self._count, 2, 2))
         diameters, qualities = np.zeros(self._count), np.zeros(self._count)
         flags = np.full(self._count, MarkerFlag.LOST, np.uint16)
-        for (_, markers, landmarks), found in zip(self._hands, self._assigned(message.hands), strict=True):
+        for (_, markers, landmarks), found in zip(self._hands, self._assigned(message.hands, t_row0_ns), strict=True):
             if found is None:
                 continue
             points = np.array(found.points)[landmarks]
@@ -57,16 +111,46 @@ class LandmarkMarkers:
             network_s=1e-9 * (t_receive_ns - t_send_ns), pixels=pixels, covariances=covariances, diameters=diameters,
             qualities=qualities, flags=flags)
 
-    def _assigned(self, found: Sequence[LandmarkedHand]) -> list[LandmarkedHand | None]:
-        """Which hand of a frame is which of the rig's: the likeliest by their sides. None: rather none of them."""
-        best: tuple[LandmarkedHand | None, ...] = (None,) * len(self._hands)
+    def _assigned(self, found: Sequence[LandmarkedHand], t_ns: int) -> list[LandmarkedHand | None]:
+        """Which hand of a frame is which of the rig's: the likeliest by their sides, and by what they were before.
+        None: rather none of them."""
+        tracks = self._followed(found, t_ns)
+        best: tuple[int | None, ...] = (None,) * len(self._hands)
         most = 0.0
         for choice in product((None, *range(len(found))), repeat=len(self._hands)):
             chosen = [k for k in choice if k is not None]
             if len(set(chosen)) < len(chosen):
                 continue
-            gain = sum((found[k].right if is_right else 1.0 - found[k].right) - _HALF
-                       for k, (is_right, _, _) in zip(choice, self._hands, strict=True) if k is not None)
+            gain = 0.0
+            for number, k in enumerate(choice):
+                if k is not None:
+                    gain += tracks[k].right if self._hands[number][0] else -tracks[k].right
+                    gain += STAYS if tracks[k].hand == number else 0.0
             if gain > most:
-                most, best = gain, tuple(None if k is None else found[k] for k in choice)
-        return list(best)
+                most, best = gain, choice
+        for k, track in enumerate(tracks):
+            track.hand = best.index(k) if k in best else None
+        return [None if k is None else found[k] for k in best]
+
+    def _followed(self, found: Sequence[LandmarkedHand], t_ns: int) -> list[_Track]:
+        """The track of each hand of a frame: the nearest one, or a new one."""
+        self._tracks = [track for track in self._tracks if abs(t_ns - track.t_ns) < FORGOTTEN_NS]
+        hands = []
+        for one in found:
+            points = np.array(one.points)
+            points[points[:, 2] <= 0.0] = np.nan
+            odds = min(max(one.right, 1.0 - MOST_SURE), MOST_SURE)
+            hands.append((points[:, :2], math.log(odds / (1.0 - odds))))
+        pairs = sorted((track.distance(points, t_ns), k, number) for number, track in enumerate(self._tracks)
+                       for k, (points, _) in enumerate(hands))
+        of_hand: dict[int, _Track] = {}
+        for distance, k, number in pairs:
+            if distance < NEAR and k not in of_hand and self._tracks[number] not in of_hand.values():
+                of_hand[k] = self._tracks[number]
+        for k, (points, right) in enumerate(hands):
+            if k in of_hand:
+                of_hand[k].follow(points, right, t_ns)
+            else:
+                of_hand[k] = _Track(t_ns, points, np.zeros(2), right)
+                self._tracks.append(of_hand[k])
+        return [of_hand[k] for k in range(len(found))]

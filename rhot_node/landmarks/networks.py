@@ -181,8 +181,8 @@ def open_hand_networks(folder: Path | None = None, *, model: str = "full", runti
     Raises KeypointError."""
     folder = installed_folder() if folder is None else folder
     if folder is None:
-        raise KeypointError("the hand networks are not installed. Run `rhot-node landmarks install`, for the node's "
-                            "service `sudo rhot-node landmarks install --service`.")
+        raise KeypointError("the hand networks are not installed. Run `rhot landmarks install`; on a node `rhot-node "
+                            "landmarks install`, for its service `sudo rhot-node landmarks install --service`.")
     runtime = best_runtime() if runtime is None else runtime
     palm, hand = (open_network(read_network(folder, f"{name}_{model}.tflite"), runtime, threads)
                   for name in ("palm_detection", "hand_landmark"))

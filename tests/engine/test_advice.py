@@ -99,6 +99,8 @@ def test_one_sentence_when_nobody_sees_anything() -> None:
     assert "No camera has seen a marker for 8 s" in advice.text
     assert node_advice(blind, IDS, True, visibility=False) == []
     assert no_marker_advice([blind, WELL], running=True) == []
+    (advice,) = no_marker_advice([blind], running=True, painted=False)
+    assert "landmarks install" in advice.text and "colours" not in advice.text, "of a rig of landmarks"
 
 
 def test_what_must_be_done_now_comes_before_graver_words_about_less() -> None:

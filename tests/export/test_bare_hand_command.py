@@ -49,9 +49,9 @@ class Recorded:
     frames: list[BareHandFrame]
 
     def arguments(self, *more: str) -> list[str]:
-        """Of ``rhot bare-hand``."""
+        """Of ``rhot track``, by its former name."""
         given = [word for name, path in self.videos.items() for word in ("--video", f"{name}={path}")]
-        return ["bare-hand", "--rig", str(self.rig), *given, *more]
+        return ["bare-hand", "--observe", "contours", "--rig", str(self.rig), *given, *more]
 
 
 def write_video(path: Path, pictures: Sequence[NDArray[np.uint8]], fps: float = FPS) -> Path:
@@ -145,8 +145,8 @@ def test_a_hand_that_is_found_again_has_its_own_key_frames(recorded: Recorded,
 def test_videos_without_a_hand_say_so(recorded: Recorded, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     name, path = next(iter(recorded.videos.items()))
     empty = write_video(tmp_path / "empty.avi", [frame.images[0] for frame in recorded.frames[:EMPTY]])
-    arguments = ["bare-hand", "--rig", str(recorded.rig), "--video", f"{name}={empty}", "--background",
-                 f"{name}={path}"]
+    arguments = ["track", "--observe", "contours", "--rig", str(recorded.rig), "--video", f"{name}={empty}",
+                 "--background", f"{name}={path}"]
     assert main(arguments) == 0
     said = capsys.readouterr().out
     assert "No hand was found" in said and "frame sets a second overall" in said
@@ -195,13 +195,14 @@ def test_videos_that_cannot_be_used_are_refused(recorded: Recorded, tmp_path: Pa
         path.write_bytes(content)
     elif content == "small":
         write_video(path, [frame.images[0][::2, ::2] for frame in recorded.frames[:2]])
-    assert main(["bare-hand", "--rig", str(recorded.rig), "--video", f"left={path}"]) == 2
+    assert main(["track", "--observe", "contours", "--rig", str(recorded.rig), "--video", f"left={path}"]) == 2
     assert says in capsys.readouterr().err
 
 
 def test_one_file_is_not_two_cameras(recorded: Recorded, capsys: pytest.CaptureFixture[str]) -> None:
     path = recorded.videos["left"]
-    assert main(["bare-hand", "--rig", str(recorded.rig), "--video", f"left={path}", "--video", f"right={path}"]) == 2
+    assert main(["track", "--observe", "contours", "--rig", str(recorded.rig), "--video", f"left={path}", "--video",
+                 f"right={path}"]) == 2
     assert "two cameras" in capsys.readouterr().err
 
 
@@ -303,8 +304,8 @@ def test_recordings_of_two_nodes_need_their_log(tmp_path: Path, capsys: pytest.C
     save_rig(tmp_path / "rig.json", rig)
     paths = [write_node_video(tmp_path / f"r.{node.name}.avi", shades(3, rig), [10 ** (9 + c) + k for k in (0, 50, 90)])
              for c, node in enumerate(rig.nodes)]
-    assert main(["bare-hand", "--rig", str(tmp_path / "rig.json"), "--video", f"left={paths[0]}", "--video",
-                 f"right={paths[1]}"]) == 2
+    assert main(["track", "--observe", "contours", "--rig", str(tmp_path / "rig.json"), "--video", f"left={paths[0]}",
+                 "--video", f"right={paths[1]}"]) == 2
     assert "r.rhotlog" in capsys.readouterr().err
 
 
@@ -341,8 +342,8 @@ def test_real_videos_run_and_states_without_a_hand_have_no_numbers(tmp_path: Pat
                                                                    capsys: pytest.CaptureFixture[str]) -> None:
     rig = msgspec.structs.replace(bare_hand_rig(), nodes=recorded_nodes(), calibration=None)
     save_rig(tmp_path / "rig.json", rig)
-    arguments = ["bare-hand", "--rig", str(tmp_path / "rig.json"), "--unknown-size", "--json", "--out",
-                 str(tmp_path / "hand.csv"), "--overlay", str(tmp_path / "pictures")]
+    arguments = ["track", "--observe", "contours", "--rig", str(tmp_path / "rig.json"), "--unknown-size", "--json",
+                 "--out", str(tmp_path / "hand.csv"), "--overlay", str(tmp_path / "pictures")]
     for c in range(2):
         capture = cv2.VideoCapture(str(FOLDER / f"cam{c}_first120.mp4"))
         pictures = [np.ascontiguousarray(capture.read()[1][..., ::-1]) for _ in range(16)][14:]

@@ -1,4 +1,4 @@
-"""``rhot track`` by landmarks: a drawn hand through stand-in networks, a recorded one through the real ones."""
+"""``rhot track`` by landmarks: drawn hands through stand-in networks, a recorded one through the real ones."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ import pytest
 from recorded_landmarks import FOLDER, FPS, JUDGED, WHOLE, needs_recording, recording
 
 from rhot_app.__main__ import main
-from rhot_app.export import landmark_track
+from rhot_app.export import bare_hand_command, landmark_track
 from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import JOINTS
-from rhot_app.project import load_rig, save_rig
+from rhot_app.project import TrackerSettings, landmark_markers, load_rig, save_rig
+from rhot_app.rig_history import versions
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
 from rhot_node.errors import KeypointError
 from rhot_node.files import resource_path
@@ -27,6 +29,7 @@ from rhot_node.landmarks.networks import DetectedHand, Region
 needs_networks = pytest.mark.skipif(installed_folder() is None, reason="`rhot landmarks install` has not been run")
 SECONDS, RATE = 3.0, 20.0
 RIG = landmark_rig()
+LEFT = load_hand(resource_path("hands", "left.json"))
 
 
 def video(path: Path, lens, count: int) -> Path:
@@ -39,47 +42,60 @@ def video(path: Path, lens, count: int) -> Path:
 
 
 class StandIn:
-    """Finds in the pictures of a camera, one after the other, what that camera would see of a drawn hand."""
+    """Finds in the pictures of a camera, one after the other, what that camera would see of drawn hands (H, T, 21, 2)
+    px, NaN where it sees none; `right` (H, T) or of each hand: what it says of their sides."""
 
-    def __init__(self, pixels, right: float = 1.0, hidden: range = range(0)) -> None:
-        self._pixels, self._right, self._hidden, self._count = pixels, right, hidden, -1
+    def __init__(self, hands, right, hidden: range = range(0)) -> None:
+        self._hands, self._hidden, self._count = np.asarray(hands), hidden, -1
+        self._right = np.broadcast_to(np.reshape(right, (len(self._hands), -1)), self._hands.shape[:2])
 
     def find(self, picture):
         self._count += 1
         if self._count in self._hidden:
             return ()
-        landmarks = self._pixels[self._count]
-        region = Region(landmarks.mean(axis=0), 200.0, 0.0)
-        return (DetectedHand(landmarks, np.zeros((21, 3)), 0.9, self._right, region),)
+        return tuple(DetectedHand(landmarks, np.zeros((21, 3)), 0.9, float(right),
+                                  Region(landmarks.mean(axis=0), 200.0, 0.0))
+                     for landmarks, right in zip(self._hands[:, self._count], self._right[:, self._count], strict=True)
+                     if np.isfinite(landmarks).all())
+
+
+def seen_by(rig, joints):
+    """(C, T, 21, 2) px of joints (T, 21, 3) m."""
+    cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
+    return np.array([[camera.project(one) for one in joints] for camera in cameras])
+
+
+def use_networks(monkeypatch, stand_ins) -> None:
+    """From now on the networks of one film after the other are these; the command first asks whether there are any."""
+    waiting = iter(stand_ins)
+    monkeypatch.setattr(networks, "open_hand_networks", lambda: None)
+    monkeypatch.setattr(landmark_track, "open_hand_networks", lambda: next(waiting))
 
 
 @pytest.fixture
 def drawn(tmp_path, monkeypatch):
     """A drawn hand, whose bones are not the rig's; the command's words for its two videos."""
     hand = moving_hand(RIG, "grasp", SECONDS, RATE, 1, 0.05)
-    cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in RIG.nodes]
-    seen = [np.array([camera.project(one) for one in hand.joints()]) for camera in cameras]
+    seen = seen_by(RIG, hand.joints())
     save_rig(tmp_path / "rig.json", RIG)
     words = ["track"]
     for node in RIG.nodes:
         words.append(f"{node.name}={video(tmp_path / f'{node.name}.avi', node.intrinsics, len(hand.times_s))}")
 
-    def use(**options):
-        waiting = [StandIn(pixels, **options) for pixels in seen]
-        asked = iter([None, *waiting])  # the command first asks whether there are networks
-        monkeypatch.setattr(networks, "open_hand_networks", lambda: None)
-        monkeypatch.setattr(landmark_track, "open_hand_networks", lambda: next(asked) or next(asked))
+    def use(right=0.95, **options):
+        use_networks(monkeypatch, [StandIn(pixels[None], right, **options) for pixels in seen])
         return hand
 
     use()
     return use, [*words, "--rig", str(tmp_path / "rig.json")], tmp_path
 
 
-def table_of(path: Path):
+def table_of(path: Path, prefix: str = ""):
     """(T,) s and (T, 21, 3) m of a table, NaN without a hand."""
     with path.open() as file:
         rows = list(csv.DictReader(file))
-    places = [[[float(row[f"joint_{joint}_{axis}_mm"] or "nan") for axis in "xyz"] for joint in JOINTS] for row in rows]
+    places = [[[float(row[f"{prefix}joint_{joint}_{axis}_mm"] or "nan") for axis in "xyz"] for joint in JOINTS]
+              for row in rows]
     return np.array([float(row["time_s"]) for row in rows]), 1e-3 * np.array(places)
 
 
@@ -93,23 +109,163 @@ def test_a_hand_is_tracked_with_its_own_bones_and_the_films_times(drawn, capsys)
     assert np.isnan(places[:5]).all() and said["tracked"] == pytest.approx(np.isfinite(places[:, 0, 0]).mean())
     assert said["lost_s"][0][0] == 0.0 and 0.25 < said["lost_s"][0][1] < 0.5
     assert "measured" in said["bones"] and list(said["found"].values()) == [0.9, 0.9]
+    assert said["other_tracked"] is None and set(said["foreign"].values()) == {0.0}
     off = np.linalg.norm(places - hand.joints(), axis=2)[20:]
     assert 1e3 * np.median(off) < 3.0
     film = cv2.VideoCapture(str(folder / "film.avi"))
     assert int(film.get(cv2.CAP_PROP_FRAME_COUNT)) == len(times)
 
 
-def test_a_hand_of_the_other_side_is_none(drawn, capsys):
+def test_a_hand_of_the_other_side_is_none_and_is_said_to_be(drawn, capsys):
     use, words, _ = drawn
-    use(right=0.0)
+    use(right=0.05)
     assert main(words) == 0
-    assert "No hand was tracked" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "No hand was tracked" in said and "100 % they found a left hand" in said
 
 
 def test_paths_alone_take_the_cameras_in_order(drawn, capsys):
     _, words, _ = drawn
     assert main(["track", *(word.partition("=")[2] for word in words[1:3]), *words[3:], "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["tracked"] > 0.8
+
+
+def test_the_former_name_and_its_options_are_taken(drawn, capsys):
+    _, words, folder = drawn
+    given = [word for one in words[1:3] for word in ("--video", one)]
+    mine = folder / "mine.json"
+    asked = ["bare-hand", *given, *words[3:], "--background-seconds", "2", "--unknown-size", "--fps", "20",
+             "--offset-s", f"{RIG.nodes[0].name}=0.0", "--adapt", str(mine), "--json"]
+    assert main(asked) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["tracked"] > 0.8 and "not used" in said["notes"][0] and said["hand_file"] == str(mine)
+    bones = np.array([finger.bones_mm for finger in load_hand(mine).fingers.values()])
+    assert np.abs(bones - 1e3 * moving_hand(RIG, "grasp", SECONDS, RATE, 1, 0.05).model.bones).max() < 1.0
+    assert load_rig(folder / "rig.json") == RIG, "the rig stays"
+
+
+def test_a_hand_file_keeps_what_was_there_and_is_not_written_without_measured_bones(drawn, capsys):
+    use, words, folder = drawn
+    mine = folder / "mine.json"
+    mine.write_bytes(resource_path("hands", "right.json").read_bytes())
+    assert main([*words, "--adapt", str(mine)]) == 0
+    assert f"Written: {mine}" in capsys.readouterr().out and len(versions(mine)) == 1
+    use()
+    kept, (name, _, path) = mine.read_bytes(), words[1].partition("=")
+    assert main(["track", f"{name}={path}", *words[3:], "--adapt", str(mine)]) == 3
+    assert "not written" in (told := capsys.readouterr()).err and "one camera" in told.err
+    assert mine.read_bytes() == kept
+    assert main([*words, "--adapt", str(mine), "--bones", "rig"]) == 2
+
+
+def test_an_unknown_size_is_estimated_where_bones_are_not_measured(drawn):
+    _, words, folder = drawn
+    assert main([*words, "--bones", "rig", "--unknown-size", "--out", str(folder / "hand.csv")]) == 0
+    with (folder / "hand.csv").open() as file:
+        last = list(csv.DictReader(file))[-1]
+    assert float(last["hand_scale"]) != 1.0 and float(last["hand_scale_sd"]) > 0.0
+
+
+def test_what_the_rigs_tracker_observes_is_looked_for(drawn, monkeypatch):
+    _, words, folder = drawn
+    rigs = []
+    monkeypatch.setattr(bare_hand_command, "run", lambda args: rigs.append(args.rig) or 0)
+    save_rig(folder / "rig.json", msgspec.structs.replace(RIG, tracker=TrackerSettings("estimator",
+                                                                                       observe="contours")))
+    assert main(words) == 0 and len(rigs) == 1
+    assert main([*words, "--observe", "landmarks"]) == 0 and len(rigs) == 1
+
+
+def test_a_rig_without_paint_is_tracked_by_landmarks_whatever_else_it_says():
+    rig = msgspec.structs.replace(RIG, tracker=TrackerSettings())
+    assert not rig.painted and (rig.tracker.kind, rig.tracker.observe) == ("estimator", "landmarks")
+    painted = load_rig(resource_path("rigs", "two_pis.json"))
+    mixed = msgspec.structs.replace(painted.markers, markers=(*painted.markers.markers[:1],
+                                                              *RIG.markers.markers[1:]))
+    for one in (painted, msgspec.structs.replace(painted, markers=mixed)):
+        assert one.painted and one.tracker == painted.tracker
+
+
+# -- pictures ----------------------------------------------------------------------------------------------------------
+
+def test_one_picture_of_each_camera_is_a_second_in_which_nothing_moves(drawn, monkeypatch, capsys):
+    _, words, folder = drawn
+    hand = moving_hand(RIG, "grasp", SECONDS, RATE, 1)
+    still = np.repeat(seen_by(RIG, hand.joints()[30:31]), 30, axis=1)
+    use_networks(monkeypatch, [StandIn(pixels[None], 0.95) for pixels in still])
+    given = []
+    for node in RIG.nodes:
+        path = folder / f"{node.name}.png"
+        cv2.imwrite(str(path), np.zeros((node.intrinsics.height, node.intrinsics.width, 3), np.uint8))
+        given.append(f"{node.name}={path}")
+    assert main(["track", *given, *words[3:], "--out", str(folder / "hand.csv"), "--json"]) == 0
+    assert "rig's" in json.loads(capsys.readouterr().out)["bones"], "nothing moves"
+    times, places = table_of(folder / "hand.csv")
+    assert len(times) == 30
+    assert 1e3 * np.median(np.linalg.norm(places[-1] - hand.joints()[30], axis=1)) < 3.0
+
+
+def test_a_folder_of_pictures_is_a_film_of_the_rate_that_is_given(drawn, monkeypatch, capsys):
+    _, words, folder = drawn
+    lens, name = RIG.nodes[0].intrinsics, RIG.nodes[0].name
+    pictures = folder / "pictures"
+    pictures.mkdir()
+    for number in range(20):
+        cv2.imwrite(str(pictures / f"{number:03d}.png"), np.zeros((lens.height, lens.width), np.uint8))
+    assert main(["track", f"{name}={pictures}", *words[3:]]) == 2 and "--fps" in capsys.readouterr().err
+    assert main(["track", f"{name}={pictures}", *words[3:], "--fps", "20", "--out", str(folder / "hand.csv")]) == 0
+    times, places = table_of(folder / "hand.csv")
+    np.testing.assert_allclose(times, np.arange(20) / 20.0)
+    assert np.isfinite(places[-1]).all()
+    (pictures / "999.png").write_bytes(b"no picture")
+    assert main(["track", f"{name}={pictures}", *words[3:], "--fps", "20"]) == 2
+    assert "999.png" in capsys.readouterr().err
+
+
+# -- two hands ---------------------------------------------------------------------------------------------------------
+
+def test_two_hands_that_cross_are_tracked_each_with_its_own_bones(drawn, monkeypatch, capsys):
+    """Two drawn hands pass each other, one before the other, which is not found meanwhile; sides flicker."""
+    _, words, folder = drawn
+    hands = [moving_hand(one, "grasp", SECONDS, RATE, 1, 0.05)
+             for one in (RIG, msgspec.structs.replace(RIG, hand=LEFT))]
+    aside = np.linspace(-0.12, 0.12, len(hands[0].times_s))[:, None, None] * np.array([1.0, 0.0, 0.0])
+    joints = [hands[0].joints() + aside + [0.0, 0.0, 0.1], hands[1].joints() - aside]
+    seen = np.array([seen_by(RIG, one) for one in joints])  # (H, C, T, 21, 2)
+    behind = np.linalg.norm(seen[0].mean(axis=2) - seen[1].mean(axis=2), axis=2) < 60.0
+    seen[0][behind] = np.nan
+    sides = np.full((2, len(aside)), [[0.95], [0.05]])
+    sides[0, 12:14], sides[1, 40:42] = 0.1, 0.9
+    use_networks(monkeypatch, [StandIn(seen[:, c], sides) for c in range(2)])
+    save_rig(folder / "rig.json", msgspec.structs.replace(RIG, markers=landmark_markers(both=True), other_hand=LEFT))
+    film = folder / "film.avi"
+    assert main([*words, "--out", str(folder / "hand.csv"), "--overlay", str(film), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["tracked"] > 0.9 and said["other_tracked"] > 0.9 and film.exists()
+    assert "Right hand: Bones measured" in said["bones"] and "Left hand: Bones measured" in said["bones"]
+    assert behind.any(axis=0).sum() >= 5
+    for prefix, own in (("", joints[0]), ("other_", joints[1])):
+        places = table_of(folder / "hand.csv", prefix)[1]
+        off = 1e3 * np.median(np.linalg.norm(places - own, axis=2), axis=1)
+        assert np.nanmedian(off) < 5.0 and np.nanmax(off[5:]) < 60.0, "never the other one"
+
+
+# -- bad input ---------------------------------------------------------------------------------------------------------
+
+def test_cameras_that_face_each_other_track_a_hand_between_them(drawn, monkeypatch, capsys):
+    _, words, folder = drawn
+    lens = RIG.nodes[0]
+    facing = msgspec.structs.replace(RIG.nodes[1], pose=msgspec.structs.replace(
+        lens.pose, rotation_wxyz=(0.0, 0.0, 1.0, 0.0), translation_m=(0.0, 0.0, 1.2)))
+    rig = msgspec.structs.replace(RIG, nodes=(msgspec.structs.replace(lens, pose=type(lens.pose)()), facing))
+    hand = moving_hand(rig, "grasp", SECONDS, RATE, 1)
+    noise = np.random.default_rng(1).normal(0.0, 1.5, (2, len(hand.times_s), 21, 2))
+    use_networks(monkeypatch, [StandIn(pixels[None], 0.95) for pixels in seen_by(rig, hand.joints()) + noise])
+    save_rig(folder / "rig.json", rig)
+    assert main([*words, "--out", str(folder / "hand.csv"), "--json"]) == 0
+    places = table_of(folder / "hand.csv")[1]
+    off = 1e3 * np.median(np.linalg.norm(places - hand.joints(), axis=2), axis=1)
+    assert np.isfinite(off).mean() > 0.9 and np.nanmedian(off) < 20.0
 
 
 def test_a_painted_rig_with_filters_of_its_own_tracks_a_bare_hand() -> None:
@@ -121,7 +277,7 @@ def test_a_painted_rig_with_filters_of_its_own_tracks_a_bare_hand() -> None:
 
 
 @pytest.mark.parametrize(("words", "says"), [
-    (["--background-seconds", "2"], "--background-seconds is of contours"),
+    (["--bones", "rig", "--adapt", "mine.json"], "--bones rig"),
     (["--smooth", "--observe", "contours"], "only landmarks are smoothed"),
     (["--fps", "2000"], "--fps 2000"), (["--out", "hand.bvh"], "hand.bvh")])
 def test_mistakes_are_sentences(drawn, words, says, capsys):
@@ -177,7 +333,8 @@ def test_a_recorded_hand_is_tracked_from_its_videos_alone(film, capsys):
 def test_one_video_without_a_rig_is_tracked_by_an_assumed_lens(film, capsys):
     assert main(["track", str(FOLDER / "cam1_first120.mp4"), "--out", str(film / "one.csv"), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
-    assert "60 degrees" in said["assumed"][0] and said["tracked"] > 0.9 and "one camera" in said["bones"]
+    assert "60 degrees" in said["notes"][0] and "right one" in said["notes"][1]
+    assert said["tracked"] > 0.9 and "one camera" in said["bones"]
     _, places = table_of(film / "one.csv")
     aligned = [aligned_mm(one, other) for one, other in zip(places[WHOLE:], recording().places, strict=False)]
     assert np.median(aligned) < 18.5

@@ -10,6 +10,7 @@ from test_door import NODE_CLOCK, NOW_NS, SESSION, known_clock
 
 from rhot_app.project import OTHER_HAND, Rig
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
+from rhot_app.sources.hand_landmarks import LandmarkMarkers
 from rhot_app.sources.validation import DatagramValidator
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.markers import MarkerSet
@@ -90,3 +91,62 @@ def test_a_rig_without_landmarks_takes_none() -> None:
     door.expect_session(SESSION)
     assert admitted(rig, hand(100.0, 0.9), door=door) is None
     assert (door.dropped, door.accepted) == ({"no_landmarks": 1}, 0)
+
+
+# -- from frame to frame -----------------------------------------------------------------------------------------------
+
+FPS = 30.0
+
+
+def followed(rig: Rig, frames: list[list[LandmarkedHand]], fps: float = FPS) -> np.ndarray:
+    """(T, H) x of the wrist of each of the rig's hands, NaN without."""
+    markers, found = LandmarkMarkers(rig), []
+    for number, hands in enumerate(frames):
+        t_ns = NOW_NS + round(1e9 * number / fps)
+        found.append(shown(markers.observations(HandLandmarks(1, SESSION, number, t_ns, t_ns, 0, 0, 0, 640, 480, number,
+                                                              hands), 0, t_ns, t_ns, t_ns, 0.0)))
+    return np.array(found)
+
+
+def test_a_flicker_of_the_side_turns_no_hand_into_the_other() -> None:
+    sides = np.full((60, 2), [0.95, 0.05])
+    sides[10:14, 0], sides[25:29, 1], sides[40:43] = 0.02, 0.98, [0.02, 0.98]
+    found = followed(two_handed_rig(), [[hand(100.0, one), hand(400.0, other)] for one, other in sides])
+    np.testing.assert_array_equal(found, np.full((60, 2), [100.0, 400.0]))
+    assert (followed(msgspec.structs.replace(landmark_rig(), markers=LANDMARKS21),
+                     [[hand(100.0, one)] for one in sides[:, 0]]) == 100.0).all(), "nor is a single one lost"
+
+
+@pytest.mark.parametrize("fps", [10.0, 30.0])
+def test_a_side_that_was_wrong_is_put_right_within_half_a_second(fps: float) -> None:
+    begin = round(fps)
+    frames = [[hand(100.0, 0.95), hand(400.0, 0.05)]] * begin + [[hand(100.0, 0.05), hand(400.0, 0.95)]] * begin
+    found = followed(two_handed_rig(), frames, fps)
+    np.testing.assert_array_equal(found[begin + round(0.5 * fps):], np.full((begin - round(0.5 * fps), 2),
+                                                                            [400.0, 100.0]))
+
+
+def test_hands_that_cross_keep_their_names_though_one_is_hidden_and_the_sides_are_doubtful() -> None:
+    left, right = 100.0 + 10.0 * np.arange(41), 505.0 - 10.0 * np.arange(41)
+    frames = []
+    for number, (one, other) in enumerate(zip(left, right, strict=True)):
+        near = abs(number - 20) <= 6
+        hands = [hand(one, 0.45 if near else 0.95), hand(other, 0.55 if near else 0.05)]
+        frames.append(hands[:1] if abs(number - 20) <= 3 else hands[::-1] if number % 2 else hands)
+    found = followed(two_handed_rig(), frames)
+    np.testing.assert_array_equal(found[:, 0], left)
+    there = np.isfinite(found[:, 1])
+    np.testing.assert_array_equal(found[there, 1], right[there])
+    assert there.sum() == 34
+
+
+def test_of_two_hands_of_the_rigs_side_the_one_that_was_there_stays() -> None:
+    rig = msgspec.structs.replace(landmark_rig(), markers=LANDMARKS21)
+    frames = [[hand(100.0, 0.9)]] * 5 + [[hand(400.0, 0.95), hand(100.0, 0.9)]] * 30
+    assert (followed(rig, frames) == 100.0).all()
+
+
+def test_a_hand_that_comes_elsewhere_is_another_one() -> None:
+    rig = msgspec.structs.replace(landmark_rig(), markers=LANDMARKS21)
+    found = followed(rig, [[hand(100.0, 0.95)]] * 20 + [[hand(400.0, 0.1)]] * 20)
+    assert (found[:20] == 100.0).all() and np.isnan(found[20:]).all(), "a left one"

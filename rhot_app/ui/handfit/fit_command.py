@@ -93,4 +93,4 @@ def _require_screen() -> None:
     if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in (
             "DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")):
         raise CalibrationError("There is no screen here on which a window could open. The rig and the pictures are in "
-                               "order; run the command where there is one. `rhot bare-hand` needs no screen.")
+                               "order; run the command where there is one. `rhot track` needs no screen.")
