@@ -119,7 +119,11 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
     adapted = None
     if hand_file is not None and run.key_frames.sufficient:
         adapted = adapt(rig.hand, run.key_frames.kept)
-        accept_hand(hand_file, adapted.hand, REASON)
+        if adapted.verdict.acceptable:
+            accept_hand(hand_file, adapted.hand, REASON)
+        else:
+            note_loss(str(hand_file), f"{hand_file}: not written. {adapted.verdict.findings[0].sentence}")
+            adapted = None
     elif hand_file is not None:
         note_loss(str(hand_file), f"{hand_file}: not written, the hand was not adapted. Since it was found last, the "
                                   "videos tell too little of its lengths. Show it from all sides, and bend and spread "

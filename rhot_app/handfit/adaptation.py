@@ -2,6 +2,9 @@
 
 The shape is what the key frames share. Each step eliminates the frames' own numbers (Schur complement), so that it
 costs no more than a camera's bundle adjustment of as many frames. Levenberg-Marquardt as everywhere.
+
+Whether the hand may be used is judged by key frames that were kept aside: a hand adapted to every second one must
+explain the others better than the file does.
 """
 
 from __future__ import annotations
@@ -26,6 +29,8 @@ from rhot_app.barehand.key_frames import (
     with_edge_bias,
 )
 from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENGTH, RADIUS, SHAPE, THICKNESS
+from rhot_app.barehand.tracker import LENGTH_SD, RADIUS_SD
+from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.estimation.least_squares import minimise
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.kinematics import move
@@ -52,7 +57,9 @@ _STEPS, _LEAST_GAIN = 20, 1e-2  # of a cost in which one standard deviation cost
 class Adapted:
     """`hand`: the hand file by the key frames, with standard deviations. `length_sd`, `radius_sd` (15,): those of its
     phalanges' lengths and radii, relative. `states` (F, n): the hand at each key frame. `shape` (SIZE,), relative to
-    the file before, as in `hand_shape`; `covariance` (FOREARM_TURN, FOREARM_TURN) of it, without the finger roots."""
+    the file before, as in `hand_shape`; `covariance` (FOREARM_TURN, FOREARM_TURN) of it, without the finger roots.
+    `kept_aside`: -2 log likelihood of every second key frame, in sum, with the file before and with a hand adapted to
+    the others; NaN of less than two key frames."""
 
     hand: HandAnatomy
     length_sd: Array
@@ -60,6 +67,32 @@ class Adapted:
     states: Array
     shape: Array
     covariance: Array
+    kept_aside: tuple[float, float]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the hand may be used."""
+        change = self.document()
+        before, after = self.kept_aside
+        findings = [Finding("adapted", Grade.GOOD, f"Lengths change by {change['lengths_percent']:.1f} %, radii by "
+                            f"{change['radii_percent']:.1f} %, rms.")]
+        for what, most in (("lengths", LENGTH_SD), ("radii", RADIUS_SD)):
+            if not change[f"{what}_sd_percent"] < 100.0 * most:
+                findings.append(Finding(
+                    "hand_undetermined", Grade.POOR, f"The {what} are known to {change[f'{what}_sd_percent']:.1f} %, "
+                    f"those of any adult to {100.0 * most:.0f} %.", "The hand was seen in too few poses.",
+                    "Spread and bend every finger, and turn the hand."))
+        if not after < before:
+            findings.append(Finding(
+                "not_confirmed", Grade.POOR, "Pictures that were kept aside fit the hand in use as well or better.",
+                "The contours are not those of one hand.", "Learn the background, and show one bare hand alone."))
+        if np.any(np.abs(self.shape[:FOREARM_TURN]) >= SHAPE_LIMIT[:FOREARM_TURN]):
+            findings.append(Finding(
+                "no_hand_has", Grade.POOR, "A length or radius is as far from the hand in use as no adult's is.",
+                "The contours are not a hand's, or the cameras' poses are wrong.",
+                "Check the stereo calibration, and show one bare hand alone."))
+        return judge(f"by {len(self.states)} poses; lengths are known to {change['lengths_sd_percent']:.1f} %, radii "
+                     f"to {change['radii_sd_percent']:.1f} %.", findings)
 
     def document(self) -> dict[str, float]:
         """By how much lengths and radii changed and how well they are known, rms over the phalanges."""
@@ -75,23 +108,39 @@ class Adapted:
 def adapt(base: HandAnatomy, key_frames: Sequence[KeyFrame],
           progress: Callable[[float], None] = lambda part: None) -> Adapted:
     """The most probable hand by key frames that were tracked with the hand `base`, and people's hands."""
-    shapes, shape = Shapes(base), np.zeros(SIZE)
+    shapes = Shapes(base)
+    found, shape = _fitted(shapes, key_frames, np.zeros(SIZE), progress=progress)
+    covariance = with_edge_bias(found.reduced(0.0)[0], key_frames, shapes.model(shape))
+    length_sd, radius_sd = phalanx_sd(covariance)
+    hand = _with_sd(shapes.anatomy(shape), length_sd.reshape(5, 3), radius_sd.reshape(5, 3))
+    return Adapted(hand, length_sd, radius_sd, np.array(found.states), shape, covariance,
+                   _kept_aside(shapes, key_frames))
+
+
+def _fitted(shapes: Shapes, key_frames: Sequence[KeyFrame], shape: Array, *, fixed: bool = False,
+            progress: Callable[[float], None] = lambda part: None) -> tuple[_Iterate, Array]:
+    """The last solution, and its shape. `fixed`: the shape stays."""
     states = [one.state for one in key_frames]
     found: _Iterate | None = None
     for number, sd_px in enumerate(EDGE_SD_PX):
         progress(number / len(EDGE_SD_PX))
         problem = _Problem(shapes, shape, [[_expected(frame, sd_px, shapes, shape) for frame in one.frames]
-                                           for one in key_frames])
+                                           for one in key_frames], fixed)
         found, _ = minimise(_Iterate(problem, np.zeros(FOREARM_TURN), states), _STEPS, _LEAST_GAIN)
         shape = shape.copy()
         shape[:FOREARM_TURN] = np.clip(shape[:FOREARM_TURN] + found.step, -SHAPE_LIMIT[:FOREARM_TURN],
                                        SHAPE_LIMIT[:FOREARM_TURN])
         states = found.states
     assert found is not None
-    covariance = with_edge_bias(found.reduced(0.0)[0], key_frames, shapes.model(shape))
-    length_sd, radius_sd = phalanx_sd(covariance)
-    hand = _with_sd(shapes.anatomy(shape), length_sd.reshape(5, 3), radius_sd.reshape(5, 3))
-    return Adapted(hand, length_sd, radius_sd, np.array(states), shape, covariance)
+    return found, shape
+
+
+def _kept_aside(shapes: Shapes, key_frames: Sequence[KeyFrame]) -> tuple[float, float]:
+    if len(key_frames) < 2:
+        return np.nan, np.nan
+    before, after = (_fitted(shapes, key_frames[1::2], shape, fixed=True)[0].frames_cost
+                     for shape in (np.zeros(SIZE), _fitted(shapes, key_frames[::2], np.zeros(SIZE))[1]))
+    return before, after
 
 
 def _with_sd(hand: HandAnatomy, length_sd: Array, radius_sd: Array) -> HandAnatomy:
@@ -124,11 +173,12 @@ def _expected(frame: ContourFrame, sd_px: float, shapes: Shapes, shape: Array) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Problem:
-    """`frames`: of each key frame, about the surface of `shape`."""
+    """`frames`: of each key frame, about the surface of `shape`. `fixed`: the shape stays as it is."""
 
     shapes: Shapes
     shape: Array
     frames: Sequence[Sequence[ContourFrame]]
+    fixed: bool = False
 
     @property
     def model(self) -> HandModel:
@@ -142,13 +192,14 @@ class _Iterate:
         self._problem, self.step, self.states = problem, step, list(states)
         self._systems = []
         away = (problem.shape[:FOREARM_TURN] + step) / SHAPE_SD
-        self.cost = float(away @ away)
+        self.frames_cost = 0.0
         for frames, state in zip(problem.frames, self.states, strict=True):
             there = state.copy()
             there[BIAS:BIAS + FOREARM_TURN] = step
             information, pull, cost = normal_equations(frames, there, problem.model)
             self._systems.append((information, pull))
-            self.cost += cost
+            self.frames_cost += cost
+        self.cost = float(away @ away) + self.frames_cost
 
     def reduced(self, damping: float) -> tuple[Array, Array, list[Array]]:
         """Normal matrix and right side of the shape, and of each frame how its own numbers follow: a matrix
@@ -173,7 +224,7 @@ class _Iterate:
     def moved(self, damping: float) -> _Iterate:
         """The iterate after a damped step."""
         matrix, right, followed = self.reduced(damping)
-        step = np.linalg.solve(matrix, right)
+        step = np.zeros(FOREARM_TURN) if self._problem.fixed else np.linalg.solve(matrix, right)
         states = [_moved(state, follows[:, -1] - follows[:, :-1] @ step)
                   for state, follows in zip(self.states, followed, strict=True)]
         return _Iterate(self._problem, self.step + step, states)

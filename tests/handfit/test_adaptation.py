@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -15,13 +18,14 @@ from shipped_rig import RIGHT_HAND, RIGHT_MODEL
 from rhot_app.barehand.key_frames import MAX_KEY_FRAMES, MIN_INTERVAL_S, SHAPE_SD, KeyFrame, KeyFrames, phalanx_sd
 from rhot_app.barehand.surface import surface_of
 from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.calibration.verdict import Grade
 from rhot_app.engine.rig_watch import JUDGE_NS, HandWatch
 from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy, load_hand, save_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.handfit.adaptation import adapt
+from rhot_app.handfit.adaptation import Adapted, adapt
 from rhot_app.rig_history import accept_hand, require_hand_place, versions
 from rhot_app.simulator.scene.motion import load_motion
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground
@@ -67,6 +71,12 @@ def tracked() -> tuple[HandAnatomy, KeyFrames, list[HandPose], BareHandTracker]:
     return believed, key_frames, poses, tracker
 
 
+@lru_cache
+def adapted() -> Adapted:
+    """The hand by these key frames."""
+    return adapt(tracked()[0], tracked()[1].kept)
+
+
 def errors(hand: HandAnatomy, field: str) -> np.ndarray:
     """(15,) logarithms of the true values less the hand's."""
     truth = RIGHT_HAND
@@ -79,8 +89,8 @@ def rms(values: np.ndarray) -> float:
 
 
 def test_a_wrong_hand_file_is_mended_by_ten_poses() -> None:
-    believed, key_frames, poses, _ = tracked()
-    found = adapt(believed, key_frames.kept)
+    believed, _, poses, _ = tracked()
+    found = adapted()
     joints = []
     for state, pose in zip(found.states, poses, strict=True):
         world = np.eye(4)
@@ -101,7 +111,7 @@ def test_a_wrong_hand_file_is_mended_by_ten_poses() -> None:
 def test_key_frames_predict_how_certain_the_hand_will_be() -> None:
     _, key_frames, _, _ = tracked()
     predicted = phalanx_sd(key_frames.covariance)
-    found = adapt(tracked()[0], key_frames.kept)
+    found = adapted()
     assert rms(predicted[0]) == pytest.approx(rms(found.length_sd), rel=0.3)
     assert rms(predicted[1]) == pytest.approx(rms(found.radius_sd), rel=0.3)
     assert key_frames.sufficient
@@ -122,12 +132,44 @@ def test_what_tells_least_goes_first() -> None:
 
 
 def test_the_tracker_believes_the_stated_standard_deviations() -> None:
-    believed, key_frames, _, tracker = tracked()
-    found = adapt(believed, key_frames.kept)
+    _, _, _, tracker = tracked()
+    found = adapted()
     rig = rig_of(tracker.cameras, found.hand)
     stated = np.sqrt(np.diagonal(BareHandTracker(rig).shape_covariance, axis1=1, axis2=2)).ravel()
     np.testing.assert_allclose(stated[3:18], found.length_sd, rtol=1e-2)
     np.testing.assert_allclose(stated[18:33], found.radius_sd, rtol=1e-2)
+
+
+def altered(key_frames: Sequence[KeyFrame], px: float = 0.0, seen: bool = True) -> list[KeyFrame]:
+    """The key frames with every edge moved along its slice, or with no edges."""
+    out = []
+    for one in key_frames:
+        frames = [copy.copy(frame) for frame in one.frames]
+        for frame in frames:
+            assert frame.edges is not None
+            frame.edges = frame.edges._replace(offset=frame.edges.offset + px, number=seen * frame.edges.number)
+        out.append(replace(one, frames=tuple(frames)))
+    return out
+
+
+def test_pictures_that_were_kept_aside_confirm_the_hand() -> None:
+    found = adapted()
+    assert found.verdict.grade is Grade.GOOD and found.verdict.codes == {"adapted"}
+    assert found.kept_aside[1] < found.kept_aside[0]
+
+
+def test_a_hand_that_nothing_confirms_is_not_usable() -> None:
+    believed, key_frames, _, _ = tracked()
+    verdict = adapt(believed, altered(key_frames.kept, seen=False)).verdict
+    assert not verdict.acceptable and verdict.codes >= {"hand_undetermined", "not_confirmed"}
+    assert "not_confirmed" in adapt(believed, key_frames.kept[:1]).verdict.codes, "nothing was kept aside"
+    two_hands = list(key_frames.kept)
+    two_hands[::2], two_hands[1::2] = altered(two_hands[::2], 6.0), altered(two_hands[1::2], -3.0)
+    verdict = adapt(believed, two_hands).verdict
+    assert not verdict.acceptable and "not_confirmed" in verdict.codes
+    found = adapted()
+    verdict = replace(found, shape=found.shape + 5.0 * np.append(SHAPE_SD, np.zeros(15))).verdict
+    assert not verdict.acceptable and "no_hand_has" in verdict.codes
 
 
 def test_a_hand_file_keeps_what_it_was(tmp_path: Path) -> None:
