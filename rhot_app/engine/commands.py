@@ -53,7 +53,7 @@ class Commands:
             "hello": self._hello, "status": self._status, "start": self._start, "stop": self._stop,
             "record": self._record, "record_stop": self._record_stop, "bookmark": self._bookmark, "rig": self._rig,
             "set_rig": self._set_rig, "save_rig": self._save_rig, "preview": self._set_preview,
-            "refined": self._refined, "adapted": self._adapted,
+            "refined": self._refined, "adapted": self._adapted, "measured": self._measured,
             "quit": self._end,
         }
 
@@ -132,6 +132,9 @@ class Commands:
 
     def _adapted(self, arguments: Arguments) -> Answer:
         return self._engine.adapted()
+
+    def _measured(self, arguments: Arguments) -> Answer:
+        return self._engine.measured()
 
     def _set_preview(self, arguments: Arguments) -> Answer:
         on = arguments.get("on")

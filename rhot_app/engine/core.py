@@ -288,6 +288,11 @@ class Engine:
         with self._lock:
             return self._observer.hand_watch.adapted(self._pipeline.work.tracker, time.monotonic_ns())
 
+    def measured(self) -> dict[str, Any]:
+        """The bones that the landmarks of a hand show (`BonesWatch.measured`)."""
+        with self._lock:
+            return self._observer.bones_watch.measured()
+
     def close(self) -> None:
         """Stop the nodes, finish the log, close all ports. May be called twice."""
         with self._lock:

@@ -15,7 +15,7 @@ from rhot_app.diagnostics import Diagnostic
 from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice
 from rhot_app.engine.node_meter import RECENT_NS, NodeMeter
 from rhot_app.engine.pipeline import Pipeline
-from rhot_app.engine.rig_watch import HandWatch, RigWatch
+from rhot_app.engine.rig_watch import BonesWatch, HandWatch, RigWatch
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus, most_urgent_first
 from rhot_app.project import Rig
 from rhot_app.recording.recorder import Recorder
@@ -46,7 +46,7 @@ class Observer:
         self._summarised_ns = 0
         self._ever_tracked = False
         self._health = HealthWatch(rig)
-        self.rig_watch, self.hand_watch = RigWatch(rig), HandWatch(rig)
+        self.rig_watch, self.hand_watch, self.bones_watch = RigWatch(rig), HandWatch(rig), BonesWatch(rig)
 
     def restart(self) -> None:
         """A new run begins."""
@@ -54,6 +54,7 @@ class Observer:
         self._health.restart()
         self.rig_watch.restart()
         self.hand_watch.restart()
+        self.bones_watch.restart()
 
     def status(self, rig_path: str, session: int, running: bool, recorder: Recorder | None,
                message: NodeMessage, extra: list[Advice],
@@ -104,6 +105,7 @@ class Observer:
             stale = self.rig_watch.advice(now_ns)
             health = self._health.advice(self._pipeline.last_state, self._pipeline.work.tracker, now_ns)
             found += self.hand_watch.advice(self._pipeline.work.tracker, now_ns)
+            found += self.bones_watch.advice(self._pipeline.last_state, now_ns)
             found += [*stale, *(one for one in health if not (stale and one.mender == "stereo"))]
         found += [Advice(one.level, one.sentence, subject="tracking" if one.level == "error" else "sight")
                   for one in self._diagnosed(now_ns)]

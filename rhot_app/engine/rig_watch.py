@@ -1,4 +1,4 @@
-"""Refines the rig and adapts the hand beside a running pipeline, outside the frames' own thread.
+"""Refines the rig, adapts the hand and measures its bones beside a running pipeline, outside the frames' own thread.
 
 Costs 2 ms of processor time per second of 80 frames for what is kept of them, and 60 ms every ten seconds in a
 thread of its own (`benchmarks/self_calibration.py`).
@@ -13,13 +13,19 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from rhot_app.barehand.key_frames import KeyFrame
-from rhot_app.calibration.verdict import Finding, Grade, judge
+from rhot_app.calibration.hand.bones_report import BonesReport
+from rhot_app.calibration.hand.landmark_bones import measure_bones, spreads_apart
+from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.engine.status import Advice
+from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.handfit.adaptation import Adapted, adapt
 from rhot_app.project import Rig
+from rhot_app.state import HandState
 from rhot_app.tracking.refinement.refined_rig import (
     Refinement,
     figure_rows,
@@ -34,6 +40,8 @@ from rhot_node.threads import OneShotThread
 
 log = logging.getLogger(__name__)
 
+Array = NDArray[np.float64]
+
 JUDGE_NS = 10_000_000_000
 
 MENDER = "refined"
@@ -41,6 +49,14 @@ MENDER = "refined"
 
 HAND_MENDER = "adapted"
 """The wizard that shows and uses the adapted hand."""
+
+BONES_MENDER = "measured"
+"""The wizard that shows and uses the bones that landmarks show."""
+
+BONES_JUDGE_NS = 2_000_000_000
+
+LOOKS = 600
+"""Looks at a hand by which its bones are measured: the last minute of them."""
 
 
 class RigWatch:
@@ -119,10 +135,10 @@ class HandWatch:
         self._newest, self._enough = None, False
 
     def advice(self, tracker: Tracker, now_ns: int) -> list[Advice]:
-        """Judge anew every ten seconds. A hand file that states how well it is known is not offered again."""
+        """Judge anew every ten seconds. A hand file that states how well its radii are known is not offered again."""
         if now_ns - self._judged_ns >= JUDGE_NS:
             self._judged_ns = now_ns
-            self._enough = _stated(self._rig.hand) is None and bool(_kept(tracker))
+            self._enough = _radii_sd(self._rig.hand) is None and bool(_kept(tracker))
         sentence = "The bare hand has shown how long and how thick its fingers are: its file can be adapted to it."
         return [Advice("info", sentence, HAND_MENDER, subject="information")] if self._enough else []
 
@@ -141,13 +157,7 @@ class HandWatch:
         found = self._newest
         if found is None:
             return {"known": False}
-        change = found.document()
-        verdict = judge(f"by {len(found.states)} poses; lengths are known to {change['lengths_sd_percent']:.1f} %, "
-                        f"radii to {change['radii_sd_percent']:.1f} %.",
-                        [Finding("adapted", Grade.GOOD,
-                                 f"Lengths change by {change['lengths_percent']:.1f} %, radii by "
-                                 f"{change['radii_percent']:.1f} %, rms.")])
-        return {"known": True, **verdict.to_json(), "rows": _hand_rows(self._rig.hand, found.hand),
+        return {"known": True, **found.verdict.to_json(), "rows": _hand_rows(self._rig.hand, found.hand),
                 "document": msgspec.to_builtins(msgspec.structs.replace(self._rig, hand=found.hand))}
 
     def _solve(self, kept: list[KeyFrame], run: int) -> None:
@@ -160,23 +170,93 @@ class HandWatch:
             self._newest = found
 
 
+class BonesWatch:
+    """Measures the bones of the rig's first hand by its landmarks, and offers them when they differ from the rig's, and
+    from those that were shown last, by more than they spread. One thread."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        roles = [marker.role for marker in rig.markers.markers]
+        self._columns = [roles.index(role) for role in LANDMARK_ROLES if role in roles]
+        self._active = len(self._columns) == len(LANDMARK_ROLES) and len(rig.nodes) > 1
+        self._seen: deque[tuple[float, Array]] = deque(maxlen=LOOKS)
+        self._newest: BonesReport | None = None
+        self._offer: Advice | None = None
+        self._shown: HandAnatomy | None = None
+        self._sequence, self._judged_ns = -1, -BONES_JUDGE_NS
+
+    def restart(self) -> None:
+        """A new run begins, perhaps with another person's hand."""
+        self._seen.clear()
+        self._newest = self._offer = None
+        self._sequence = -1
+
+    def advice(self, state: HandState | None, now_ns: int) -> list[Advice]:
+        """Look at the newest state, and measure anew every other second. What is offered stays, in the same words,
+        until it is shown or can no longer be used."""
+        if self._active and state is not None and state.sequence != self._sequence:
+            self._sequence = state.sequence
+            places = state.marker_raw_positions[self._columns]
+            if np.isfinite(places).any():
+                self._seen.append((1e-9 * state.t_master_ns, places))
+        if self._seen and now_ns - self._judged_ns >= BONES_JUDGE_NS:
+            self._judged_ns = now_ns
+            self._measure()
+        return [] if self._offer is None else [self._offer]
+
+    def _measure(self) -> None:
+        times_s, places = zip(*self._seen, strict=True)
+        try:
+            found = measure_bones(tracks_of(np.array(times_s), np.array(places), LANDMARK_ROLES), self._rig.hand)
+        except CalibrationError:  # too little was seen by two cameras
+            found = None
+        self._newest = found
+        if found is None or not found.verdict.acceptable:
+            self._offer = None
+        elif self._offer is None and all(spreads_apart(found, hand) > 1.0 for hand in (self._rig.hand, self._shown)
+                                         if hand is not None):
+            apart_mm = _apart_mm(found, self._rig.hand)
+            self._offer = Advice("info", f"The landmarks show bones that differ from the rig's hand by {apart_mm:.0f} "
+                                 "mm (rms). Its joints are truer with the measured ones.", BONES_MENDER,
+                                 subject="information")
+
+    def measured(self) -> dict[str, Any]:
+        """The answer to the command `measured`, and from now on shown: `known`, whether the bones could be measured;
+        the verdict's fields; `rows` of (what, before, after); `document`, the rig with the measured hand."""
+        found = self._newest
+        if found is None:
+            return {"known": False}
+        self._shown, self._offer = found.hand, None
+        hand = msgspec.structs.replace(found.hand, name="measured from landmarks")
+        size = ("size", "100 %", f"{100.0 * found.size:.1f} ± {100.0 * found.size_std:.1f} %")
+        return {"known": True, **found.verdict.to_json(), "rows": [size, *_hand_rows(self._rig.hand, hand)],
+                "document": msgspec.to_builtins(msgspec.structs.replace(self._rig, hand=hand))}
+
+
+def _apart_mm(report: BonesReport, hand: HandAnatomy) -> float:
+    others = np.array([one.bones_mm for one in hand.fingers.values()]).ravel()
+    return float(np.sqrt(np.mean((np.array([one.length_mm for one in report.bones]) - others) ** 2)))
+
+
 def _kept(tracker: Tracker) -> list[KeyFrame]:
     """The tracker's key frames, none while they tell too little."""
     found = tracker.key_frames if isinstance(tracker, KeepsKeyFrames) else None
     return list(found.kept) if found is not None and found.sufficient else []
 
 
-def _stated(hand: HandAnatomy) -> tuple[float, float, float] | None:
-    return next(iter(hand.fingers.values())).bones_sd_mm
+def _radii_sd(hand: HandAnatomy) -> tuple[float, float, float] | None:
+    return next(iter(hand.fingers.values())).radii_sd_mm
 
 
 def _hand_rows(before: HandAnatomy, after: HandAnatomy) -> list[tuple[str, str, str]]:
-    """Lengths and radii of each finger, mm, and how well they are known."""
+    """Lengths and radii of each finger that differ, mm, and how well they are known."""
     rows = []
     for name, new in after.fingers.items():
         old = before.fingers[name]
         for what, values, then, sd in (("bones", old.bones_mm, new.bones_mm, new.bones_sd_mm),
                                        ("radii", old.radii_mm, new.radii_mm, new.radii_sd_mm)):
+            if values == then:
+                continue
             shown = ", ".join(f"{value:.1f} ± {one:.1f}" for value, one in zip(then, sd or (), strict=True))
             rows.append((f"{name} {what}", ", ".join(f"{value:.1f}" for value in values) + " mm", f"{shown} mm"))
     return rows

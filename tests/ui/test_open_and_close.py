@@ -50,7 +50,7 @@ class LendingBackend(RigBackend):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self.missed: set[Borrowed] = set()
-        self.rig_asker.answers = {"refined": {"known": False}, "adapted": {"known": False}}
+        self.rig_asker.answers = {name: {"known": False} for name in ("refined", "adapted", "measured")}
 
     def asker(self) -> Any:
         return Borrowed(super().asker(), self.missed)

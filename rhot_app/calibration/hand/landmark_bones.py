@@ -32,8 +32,8 @@ LARGE_SPREAD, USELESS_SPREAD = 0.12, 0.18
 """Median spread of the bones as a part of their lengths. A recorded hand's is 0.05 to 0.08; that of the same landmarks
 with one camera a third of a second late 0.19, with the cameras in the wrong order 0.7."""
 
-UNUSUAL_SIZE, WRONG_SIZE = 3.0, 4.0
-"""Standard deviations of the size of adult hands (SIZE_SD)."""
+WRONG_SIZE = 4.0
+"""Standard deviations of the size of adult hands (SIZE_SD): one in 16 000 is beyond."""
 
 _DECILES = 2.563  # standard deviations of a Gaussian from its tenth to its ninetieth part; two hands in turn show, too
 
@@ -87,6 +87,13 @@ def measure_bones(tracks: MarkerTracks, base: HandAnatomy) -> BonesReport:
                       f"{100 * spread:.0f} %; the hand is {100 * size:.1f} % of the base hand.", findings))
 
 
+def spreads_apart(report: BonesReport, hand: HandAnatomy) -> float:
+    """How far the measured bones are from those of a hand: rms over them, each by the spread of its length."""
+    others = np.array([hand.fingers[name].bones_mm for name in FINGERS]).ravel()
+    return float(np.sqrt(np.mean([((one.length_mm - other) / max(one.std_mm, 0.01)) ** 2
+                                  for one, other in zip(report.bones, others, strict=True)])))
+
+
 def _with_lengths(base: HandAnatomy, lengths_mm: Array, spreads_mm: Array) -> HandAnatomy:
     """`lengths_mm` (5, 4): from the wrist to the finger's root, then its three bones."""
     fingers = {}
@@ -120,10 +127,9 @@ def _spread_findings(spread: float) -> list[Finding]:
 
 
 def _size_findings(size: float) -> list[Finding]:
-    off = abs(np.log(size)) / SIZE_SD
-    if off < UNUSUAL_SIZE:
+    if abs(np.log(size)) < WRONG_SIZE * SIZE_SD:
         return []
-    return [Finding("unusual_size", Grade.POOR if off > WRONG_SIZE else Grade.FAIR,
+    return [Finding("unusual_size", Grade.POOR,
                     f"The hand is {100 * size:.0f} % of the base hand.",
                     "The cameras' distance is in another unit or wrong, or it is a child's hand.",
                     "Check the stereo calibration. For a child begin from a hand of its length (rhot hand --length).")]

@@ -15,12 +15,15 @@ from PySide6.QtTest import QTest
 from synthetic_rig import WIDE, Viewing, make_rig, observe
 from wizard_hand import HeldMarker, RecordingAsker
 
+from rhot_app.calibration.hand.bones import solve_bones
+from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import load_rig
+from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
 from rhot_app.ui.wizards.bones import make_plan
 from rhot_app.ui.wizards.models.movement import QuietCoach
 from rhot_app.ui.wizards.models.step import Bar
-from rhot_app.ui.wizards.steps.bones_steps import SweepCoach, make_coach
+from rhot_app.ui.wizards.steps.bones_steps import SweepCoach, make_coach, propose
 
 SECONDS = 8.0
 SIZE = 1.06
@@ -135,3 +138,12 @@ def test_markers_that_name_no_place_get_a_quiet_coach():
                  for k, marker in enumerate(rig.markers.markers))
     rig = msgspec.structs.replace(rig, markers=msgspec.structs.replace(rig.markers, markers=free))
     assert isinstance(make_coach(rig), QuietCoach)
+
+
+def test_bones_by_landmarks_are_proposed():
+    rig = landmark_rig()
+    places = moving_hand(rig, "grasp", 4.0, 30.0, 1, 0.05).joints()
+    roles = {marker.id: marker.role for marker in rig.markers.markers}
+    report = solve_bones(tracks_of(np.arange(len(places)) / 30.0, places, rig.markers.ids, roles), rig.hand)
+    proposal = propose(report, rig, None)
+    assert "landmarks" in proposal.rig.hand.name and proposal.rig.hand.fingers == report.hand.fingers

@@ -51,7 +51,7 @@ def frame_of(themed):
     def lay_out(module, size):
         rig = load_rig(resource_path("rigs", "two_pis.json"))
         asker = FakeRigAsker(rig)
-        asker.answers = {"refined": {"known": False}, "adapted": {"known": False}}
+        asker.answers = {name: {"known": False} for name in ("refined", "adapted", "measured")}
         kit = Kit(rig, None, asker.connect, DARK, FakeMemory(), asker.told, Silence)
         plan, window = wizard_named(module).make_plan(kit), QWidget()
         frame = WizardFrame(plan, tuple(node.name for node in rig.nodes), Work(InProcessSolver(), window), DARK, window)

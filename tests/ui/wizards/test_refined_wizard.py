@@ -1,6 +1,6 @@
-"""What the engine learns from a moving hand, in the window: the refined calibration and the adapted hand.
+"""What the engine learns from a moving hand, in the window: the refined calibration, the adapted hand, measured bones.
 
-Both are shown before and after, used only when asked, and kept with the way back.
+All are shown before and after, used only when asked, and kept with the way back.
 """
 
 from __future__ import annotations
@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 from fake_engine import synthetic_rig
 from knocked_rig import moved
-from wizard_rig import FakeRigAsker
+from wizard_hands import Hands
+from wizard_rig import FakeRigAsker, RigBackend
 
 from rhot_app.calibration.verdict import Finding, Grade, judge
 from rhot_app.engine.status import Advice
 from rhot_app.project import load_rig
 from rhot_app.rig_history import versions
 from rhot_app.ui.status_words import _advice_notice
-from rhot_app.ui.wizards import adapted, refined
+from rhot_app.ui.wizards import adapted, measured, refined
 from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD
-from rhot_app.ui.wizards.steps.adapted_steps import propose as propose_hand
+from rhot_app.ui.wizards.steps.adapted_steps import ShowBonesStep, propose_hand
 from rhot_app.ui.wizards.steps.refined_steps import EngineFeed, MoveStep, propose
 
 
@@ -29,7 +30,7 @@ class RefiningAsker(FakeRigAsker):
     answer: dict
 
     def command(self, name, timeout_s=5.0, **arguments):
-        known = name in ("refined", "adapted")
+        known = name in ("refined", "adapted", "measured")
         return self.answer if known else super().command(name, timeout_s=timeout_s, **arguments)
 
 
@@ -41,10 +42,10 @@ def answer_of(rig, *, grade=Grade.GOOD, stale=True):
             "rows": [["rays miss each other by", "1.40 px", "0.02 px"]], "document": msgspec.to_builtins(after)}
 
 
-def hand_answer(rig):
+def hand_answer(rig, grade=Grade.GOOD):
     thicker = msgspec.structs.replace(rig.hand.fingers["index"], radii_mm=(9.0, 8.0, 7.0))
     hand = msgspec.structs.replace(rig.hand, fingers={**rig.hand.fingers, "index": thicker})
-    verdict = judge("by 24 poses.", [Finding("adapted", Grade.GOOD, "Radii change by 2 %.")])
+    verdict = judge("by 24 poses.", [Finding("adapted", grade, "Radii change by 2 %.")])
     return {"known": True, **verdict.to_json(), "rows": [["index radii", "8.5 mm", "9.0 ± 0.2 mm"]],
             "document": msgspec.to_builtins(msgspec.structs.replace(rig, hand=hand))}
 
@@ -94,21 +95,50 @@ def test_the_engines_sentence_has_the_button():
     assert notice.action == "Use refined calibration …" and notice.key == f"{OPEN_WIZARD}refined"
 
 
-@pytest.mark.parametrize("hands", [adapted], indirect=True)
-def test_an_adapted_hand_is_used_only_when_asked(hands):
+@pytest.mark.parametrize(("hands", "reason"), [(adapted, "hand adapted while it was tracked"),
+                                               (measured, "bones measured while the hand was tracked")],
+                         indirect=["hands"])
+def test_a_learnt_hand_is_used_only_when_asked(hands, reason):
     assert not hands.frame.next_button.isEnabled()
     hands.asker.answer = hand_answer(hands.rig)
     hands.next()
     assert load_rig(hands.path) == hands.rig, "nothing was changed yet"
     hands.use()
     assert load_rig(hands.path).hand.fingers["index"].radii_mm == (9.0, 8.0, 7.0)
-    assert [one.replaced_by for one in versions(hands.path)] == ["hand adapted while it was tracked"]
+    assert [one.replaced_by for one in versions(hands.path)] == [reason]
+    hands.restore()
+    assert load_rig(hands.path) == hands.rig
 
 
 def test_only_the_hand_is_proposed():
     rig = synthetic_rig()
     edited = msgspec.structs.replace(rig, name="edited since")
-    proposal = propose_hand(hand_answer(rig), edited, None)
+    proposal = propose_hand("by contours")(hand_answer(rig), edited, None)
     assert proposal is not None and proposal.rig is not None
     assert proposal.rig.name == "edited since" and proposal.rig.nodes == rig.nodes and proposal.rig.hand != rig.hand
-    assert propose_hand({"known": False}, rig, None) is None
+    assert propose_hand("by contours")({"known": False}, rig, None) is None
+
+
+def test_bones_that_must_not_be_used_lead_nowhere():
+    asker = RefiningAsker(synthetic_rig())
+    feed = EngineFeed(asker.connect, "measured")
+    step = ShowBonesStep(feed)
+    asker.answer = hand_answer(asker.rig, Grade.POOR)
+    feed.step(asker)
+    view = step.view()
+    assert not view.may_go_on and not view.verdict.acceptable and "two cameras" in view.sentence
+
+
+def test_the_offer_of_measured_bones_is_clicked_and_used(make_bench, tmp_path):
+    bench = make_bench(RigBackend(tmp_path / "desk.json"))
+    bench.track()
+    rig, asker, window = bench.controller.rig, bench.backend.rig_asker, bench.window
+    asker.answers["measured"] = hand_answer(rig)
+    bench.backend.engine.advice = (Advice("info", "The bones differ by 4 mm.", "measured", subject="information"),)
+    bench.until(lambda: "Use measured bones …" in window.advice.buttons)
+    bench.click(window.advice.buttons["Use measured bones …"])
+    bench.until(lambda: window.wizards.wizard is not None)
+    wizard = Hands(window.wizards.wizard)
+    wizard.next()
+    wizard.use()
+    assert load_rig(tmp_path / "desk.json").hand.fingers["index"].radii_mm == (9.0, 8.0, 7.0)

@@ -101,6 +101,8 @@ WIZARDS: tuple[Wizard, ...] = (
            "be tracked.", "background and skin"),
     Wizard("adapted", "Adapt the hand's shape", "How long and how thick the fingers are, from a bare hand that moves "
            "while it is tracked.", "hand adapted while it was tracked"),
+    Wizard("measured", "Use measured bones", "How long the bones are, from the landmarks of a hand that two cameras "
+           "see while it is tracked.", "bones measured while the hand was tracked"),
     Wizard("time", "Time of the cameras", "When each camera sees, from a hand that waves.", "time calibration"),
     Wizard("depth", "Depth without a board", "Distance from disparity, from a marker at measured distances.",
            "depth calibration"),

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 REASON = "bones calibration"
 SECONDS = 60.0
 
-_NAMES = {"movement": "measured by movement", "reach": "measured by movement", "entered": "measured with a ruler"}
+_NAMES = {"movement": "measured by movement", "reach": "measured by movement", "entered": "measured with a ruler",
+          "landmarks": "measured from landmarks"}
 
 Side = Literal["right", "left"]
 
