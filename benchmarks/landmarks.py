@@ -4,8 +4,9 @@
 
 First the recorded hand, if it is there: the errors of its landmarks about the hand that fits them (the source of
 `simulator.nodes.landmark_detector.LandmarkErrors`), then reprojection, jitter and lag of the tracked hand against
-plain triangulation of the same landmarks. The recording's unit of length is unknown: `--unit-mm` makes its hand as
-large as the rig's.
+plain triangulation of the same landmarks, and how near its joints are to triangulation with other values of NOISE_M,
+which is chosen by the frames from 13 to 66 and judged by those from 67 to 119. The recording's unit of length is
+unknown: `--unit-mm` makes its hand as large as the rig's.
 Then synthetic hands with landmarks that err as much: errors of the joints against triangulation, NEES and the part of
 errors within three sigma. The jitter is the rms of third differences, divided by sqrt(20), of a point's coordinates.
 """
@@ -17,6 +18,7 @@ import sys
 import tempfile
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import msgspec
 import numpy as np
@@ -24,22 +26,28 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from tables import arguments, publish, table
 
-from rhot_app.calibration.hand.bundle_model import POSE, expected
-from rhot_app.calibration.hand.fit import fit_hand
-from rhot_app.calibration.hand.marker_places import tracks_of
-from rhot_app.calibration.hand.shape import MARKERS
-from rhot_app.export.landmark_track import states_of_log
-from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import quaternion_from_rotation
-from rhot_app.hand.anatomy import load_hand
-from rhot_app.hand.skeleton import JOINTS
-from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettings
-from rhot_app.recording.landmark_log import LandmarkTable, read_landmark_table, write_landmark_log
-from rhot_app.simulator.nodes.landmark_detector import EPOCH_NS, detected_landmarks, landmark_rig, moving_hand
-from rhot_app.state import HandState
-from rhot_app.tracking.trackers import make_tracker
-from rhot_node.files import resource_path
-from rhot_node.markers import load_markers
+sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "tests" / "recording")]
+
+from recorded_landmarks import FITTED, JUDGED, recording  # noqa: E402
+
+from rhot_app.calibration.hand.bundle_model import POSE, expected  # noqa: E402
+from rhot_app.calibration.hand.fit import fit_hand  # noqa: E402
+from rhot_app.calibration.hand.landmark_bones import measure_bones  # noqa: E402
+from rhot_app.calibration.hand.marker_places import tracks_of  # noqa: E402
+from rhot_app.calibration.hand.shape import MARKERS  # noqa: E402
+from rhot_app.export.landmark_track import states_of_log  # noqa: E402
+from rhot_app.geometry.camera import CameraModel  # noqa: E402
+from rhot_app.geometry.transforms import quaternion_from_rotation  # noqa: E402
+from rhot_app.hand.anatomy import load_hand  # noqa: E402
+from rhot_app.hand.skeleton import JOINTS  # noqa: E402
+from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettings  # noqa: E402
+from rhot_app.recording.landmark_log import LandmarkTable, read_landmark_table, write_landmark_log  # noqa: E402
+from rhot_app.simulator.nodes.landmark_detector import EPOCH_NS, detected_landmarks, landmark_rig, moving_hand  # noqa: E402
+from rhot_app.state import HandState  # noqa: E402
+from rhot_app.tracking.markers import acquisition, marker_residual  # noqa: E402
+from rhot_app.tracking.trackers import make_tracker  # noqa: E402
+from rhot_node.files import resource_path  # noqa: E402
+from rhot_node.markers import load_markers  # noqa: E402
 
 Array = NDArray[np.float64]
 
@@ -48,6 +56,7 @@ FPS, SIZE_PX = 30.0, 720
 INDEX_TIP = JOINTS.index("index_tip")
 THIRD_DIFFERENCE = math.sqrt(20.0)
 SETTLED_S = 1.0
+NOISES_MM = 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0
 
 
 def main() -> int:
@@ -60,11 +69,14 @@ def main() -> int:
     figures: dict[str, Any] = {}
     if args.data.is_dir():
         figures |= recorded(args.data, 1e-3 * args.unit_mm)
+        figures["noise"] = noise()
     else:
         print(f"{args.data} is not there: the recorded hand is left out.", file=sys.stderr)
     rows = figures["synthetic"] = synthetic(args.seeds)
     publish(args, figures,
-            *(table([name, ""], part.items()) for name, part in figures.items() if name != "synthetic"),
+            *(table([name, ""], part.items()) for name, part in figures.items() if isinstance(part, dict)),
+            *([table(["NOISE_M, mm", "13 to 66: median mm", "95 %", "67 to 119: median mm", "95 %"], figures["noise"])]
+              if "noise" in figures else []),
             table([name.replace("_", " ") for name in rows[0]], [list(row.values()) for row in rows]))
     return 0
 
@@ -226,6 +238,21 @@ def tracked(rig: Rig, tables: list[LandmarkTable], both: NDArray[np.int64], plac
         out |= {f"jitter of the {name}, mm": 1e3 * mine, f"triangulated over tracked, {name}": plain / mine}
     out["lag of the index fingertip, frames"] = lag(joints[:, INDEX_TIP], places[chosen][:, INDEX_TIP])
     return out
+
+
+def noise() -> list[list[float]]:
+    """Of each NOISE_M: how far the joints of the recorded hand, with its own bones, are from triangulation, mm."""
+    seen, rows = recording(), []
+    roles = {marker.id: marker.role or "" for marker in seen.rig.markers.markers}
+    own = seen.places[FITTED]
+    hand = measure_bones(tracks_of(np.arange(len(own)) / FPS, own, seen.rig.markers.ids, roles), seen.rig.hand).hand
+    for noise_mm in NOISES_MM:
+        with (patch.object(marker_residual, "NOISE_M", 1e-3 * noise_mm),
+              patch.object(acquisition, "NOISE_M", 1e-3 * noise_mm)):
+            off_mm = 1e3 * np.linalg.norm(seen.joints(hand) - seen.places, axis=2)
+        rows.append([noise_mm, *(float(np.nanpercentile(off_mm[part], percent)) for part in (FITTED, JUDGED)
+                                 for percent in (50.0, 95.0))])
+    return rows
 
 
 def jitter(points: Array) -> float:

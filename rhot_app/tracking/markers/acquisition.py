@@ -40,9 +40,6 @@ Array = NDArray[np.float64]
 LEAST_MARKERS = 4
 """Markers that show where a hand is."""
 
-LEAST_ON_PALM = 5
-"""Landmarks of the palm that show how it is turned: it has six."""
-
 EXTENT_M = 0.1
 """Greatest extent of a hand's landmarks: a fist's, so that no noise is taken for too small."""
 
@@ -96,7 +93,7 @@ class Starter:
         """The frame with the noise of landmarks, of a hand as far as its image is large: what a detector states is less
         than by how much two cameras' landmarks miss each other."""
         own = self._markers.landmark & np.isfinite(observations.pixels[:, 0])
-        if np.count_nonzero(own) < LEAST_ON_PALM:
+        if np.count_nonzero(own) < LEAST_MARKERS:
             return observations
         extent_px = float(np.ptp(observations.pixels[own], axis=0).max())
         covariances = observations.covariances.copy()
@@ -200,7 +197,7 @@ def pose_before_camera(frame: MarkerFrame, process: HandProcess) -> HandPose | N
     both are tried."""
     m = frame.markers
     palm = np.flatnonzero(frame.seen & m.landmark & (m.finger < 0))
-    if len(palm) < LEAST_ON_PALM:
+    if len(palm) < LEAST_MARKERS:
         return None
     own = np.array([m.places[k].point for k in palm])
     rays = undistort_points(frame.pixels[palm], m.intrinsics[frame.camera])
