@@ -5,7 +5,8 @@
 What `rhot track` makes of ../shared/data/bare_hand_stereo, judged on the frames from 67 to 119. Truth is what the
 landmarks of another program in both videos triangulate to: so this is agreement, not accuracy. `lag`: frames by which
 the joints follow. `jitter`: rms of their third differences, as a part of the triangulated points'. One camera alone:
-after laying hand on hand. `held still`: each frame for a second, with the shipped bones. Needs the hand networks.
+after laying hand on hand. `goes on alone`: the other camera's film ends at frame 67. `held still`: each frame for a
+second, with the shipped bones. Needs the hand networks.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -76,6 +78,17 @@ def aligned(joints: Array) -> float:
     return float(np.median(found))
 
 
+def first_frames(film: str, count: int, out: Path) -> str:
+    """The film's first frames as another film."""
+    capture = cv2.VideoCapture(film)
+    size = int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)), int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
+    writer = cv2.VideoWriter(str(out), cv2.VideoWriter.fourcc(*"MJPG"), FPS, size)
+    for _ in range(count):
+        writer.write(capture.read()[1])
+    writer.release()
+    return str(out)
+
+
 def main() -> int:
     """Print the tables."""
     args = arguments(__doc__).parse_args()
@@ -87,8 +100,15 @@ def main() -> int:
                            ("shipped bones", ["--bones", "rig"])):
             found = agreement(*tracked([*VIDEOS, "--rig", str(rig), *more], Path(folder)))
             rows.append([name, *found.values()])
-        alone = [[f"camera {c} alone", aligned(tracked([f"c{c}={VIDEOS[c]}", "--rig", str(rig)], Path(folder))[1])]
-                 for c in range(2)]
+        alone: list[list[Any]] = []
+        for c in range(2):
+            alone.append([f"camera {c} alone", aligned(tracked([f"c{c}={VIDEOS[c]}", "--rig", str(rig)],
+                                                               Path(folder))[1])])
+            cut = [*VIDEOS]
+            cut[1 - c] = first_frames(VIDEOS[1 - c], WHOLE + JUDGED.start, Path(folder) / "cut.avi")
+            joints = tracked([*cut, "--rig", str(rig)], Path(folder))[1]
+            off = np.linalg.norm(joints - 1e3 * recording().places, axis=2)[JUDGED]
+            alone.append([f"camera {c} goes on alone", float(np.nanmedian(off))])
     still = np.array([recording().held_still(k) for k in range(JUDGED.start, JUDGED.stop, 2)])
     alone.append(["held still, the worst frame's median", float(np.median(still, axis=1).max())])
     alone.append(["held still, the worst joint", float(still.max())])

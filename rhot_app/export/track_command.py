@@ -160,8 +160,10 @@ def picture_size(path: Path) -> tuple[int, int]:
 
 def sentences(document: dict[str, Any]) -> list[str]:
     """The summary for a person."""
-    out = [f"{document['frame_sets']} frame sets, {document['frames_left_out']} frames outside the time that all "
-           "videos show.",
+    left_out = document["frames_left_out"]
+    out = [f"{document['frame_sets']} frame sets.",
+           *([f"{left_out} frames are of a time that not all videos show; an overlay leaves them out."]
+             if left_out else []),
            "The networks found the hand in " + ", ".join(f"{100 * part:.0f} % of {camera}'s pictures"
                                                          for camera, part in document["found"].items()) + "."]
     foreign = max(document["foreign"].values())

@@ -87,12 +87,15 @@ class Recording:
         last = np.linalg.svd(np.concatenate(rows, axis=-2))[2][..., 3, :]
         return last[..., :3] / last[..., 3:]
 
-    def joints(self, hand=None, smooth: bool = False) -> np.ndarray:
-        """(T, 21, 3) m: the tracked hand's after each frame of both cameras, NaN where it is not tracked."""
+    def joints(self, hand=None, smooth: bool = False, alone: int | None = None) -> np.ndarray:
+        """(T, 21, 3) m: the tracked hand's after each frame of both cameras, NaN where it is not tracked. `alone`: the
+        only camera in the judged frames."""
+        tables = self.tables if alone is None else [table if camera == alone else _until(table, JUDGED.start)
+                                                    for camera, table in enumerate(self.tables)]
         rig = self.rig if hand is None else msgspec.structs.replace(self.rig, hand=hand)
         found = np.full(self.places.shape, np.nan)
         begin = None
-        for first_ns, state in _states(rig, self.tables, smooth):
+        for first_ns, state in _states(rig, tables, smooth):
             begin = first_ns
             frame = round((1e-9 * (state.t_master_ns - begin) + self._first_s) * FPS)
             if state.tracked and frame in self._frames:
@@ -107,9 +110,9 @@ class Recording:
         last = list(_states(self.rig, tables, False))[-1][1]
         return 1e3 * np.linalg.norm(last.joint_positions - self.places[frame], axis=1)
 
-    def errors(self, hand=None, smooth: bool = False) -> np.ndarray:
+    def errors(self, hand=None, smooth: bool = False, alone: int | None = None) -> np.ndarray:
         """(T, 21) mm of the joints in the judged frames."""
-        joints = self.joints(hand, smooth)[JUDGED]
+        joints = self.joints(hand, smooth, alone)[JUDGED]
         assert np.isfinite(joints).all(), "the hand was lost"
         return 1e3 * np.linalg.norm(joints - self.places[JUDGED], axis=2)
 
@@ -122,6 +125,12 @@ class Recording:
 def recording() -> Recording:
     """The one."""
     return Recording()
+
+
+def _until(table: LandmarkTable, frame: int) -> LandmarkTable:
+    """The frames of a table before one of those from WHOLE on."""
+    kept = table.times_s * FPS < WHOLE + frame - 0.5
+    return LandmarkTable(table.times_s[kept], table.pixels[kept], table.scores[kept], table.sigma_px[kept])
 
 
 def _states(rig, tables, smooth):

@@ -1,4 +1,5 @@
-"""Bone lengths from landmarks that two cameras see: each is the median distance of its two joints.
+"""Bone lengths from landmarks that two cameras see: each is the median distance of its two joints, and the palm is the
+mean of all palms.
 
 Landmarks err by millimetres, but about joints, so that nothing has to be fitted. On a recorded hand the medians are as
 good as a bundle adjustment.
@@ -16,6 +17,7 @@ from rhot_app.calibration.hand.marker_places import SIZE_SD, MarkerTracks
 from rhot_app.calibration.hand.shape import BONE_COUNT, HandUnknowns
 from rhot_app.calibration.verdict import Finding, Grade, judge
 from rhot_app.errors import CalibrationError
+from rhot_app.geometry.transforms import best_rotation
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.landmarks import ANATOMY_SD_M, LASTING_S
 from rhot_app.hand.skeleton import FINGERS, JOINTS
@@ -46,8 +48,8 @@ def are_landmarks(tracks: MarkerTracks) -> bool:
 def measure_bones(tracks: MarkerTracks, base: HandAnatomy) -> BonesReport:
     """The hand whose landmarks these are; `base` gives what landmarks do not show: side, directions, radii, limits.
 
-    A bone's stated deviation is the spread of its length, not that of the median. Raises CalibrationError when a bone
-    was located in fewer than LEAST_INSTANTS instants.
+    A bone's stated deviation is the spread of its length, not that of the median. Raises CalibrationError when a bone,
+    or the whole palm, was located in fewer than LEAST_INSTANTS instants.
     """
     column = {place.joint: k for k, place in enumerate(tracks.places)}
     joints = tracks.positions[:, [column[joint] for joint in range(len(JOINTS))]]
@@ -64,7 +66,7 @@ def measure_bones(tracks: MarkerTracks, base: HandAnatomy) -> BonesReport:
             instants = min(instants, len(seen))
             lengths[finger, bone] = np.median(seen)
             spreads[finger, bone] = np.subtract(*np.percentile(seen, [90.0, 10.0])) / _DECILES
-    hand = _with_lengths(base, 1e3 * lengths, 1e3 * spreads)
+    hand = _with_lengths(base, 1e3 * _roots(joints, base), 1e3 * lengths[:, 1:], 1e3 * spreads)
     prior = HandUnknowns(base, tracks.places).prior
     usual_mm = 1e3 * np.sqrt(np.diag(prior.fixed_size)[:BONE_COUNT] + 2.0 * ANATOMY_SD_M**2)  # a landmark is no joint
     bones = tuple(BoneLength(bone_name(k // 3, k % 3), float(1e3 * lengths[k // 3, 1 + k % 3]),
@@ -94,14 +96,31 @@ def spreads_apart(report: BonesReport, hand: HandAnatomy) -> float:
                                   for one, other in zip(report.bones, others, strict=True)])))
 
 
-def _with_lengths(base: HandAnatomy, lengths_mm: Array, spreads_mm: Array) -> HandAnatomy:
-    """`lengths_mm` (5, 4): from the wrist to the finger's root, then its three bones."""
+def _roots(joints: Array, base: HandAnatomy) -> Array:
+    """(5, 3) m: mean places of the fingers' roots in the palm's frame of a right hand, from `joints` (T, 21, 3) m. The
+    palms of all instants are laid on each other (generalised Procrustes analysis, Gower 1975), at first on `base`."""
+    palms = joints[:, [0, *(1 + 4 * finger for finger in range(5))]]
+    palms = palms[np.isfinite(palms).all(axis=(1, 2))] * (1.0 if base.side == "right" else np.array([-1.0, 1.0, 1.0]))
+    if len(palms) < LEAST_INSTANTS:
+        raise CalibrationError(f"the whole palm is located in {len(palms)} instants; its width needs {LEAST_INSTANTS}. "
+                               "Hold the hand so that two cameras see all of it.")
+    mean = np.vstack([np.zeros(3), 1e-3 * np.array([base.fingers[name].base_mm for name in FINGERS])])
+    rigid = [0, 2, 3, 4, 5]  # the root of the thumb moves
+    for _ in range(2):
+        turns = [best_rotation((mean[rigid] - mean[rigid].mean(axis=0)).T @ (palm[rigid] - palm[rigid].mean(axis=0)))
+                 for palm in palms]
+        mean = np.mean([(palm - palm[0]) @ turn.T for palm, turn in zip(palms, turns, strict=True)], axis=0)
+    return np.asarray(mean[1:])
+
+
+def _with_lengths(base: HandAnatomy, roots_mm: Array, lengths_mm: Array, spreads_mm: Array) -> HandAnatomy:
+    """`roots_mm` (5, 3): of the fingers, in the palm's frame; `lengths_mm` (5, 3): of their bones; `spreads_mm` (5, 4):
+    of the distance from wrist to root, then of the bones."""
     fingers = {}
     for k, name in enumerate(FINGERS):
         one = base.fingers[name]
-        larger = float(lengths_mm[k, 0]) / float(np.linalg.norm(one.base_mm))
-        x, y, z = (round(float(larger * value), 2) for value in one.base_mm)
-        first, second, last = (round(float(value), 2) for value in lengths_mm[k, 1:])
+        x, y, z = (round(float(value), 2) for value in roots_mm[k])
+        first, second, last = (round(float(value), 2) for value in lengths_mm[k])
         deviations = tuple(round(max(float(value), 0.01), 2) for value in spreads_mm[k, 1:])
         fingers[name] = msgspec.structs.replace(
             one, base_mm=(x, y, z), bones_mm=(first, second, last), marker_mm=min(one.marker_mm, last),
