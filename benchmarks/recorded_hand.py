@@ -29,6 +29,7 @@ from tables import arguments, publish, table  # noqa: E402
 from rhot_app.__main__ import main as rhot  # noqa: E402
 from rhot_app.hand.skeleton import JOINTS  # noqa: E402
 from rhot_app.project import save_rig  # noqa: E402
+from rhot_node.pictures import open_video  # noqa: E402
 
 Array = NDArray[np.float64]
 
@@ -80,7 +81,7 @@ def aligned(joints: Array) -> float:
 
 def first_frames(film: str, count: int, out: Path) -> str:
     """The film's first frames as another film."""
-    capture = cv2.VideoCapture(film)
+    capture = open_video(Path(film))
     size = int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)), int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
     writer = cv2.VideoWriter(str(out), cv2.VideoWriter.fourcc(*"MJPG"), FPS, size)
     for _ in range(count):
