@@ -33,9 +33,16 @@ HAND_PX: Final = 224
 LEAST_PROBABILITY: Final = 0.5
 """Of a palm, and of a hand's presence: less is none."""
 
-SEARCH_EVERY: Final = 10
-"""Pictures from one search for a further hand to the next. A search costs about as much as the landmarks of a hand, so
-that it takes a tenth of the time."""
+SEARCH_EVERY: Final = 4
+"""Pictures from one search to the next, for a further hand and in an empty scene. A search costs about as much as the
+landmarks of a hand."""
+
+EAGER: Final = 30
+"""Pictures without a hand, the first ones and those after a loss, that are all searched."""
+
+PART: Final = 0.6
+"""Side, by the longer one of the picture, of its parts that are searched by turns with the whole: in the whole picture
+a small or far hand has too few px. Five of them cover it."""
 
 OVERLAP: Final = 0.3
 """Intersection over union from which two boxes are of one palm (MediaPipe's `min_suppression_threshold`)."""
@@ -104,12 +111,12 @@ class HandNetworks:
         """`palm`, `hand`: the networks. `hands`: so many are looked for at most."""
         self._palm, self._hand, self._most = palm, hand, hands
         self._anchors = _anchors()
-        self._regions: list[Region] = []
-        self._unsearched = SEARCH_EVERY  # pictures since the last search
+        self.reset()
 
     def reset(self) -> None:
         """The next picture does not follow the last one."""
-        self._regions, self._unsearched = [], SEARCH_EVERY
+        self._regions: list[Region] = []
+        self._unsearched, self._empty, self._searches = SEARCH_EVERY, 0, -1  # pictures since a search, and a hand
 
     def find(self, picture: Picture) -> tuple[DetectedHand, ...]:
         """The hands in a picture (H, W, 3) BGR, or (H, W) grey, uint8. Raises ValueError for any other array."""
@@ -119,11 +126,12 @@ class HandNetworks:
         for region in self._regions if picture.size else []:
             self._add(hands, picture, region)
         self._unsearched += 1
-        missing = len(hands) < self._most
-        if picture.size and missing and (not hands or len(hands) < len(self._regions)
-                                         or self._unsearched >= SEARCH_EVERY):
-            self._unsearched = 0
-            for palm in self._palms(picture):
+        self._empty = 0 if hands or self._regions else self._empty + 1
+        lost = len(hands) < len(self._regions)
+        eager = lost or (not hands and self._empty <= EAGER)
+        if picture.size and len(hands) < self._most and (eager or self._unsearched >= SEARCH_EVERY):
+            self._unsearched, self._searches = 0, 0 if lost else self._searches + 1
+            for palm in self._palms(picture, _view(picture, self._searches)):
                 if len(hands) < self._most and not any(_same(palm.points, palm.region, hand) for hand in hands):
                     self._add(hands, picture, palm.region)
         self._regions = [next_region(hand.landmarks) for hand in hands]
@@ -141,7 +149,7 @@ class HandNetworks:
                 work()
                 times.append(time.perf_counter() - begun)
             return min(times)
-        return quickest(lambda: self._palms(picture)), quickest(lambda: landmarks_in(self._hand, picture, whole))
+        return quickest(lambda: self._palms(picture, whole)), quickest(lambda: landmarks_in(self._hand, picture, whole))
 
     def _add(self, hands: list[DetectedHand], picture: Picture, region: Region) -> None:
         """Add the hand of a region, if there is one, and if it is another one than those before."""
@@ -154,22 +162,21 @@ class HandNetworks:
         if not any(_same(pixels[list(PALM_LANDMARKS)], region, hand) for hand in hands):
             hands.append(found)
 
-    def _palms(self, picture: Picture) -> list[_Palm]:
-        """The palms of a picture, the likeliest first: by weighted non-maximum suppression."""
-        whole = _whole(picture)
-        boxes, logits = self._palm(_sampled(picture, whole, PALM_PX))[:2]
+    def _palms(self, picture: Picture, view: Region) -> list[_Palm]:
+        """The palms of a part of a picture, the likeliest first: by weighted non-maximum suppression."""
+        boxes, logits = self._palm(_sampled(picture, view, PALM_PX))[:2]
         probability = 1.0 / (1.0 + np.exp(-np.clip(logits.reshape(-1).astype(np.float64), -100.0, 100.0)))
         likely = np.flatnonzero(probability >= LEAST_PROBABILITY)
         likely = likely[np.argsort(-probability[likely], kind="stable")]
         # rows of centre, size and seven points, px of the input about the anchor
         points = boxes.reshape(-1, 9, 2)[likely].astype(np.float64)
         points[:, [0, *range(2, 9)]] += PALM_PX * self._anchors[likely][:, None]
-        into, palms = whole.from_input(PALM_PX), []
+        into, palms = view.from_input(PALM_PX), []
         while len(likely):
             one = _overlaps(points[:, 0], points[:, 1]) > OVERLAP
             one[0] = True
             mean = np.average(points[one], axis=0, weights=probability[likely[one]])
-            palms.append(_palm_region(mean[1] * whole.side / PALM_PX,
+            palms.append(_palm_region(mean[1] * view.side / PALM_PX,
                                       mean[[0, *range(2, 9)]] @ into[:, :2].T + into[:, 2]))
             points, likely = points[~one], likely[~one]
         return palms
@@ -215,6 +222,19 @@ def next_region(landmarks: Array) -> Region:
 def _whole(picture: Picture) -> Region:
     height, width = picture.shape[:2]
     return Region(np.array([0.5 * (width - 1), 0.5 * (height - 1)]), float(max(width, height)), 0.0)
+
+
+def _view(picture: Picture, search: int) -> Region:
+    """What is searched next: the whole picture at every even `search`, else one of its corners, or its middle."""
+    whole = _whole(picture)
+    if search % 2 == 0:
+        return whole
+    side, number = PART * whole.side, search // 2 % 5
+    if number == 4:
+        return whole._replace(side=side)
+    far = np.maximum(2.0 * whole.centre + 1.0 - side, 0.0)  # of a part from the picture's corner
+    away = np.where(far > 0.0, far * [number % 2, number // 2] + 0.5 * (side - 1.0), whole.centre)
+    return Region(away, side, 0.0)
 
 
 def _palm_region(size: Array, points: Array) -> _Palm:

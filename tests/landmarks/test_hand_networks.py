@@ -14,7 +14,15 @@ from fake_networks import FakeNetworks, gradient, hand_at
 
 from rhot_node.errors import KeypointError
 from rhot_node.landmarks.install import installed_folder
-from rhot_node.landmarks.networks import HAND_PX, MODELS, SEARCH_EVERY, HandNetworks, next_region, open_hand_networks
+from rhot_node.landmarks.networks import (
+    EAGER,
+    HAND_PX,
+    MODELS,
+    SEARCH_EVERY,
+    HandNetworks,
+    next_region,
+    open_hand_networks,
+)
 from rhot_node.landmarks.runtime import LITERT, RUNTIMES, best_runtime, open_network
 
 FILM = Path(__file__).parents[2].parent / "shared" / "data" / "bare_hand_stereo"
@@ -107,6 +115,38 @@ def test_a_further_hand_is_searched_for_now_and_then() -> None:
     calls = fake.palm_calls
     networks.find(PICTURE)
     assert fake.palm_calls == calls, "nobody is missing"
+
+
+def test_an_empty_scene_is_searched_now_and_then_after_the_first_second() -> None:
+    fake = FakeNetworks()
+    networks = networks_for(fake)
+    for _ in range(EAGER + 20 * SEARCH_EVERY):
+        assert networks.find(PICTURE) == ()
+    assert EAGER + 19 <= fake.palm_calls <= EAGER + 21
+    fake.hands.append(hand_at((330.0, 250.0)))
+    assert [len(networks.find(PICTURE)) for _ in range(SEARCH_EVERY)][-1] == 1
+    fake.hands.clear()
+    calls = fake.palm_calls
+    for _ in range(EAGER):
+        networks.find(PICTURE)
+    assert fake.palm_calls == calls + EAGER, "it was there a moment ago"
+
+
+@pytest.mark.parametrize("shape", [(480, 640), (640, 480), (500, 500), (100, 1000)])
+def test_every_place_of_a_picture_is_searched_in_a_part_of_it(shape: tuple[int, int]) -> None:
+    fake, seen = FakeNetworks(), np.zeros(shape, bool)
+    networks, sides = HandNetworks(lambda crop: parts.append(crop) or fake.palm(gradient()), fake.hand), []
+    parts: list[np.ndarray] = []
+    y, x = np.indices(shape)
+    for _ in range(10):
+        networks.find(np.stack([np.full(shape, 255), x * 255 // shape[1], y * 255 // shape[0]], -1).astype(np.uint8))
+    for crop in parts[1::2]:
+        inside = crop[..., 2] > 0.99
+        places = crop[inside][:, :2] * shape
+        low, high = places.min(axis=0), places.max(axis=0)
+        seen[int(low[0]):int(high[0]) + 6, int(low[1]):int(high[1]) + 6] = True
+        sides.append(max(high - low) / max(shape))
+    assert seen.mean() > 0.99 and max(sides) < 0.65
 
 
 @pytest.mark.parametrize("presence, found", [(0.49, 0), (0.51, 1)])
