@@ -27,8 +27,10 @@ LASTING_S = 0.3
 """s: correlation time of that place."""
 
 NOISE_M = 3e-3
-"""m: standard deviation of a landmark's own error in a frame, beside what its detector states. Chosen: of 1.5 to 6 mm
-it leaves the joints of a recorded hand nearest to triangulation, by median and 95 %."""
+"""m: standard deviation of a landmark's own error in a frame, beside what its detector states. Chosen by the frames
+from 13 to 66 of a recorded hand with its own bones: of 1.5 to 6 mm it leaves 95 % of the joints nearest to
+triangulation, within 7.3 mm (median 3.1). In those from 67 to 119 these are 5.8 and 2.6 mm
+(`python benchmarks/landmarks.py`)."""
 
 
 # -- the master's part of a model card (docs/landmarks.md) -------------------------------------------------------------

@@ -231,3 +231,14 @@ def test_a_camera_that_sees_the_hand_a_moment_before_the_other_does_not_begin_al
               if frame.camera == 0 or frame.t_row0_master_ns > EPOCH_NS + 10**8]
     first = next(state for state in states_of(RIG, frames) if state.tracked)
     assert 1e-9 * (first.t_master_ns - EPOCH_NS) > 0.099
+
+
+def test_what_is_triangulated_does_not_follow_the_hand_file():
+    """Exact landmarks of a hand whose bones the rig does not have: of frames taken at one moment they meet at its
+    joints, wherever the estimate is."""
+    exact = LandmarkErrors(anatomy=0.0, lasting=0.0, common=0.0, noise=0.0)
+    other = hand("grasp", 0.15)
+    states = states_of(RIG, detected_landmarks(RIG, other, 1, exact))
+    errors, _, triangulated = off(states[1::2], other)  # after the second camera's frame
+    assert rms_mm(errors) > 2.0
+    assert np.nanpercentile(np.linalg.norm(triangulated, axis=2), 95) < 0.1e-3

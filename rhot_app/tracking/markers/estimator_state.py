@@ -65,8 +65,8 @@ _FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICE
 class RecentObservations:
     """The last accepted observation of each of M markers by each of C cameras, and the cameras' frames.
 
-    `newest`: each camera's newest frame. `times` (C, M) ns; `residuals` (C, M, 2) px, observed less predicted;
-    `covariances` (C, M, 2, 2) px^2; `doubtful` (C, M).
+    `newest`: each camera's newest frame. `times` (C, M) ns, of their frames; `late_s` (C, M): of their rows after
+    these; `observed` (C, M, 2) px; `covariances` (C, M, 2, 2) px^2; `doubtful` (C, M).
     """
 
     def __init__(self, rig: RigArrays, markers: MarkerModel) -> None:
@@ -77,7 +77,8 @@ class RecentObservations:
     def reset(self) -> None:
         """Forget all."""
         cameras, markers = shape = self._shape
-        self.times, self.residuals = np.full(shape, _NEVER, np.int64), np.zeros((*shape, 2))
+        self.times, self.observed = np.full(shape, _NEVER, np.int64), np.zeros((*shape, 2))
+        self.late_s = np.zeros(shape)
         self.covariances, self.doubtful = np.tile(np.eye(2), (*shape, 1, 1)), np.zeros(shape, np.bool_)
         self.fresh_ns, self.periods_s = np.full(cameras, _FRESH_NS), [1e-9 * _FRESH_NS / _PERIODS] * cameras
         self._paced = [False] * cameras
@@ -131,8 +132,9 @@ class RecentObservations:
         """Note the observations of a frame, after which the hand is in `state`; returns which are inliers (M,)."""
         inlier = np.zeros(len(frame.seen), np.bool_)
         camera = frame.camera
-        _accept(frame.t_ns, frame.expected(state), frame.pixels, frame.covariances, frame.flags, frame.seen, weights,
-                self.times[camera], self.residuals[camera], self.covariances[camera], self.doubtful[camera], inlier)
+        _accept(frame.t_ns, frame.late_s, frame.expected(state), frame.pixels, frame.covariances, frame.flags,
+                frame.seen, weights, self.times[camera], self.late_s[camera], self.observed[camera],
+                self.covariances[camera], self.doubtful[camera], inlier)
         return inlier
 
 
@@ -169,7 +171,8 @@ class EstimatorStates:
         markers, joints, angles = np.empty(count, np.uint8), np.empty(21, np.uint8), np.empty(21, np.uint8)
         angle_sd = np.empty(21)
         aligned, motion_sd = np.empty((*fresh.shape, 2)), np.empty((2, 21))
-        _place(state, covariance, self._dh, m.half_axes, m.poses, m.intrinsics, observations.residuals, points,
+        late_s = np.where(fresh, 1e-9 * (observations.times - t_ns) + observations.late_s, 0.0)
+        _place(state, covariance, self._dh, m.half_axes, m.poses, m.intrinsics, observations.observed, late_s, points,
                covariances, motion_sd, aligned)
         if rig.band_half_axes is not None:
             world = np.eye(4)
@@ -247,8 +250,8 @@ def _note_sizes(camera, t_ns, times, fresh_ns, widths, diameters, correlated, si
 
 
 @njit(cache=True)
-def _accept(t_ns, expected, pixels, pixel_covariances, flags, seen, weights, times, residuals, covariances, doubtful,
-            inlier):
+def _accept(t_ns, frame_late_s, expected, pixels, pixel_covariances, flags, seen, weights, times, late_s, observed,
+            covariances, doubtful, inlier):
     """Take one camera's inliers over into its row of the observations; `weights` are those of the seen markers."""
     count = 0
     for m in range(seen.shape[0]):
@@ -258,16 +261,18 @@ def _accept(t_ns, expected, pixels, pixel_covariances, flags, seen, weights, tim
         count += 1
         if inlier[m] and t_ns >= times[m]:
             times[m] = t_ns
-            residuals[m] = pixels[m] - expected[m]
+            late_s[m] = frame_late_s[m]
+            observed[m] = pixels[m]
             covariances[m] = pixel_covariances[m]
             doubtful[m] = (flags[m] & DOUBTFUL) != 0
 
 
 @njit(cache=True)
-def _place(state, covariance, dh, half_axes, poses, intrinsics, residuals, points, covariances, motion_sd, aligned):
+def _place(state, covariance, dh, half_axes, poses, intrinsics, observed, late_s, points, covariances, motion_sd,
+           aligned):
     """Fill points (26 + M, 3) m with covariances, `motion_sd` (2, 21) m/s and m/s^2 of the joints' velocities and
-    accelerations, and `aligned` (C, M, 2) px: each camera's last observation of a marker, carried on to the state's
-    instant."""
+    accelerations, and `aligned` (C, M, 2) px: each camera's last `observed` (C, M, 2) pixel of a marker, `late_s`
+    (C, M) after the state's instant, carried there by the hand's motion alone."""
     count = points.shape[0]
     frames, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3, POSE))
     world = np.eye(4)
@@ -299,15 +304,20 @@ def _place(state, covariance, dh, half_axes, poses, intrinsics, residuals, point
                     for i in range(3):
                         variance += jacobian[p, i, columns[a]] * together * jacobian[p, i, columns[b]]
             motion_sd[order, p] = math.sqrt(max(variance, 0.0))
-    place, slope = np.empty(3), np.empty((2, 3))
+    place, then, seen, slope = np.empty(3), np.empty(3), np.empty(2), np.empty((2, 3))
     for camera in range(poses.shape[0]):
         for m in range(half_axes.shape[0]):
+            late = late_s[camera, m]
             for i in range(3):
-                place[i] = points[_FIRST_MARKER + m, i] + state[BIAS + 3 * m + i]
-            if project_marker(place, world, half_axes[m], poses[camera], intrinsics[camera], aligned[camera, m],
-                              slope):
-                aligned[camera, m, 0] += residuals[camera, m, 0]
-                aligned[camera, m, 1] += residuals[camera, m, 1]
+                place[i] = then[i] = points[_FIRST_MARKER + m, i] + state[BIAS + 3 * m + i]
+                for j in range(POSE):
+                    then[i] += (late * jacobian[_FIRST_MARKER + m, i, j]
+                                * (state[VELOCITY + j] + 0.5 * late * state[ACCELERATION + j]))
+            if (project_marker(then, world, half_axes[m], poses[camera], intrinsics[camera], seen, slope)
+                    and project_marker(place, world, half_axes[m], poses[camera], intrinsics[camera],
+                                       aligned[camera, m], slope)):
+                for i in range(2):
+                    aligned[camera, m, i] += observed[camera, m, i] - seen[i]
             else:
                 aligned[camera, m] = math.nan
 
