@@ -18,13 +18,16 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.project import TrackerSettings, landmark_markers, load_rig, save_rig
+from rhot_app.recording.landmark_log import write_landmark_log
 from rhot_app.rig_history import versions
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
+from rhot_app.state import Condition
 from rhot_node.errors import KeypointError
 from rhot_node.files import resource_path
 from rhot_node.landmarks import networks
 from rhot_node.landmarks.install import installed_folder
 from rhot_node.landmarks.networks import DetectedHand, Region
+from rhot_node.pictures import open_video
 
 needs_networks = pytest.mark.skipif(installed_folder() is None, reason="`rhot landmarks install` has not been run")
 SECONDS, RATE = 3.0, 20.0
@@ -268,6 +271,37 @@ def test_cameras_that_face_each_other_track_a_hand_between_them(drawn, monkeypat
     assert np.isfinite(off).mean() > 0.9 and np.nanmedian(off) < 20.0
 
 
+def test_a_hand_on_a_screen_of_another_size_is_not_to_be_relied_on(drawn, monkeypatch, capsys):
+    _, words, _ = drawn
+    flat = moving_hand(RIG, "grasp", SECONDS, RATE, 1).joints()
+    flat[..., 2] = 0.6
+    flat += 0.5 * (flat.mean(axis=(0, 1)) - flat)  # half as large
+    use_networks(monkeypatch, [StandIn(pixels[None], 0.95) for pixels in seen_by(RIG, flat)])
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert "That is large" in said and "Bones measured" not in said
+
+
+def test_a_film_of_another_size_than_the_lens_is_refused(drawn, capsys):
+    _, words, folder = drawn
+    small = msgspec.structs.replace(RIG.nodes[0].intrinsics, width=320, height=240)
+    name = RIG.nodes[0].name
+    assert main(["track", f"{name}={video(folder / 'small.avi', small, 3)}", *words[3:]]) == 2
+    said = capsys.readouterr().err
+    assert "320 x 240" in said and "calibrated at 640 x 480" in said
+
+
+@needs_recording
+def test_films_in_the_wrong_order_are_never_called_tracked(tmp_path):
+    """The landmarks of each camera as if they were the other one's."""
+    rig = landmark_track.landmark_rig_of(recording().rig, [node.name for node in recording().rig.nodes])
+    write_landmark_log(tmp_path / "a.log", rig, recording().tables[::-1])
+    states = list(landmark_track.states_of_log(rig, tmp_path / "a.log"))
+    assert states and not any(state.condition is Condition.TRACKING for state in states)
+    assert landmark_track.summarise(rig, states)["reprojection_large"]
+
+
+
 def test_a_painted_rig_with_filters_of_its_own_tracks_a_bare_hand() -> None:
     painted = load_rig(resource_path("rigs", "two_pis.json"))
     one = painted.markers.ids[0]
@@ -338,6 +372,24 @@ def test_one_video_without_a_rig_is_tracked_by_an_assumed_lens(film, capsys):
     _, places = table_of(film / "one.csv")
     aligned = [aligned_mm(one, other) for one, other in zip(places[WHOLE:], recording().places, strict=False)]
     assert np.median(aligned) < 18.5
+
+
+@needs_recording
+@needs_networks
+def test_a_left_hand_before_a_rig_of_a_right_one_is_none(film, capsys):
+    """The recorded film, mirrored; without a rig it is tracked as what it is."""
+    source = open_video(FOLDER / "cam1_first120.mp4")
+    writer = cv2.VideoWriter(str(film / "left.avi"), cv2.VideoWriter.fourcc(*"MJPG"), FPS, (720, 720))
+    for _ in range(20):
+        writer.write(np.ascontiguousarray(source.read()[1][:, ::-1]))
+    writer.release()
+    assert main(["track", f"c1={film / 'left.avi'}", "--rig", str(film / "rig.json"), "--out",
+                 str(film / "none.csv")]) == 0
+    assert "found a left hand, which is not tracked" in capsys.readouterr().out
+    assert np.isnan(table_of(film / "none.csv")[1]).all()
+    assert main(["track", str(film / "left.avi"), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["side"] == "left" and said["tracked"] > 0.5
 
 
 def aligned_mm(one, other):

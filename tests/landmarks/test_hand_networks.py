@@ -291,6 +291,17 @@ def test_a_right_and_a_left_hand_are_told_apart(runtime: str, pictures: Iterator
     assert np.median(np.linalg.norm(left.landmarks - [1439.0, 0.0] - right.landmarks * [-1.0, 1.0], axis=1)) < 6.0
 
 
+def test_a_hand_that_fills_the_picture_is_none_or_inside_it(runtime: str, pictures: Iterator[np.ndarray]) -> None:
+    expected, networks = table(), open_hand_networks(runtime=runtime)
+    for number, picture in zip(range(20), pictures, strict=False):
+        if number < 16:
+            continue
+        x, y = np.clip(expected[number].mean(axis=0) - 40.0, 0, 640).astype(int)
+        for side in (80, 60):
+            networks.reset()
+            assert networks.find(cv2.resize(picture[y:y + side, x:x + side], (720, 720))) == ()
+
+
 @pytest.mark.parametrize("model", MODELS)
 def test_no_hand_is_found_where_there_is_none(runtime: str, model: str) -> None:
     rng = np.random.default_rng(1)
