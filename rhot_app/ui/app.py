@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import ctypes
 import os
 import signal
 import sys
@@ -64,6 +65,7 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
         _require_settings_file(args.settings)
     choose_gl_platform()
     cap_software_gl()
+    cap_heap()
     log_to_stderr()
     session = Session(args.directory)
     from rhot_app.ui.common.job import workers
@@ -145,6 +147,21 @@ def choose_gl_platform() -> None:
 def cap_software_gl() -> None:
     """Mesa's software renderer takes every core unless told otherwise; one is enough here, the rest is the engine's."""
     os.environ.setdefault("LP_NUM_THREADS", "1")
+
+
+M_MMAP_THRESHOLD, M_ARENA_MAX = -3, -8  # of malloc.h
+PICTURE_BYTES = 1 << 17
+"""What is as large as a picture goes back to the system when it is freed: glibc's own first threshold."""
+
+
+def cap_heap() -> None:
+    """One heap for all threads, with nothing large in it. By default glibc gives every thread one, up to eight a core,
+    which stays as large as pictures have made it, and soon keeps blocks of megabytes. Other libraries are left alone.
+    """
+    with contextlib.suppress(OSError, AttributeError):
+        library = ctypes.CDLL(None)
+        library.mallopt(M_ARENA_MAX, 1)
+        library.mallopt(M_MMAP_THRESHOLD, PICTURE_BYTES)
 
 
 def give_way() -> None:

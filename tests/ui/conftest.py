@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 from fake_backend import FakeBackend, InProcessSolver
 
-from rhot_app.ui.app import cap_software_gl, choose_gl_platform
+from rhot_app.ui.app import cap_heap, cap_software_gl, choose_gl_platform
 
 choose_gl_platform()
 cap_software_gl()
+cap_heap()
 
 from person import Person  # after the OpenGL platform was chosen  # noqa: E402
 from PySide6.QtCore import QCoreApplication, Qt  # noqa: E402

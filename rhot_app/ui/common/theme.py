@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import pyqtgraph as pg
-from PySide6.QtGui import QColor, QFont, QPalette
+from PySide6.QtGui import QColor, QFont, QPalette, QPixmapCache
 from PySide6.QtWidgets import QApplication
 
 from rhot_app.ui.models.palette import SCHEMES, Scheme
 
 GRID_PX = 8
 TEXT_PT = 11.0
+PIXMAPS_KB = 2048
+"""Of parts that the style has drawn. It keeps them by the widget's palette, so those of closed windows serve nobody."""
 
 
 def app_font(size_pt: float = TEXT_PT, *, bold: bool = False) -> QFont:
@@ -29,6 +31,7 @@ def scheme_named(name: str) -> Scheme:
 def apply_theme(app: QApplication, scheme: Scheme) -> None:
     """Style, palette, fonts and style sheet of the whole app."""
     app.setStyle("Fusion")
+    QPixmapCache.setCacheLimit(PIXMAPS_KB)
     app.setFont(app_font())
     app.setPalette(palette_of(scheme))
     app.setStyleSheet(style_sheet(scheme))

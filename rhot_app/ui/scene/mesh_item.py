@@ -7,6 +7,8 @@ nearest surface.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 from OpenGL import GL
@@ -78,8 +80,13 @@ def _modern(source: str, fragment: bool) -> str:
     return source.replace("attribute", "in").replace("varying", "out")
 
 
-def _build_program() -> int:
-    """Compile for the current context's dialect and fix the attributes' places."""
+@functools.cache
+def _program() -> tuple[int, dict[str, int]]:
+    """The one program of all items and the places of its uniforms, for the dialect of the context that comes first.
+
+    The window's contexts share their programs (AA_ShareOpenGLContexts), and one that an item made for itself would stay
+    when the item goes: with a software renderer that is megabytes of compiled code.
+    """
     form = QOpenGLContext.currentContext().format()
     version = (form.majorVersion(), form.minorVersion())
     if QOpenGLContext.currentContext().isOpenGLES():
@@ -93,7 +100,7 @@ def _build_program() -> int:
     for place, name in enumerate(_ATTRIBUTES):
         GL.glBindAttribLocation(program, place, name)
     GL.glLinkProgram(program)
-    return int(program)
+    return int(program), {name: GL.glGetUniformLocation(program, name) for name in _UNIFORMS}
 
 
 class MeshItem(GLGraphicsItem):
@@ -113,8 +120,6 @@ class MeshItem(GLGraphicsItem):
         self._arrays: list[NDArray[np.generic]] | None = None
         self._dirty = False
         self._see_through = False
-        self._program = 0
-        self._uniforms: dict[str, int] = {}
         self._buffers: list[QOpenGLBuffer] = []
         self._indices = QOpenGLBuffer(QOpenGLBuffer.Type.IndexBuffer)
 
@@ -136,9 +141,7 @@ class MeshItem(GLGraphicsItem):
         return np.empty((0, 4), np.uint8) if self._arrays is None else self._arrays[2].astype(np.uint8)
 
     def initializeGL(self) -> None:  # noqa: N802 (Qt's name)
-        """Make program and buffers in the current context, which may be a new one after the window moved."""
-        self._program = _build_program()
-        self._uniforms = {name: GL.glGetUniformLocation(self._program, name) for name in _UNIFORMS}
+        """Make the buffers in the current context."""
         self._buffers = [QOpenGLBuffer(QOpenGLBuffer.Type.VertexBuffer) for _ in _ATTRIBUTES]
         self._indices = QOpenGLBuffer(QOpenGLBuffer.Type.IndexBuffer)
         self._indices.create()
@@ -166,8 +169,9 @@ class MeshItem(GLGraphicsItem):
             return
         if self._dirty:
             self._upload()
-        GL.glUseProgram(self._program)
-        self._set_uniforms()
+        program, places = _program()
+        GL.glUseProgram(program)
+        self._set_uniforms(places)
         self._enable_attributes()
         self._indices.bind()
         GL.glEnable(GL.GL_BLEND)
@@ -197,10 +201,9 @@ class MeshItem(GLGraphicsItem):
     def _draw(self) -> None:
         GL.glDrawElements(GL.GL_TRIANGLES, self._faces.size, GL.GL_UNSIGNED_INT, None)
 
-    def _set_uniforms(self) -> None:
+    def _set_uniforms(self, at: dict[str, int]) -> None:
         mvp = np.array(self.mvpMatrix().data(), dtype=np.float32)
         normal = np.array(self.modelViewMatrix().normalMatrix().data(), dtype=np.float32)
-        at = self._uniforms
         GL.glUniformMatrix4fv(at["u_mvp"], 1, False, mvp)
         GL.glUniformMatrix3fv(at["u_normal"], 1, False, normal)
         GL.glUniform1f(at["u_period"], HATCH_PERIOD_PX * self.view().devicePixelRatioF())
