@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import threading
 from collections.abc import Iterator
@@ -51,8 +52,8 @@ class Rig:
     def frame(self) -> tuple[StreamHeader, np.ndarray]:
         """The left camera's next frame: header and Y plane."""
         self.cameras.step()
-        header = unpack_header(self._receive(HEADER_BYTES))
-        planes = np.frombuffer(self._receive(header.frame_bytes), np.uint8)
+        header = unpack_header(self.receive(HEADER_BYTES))
+        planes = np.frombuffer(self.receive(header.frame_bytes), np.uint8)
         return header, planes[:WIDTH * HEIGHT].reshape(HEIGHT, WIDTH)
 
     def ask(self, request: ShowRequest | LampRequest | CoverRequest) -> None:
@@ -62,7 +63,7 @@ class Rig:
         while asking.is_alive():
             self.frame()
 
-    def _receive(self, count: int) -> bytearray:
+    def receive(self, count: int) -> bytearray:
         data = bytearray()
         while len(data) < count:
             data += self.node.recv(count - len(data))
@@ -128,6 +129,42 @@ def test_what_cannot_be_shown_changes_nothing(rig: Rig) -> None:
     with pytest.raises(SimulatorError, match="kelvin"):
         rig.stage.perform(LampRequest(kelvin=3.0))
     assert rig.stage.setting is before
+
+
+def full(taken: Iterator[bool]) -> int:
+    """How many frames are taken until one is not; the last of them only in part."""
+    return next(number for number, one in enumerate(taken) if not one)
+
+
+def test_a_node_that_does_not_run_for_a_while_loses_frames_and_not_its_camera(rig: Rig) -> None:
+    left, frame = rig.sockets[0], np.zeros(WIDTH * HEIGHT * 3 // 2, np.uint8)
+    headers = (StreamHeader(WIDTH, HEIGHT, number, 1, 1, 1) for number in range(1000, 2000))
+    left.hear()
+    kept = full(left.send(header, frame) for header in headers)
+    for _ in range(3):
+        assert not left.send(next(headers), frame), "it is behind, and nobody waits for it"
+    numbers = []
+    while len(numbers) < kept:
+        header = unpack_header(rig.receive(HEADER_BYTES))
+        numbers.append(header.number)
+        if len(numbers) == kept - 1:
+            left.send(next(headers), frame)
+        rig.receive(header.frame_bytes)
+    assert numbers == list(range(1000, 1000 + kept)), "whole frames, in their order"
+    assert left.send(next(headers), frame)
+    assert unpack_header(rig.receive(HEADER_BYTES)).number > 1000 + kept + 3
+
+
+def test_a_node_that_is_stuck_is_let_go(tmp_path: Path) -> None:
+    left, frame = FrameSocket(tmp_path / "left.frames", stuck_s=0.0), np.zeros(WIDTH * HEIGHT * 3 // 2, np.uint8)
+    with contextlib.closing(left), contextlib.closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as node:
+        node.connect(str(tmp_path / "left.frames"))
+        left.hear()
+        header = StreamHeader(WIDTH, HEIGHT, 1, 1, 1, 1)
+        full(left.send(header, frame) for _ in range(1000))
+        node.settimeout(2.0)
+        while node.recv(1 << 20):
+            pass  # to the end of the stream
 
 
 def test_cameras_obey_what_their_node_says(rig: Rig) -> None:

@@ -29,18 +29,24 @@ from rhot_node.errors import CameraError
 # -- ``stream:`` server ------------------------------------------------------------------------------------------------
 # Frames go out; what the node tells its camera comes in.
 
-_SEND_TIMEOUT_S = 0.25  # a node that takes no bytes for so long is stuck; it may connect again
+_WAIT_S = 0.25  # for a node to take a frame; the rest of it then goes with the next ones, which are lost
+STUCK_S = 10.0
+"""A node that takes no byte for so long is stuck; it may connect again."""
+
 _BUFFER_BYTES = 1 << 20
 
 
 class FrameSocket:
-    """Listens at `path`; frames go to whichever node connected last and are lost while there is none."""
+    """Listens at `path`; frames go to whichever node connected last and are lost while there is none, or while it is
+    behind: on a busy computer a node may not run for a while."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, stuck_s: float = STUCK_S) -> None:
         """Raises SimulatorError when the socket cannot be made."""
         self._path = path
         self._peer: socket.socket | None = None
         self._received = bytearray()
+        self._rest = memoryview(b"")  # of the last frame
+        self._stuck_s, self._taken_s = stuck_s, 0.0
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             path.unlink(missing_ok=True)
@@ -65,16 +71,29 @@ class FrameSocket:
         return wanted
 
     def send(self, header: StreamHeader, frame: NDArray[Any]) -> bool:
-        """Send one packed I420 frame to the node that `hear` has let in; False when there is none to take it."""
-        if self._peer is None:
-            return False
+        """Send one packed I420 frame to the node that `hear` has let in; False when there is none to take it, or it has
+        not taken the one before."""
+        behind = bool(self._rest)
+        if self._peer is not None and not behind:
+            self._rest = memoryview(pack_header(header) + frame.tobytes())
+        self._hand_over(0.0 if behind else _WAIT_S)
+        return self._peer is not None and not behind
+
+    def _hand_over(self, wait_s: float) -> None:
+        """What the node takes within `wait_s`."""
+        now_s = time.monotonic()
+        end_s = now_s + wait_s
         try:
-            self._peer.sendall(pack_header(header))
-            self._peer.sendall(frame.data)
+            while self._peer is not None and self._rest:
+                if select.select([], [self._peer], [], max(0.0, end_s - now_s))[1]:
+                    self._rest = self._rest[self._peer.send(self._rest):]
+                    self._taken_s = now_s = time.monotonic()
+                elif time.monotonic() - self._taken_s > self._stuck_s:
+                    self._drop()
+                else:
+                    return
         except OSError:
             self._drop()
-            return False
-        return True
 
     def _accept(self) -> None:
         """A new connection replaces the old one: the node has come back."""
@@ -82,14 +101,15 @@ class FrameSocket:
             while True:
                 peer, _ = self._listener.accept()
                 self._drop()
-                peer.settimeout(_SEND_TIMEOUT_S)
+                peer.setblocking(False)
                 peer.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER_BYTES)
-                self._peer = peer
+                self._peer, self._taken_s = peer, time.monotonic()
 
     def _drop(self) -> None:
         if self._peer is not None:
             self._peer.close()
             self._peer = None
+        self._rest = memoryview(b"")
         self._received.clear()
 
     def close(self) -> None:
