@@ -46,7 +46,7 @@ class Said:
 
 @dataclass
 class Watch:
-    """What was read: the sentences, how often each word at the top, and MB resident at seconds after the first state."""
+    """What was read: the sentences, how often each word at the top, MB resident at seconds after the first state."""
 
     sentences: dict[str, Said] = field(default_factory=dict)
     words: Counter[str] = field(default_factory=Counter)
