@@ -1,10 +1,10 @@
-"""The bare hand in a real stereo video, from nothing, against the image points of a landmark network.
+"""The bare hand in a real stereo video by its contours, against the image points of a landmark network.
 
     python benchmarks/bare_hand_video.py ../shared/data/bare_hand_stereo [--from 13] [--to 120] [--square-m 0.0385]
         [--templates]
 
 `--templates` follows the same images a second time, by contours and then by templates of the first tracked images.
-`--start landmarks` begins at the pose that fits the first image's landmarks, not by looking for the hand.
+It begins at the pose that fits the first image's landmarks.
 
 The unit of the video's extrinsics is a chessboard square of unknown size: `--square-m` makes the hand as large as the
 default hand file. Errors are parts of the hand's size in the image, the largest distance of two landmarks.
@@ -26,14 +26,13 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand")
 
 from bare_scenes import rig_of  # noqa: E402
 
-from rhot_app.articulated.bodies import hand_bodies, root_of  # noqa: E402
+from rhot_app.articulated.bodies import hand_bodies  # noqa: E402
 from rhot_app.articulated.tracker import LayeredTracker  # noqa: E402
 from rhot_app.barehand.overlay import overlay  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
 from rhot_app.geometry.camera import CameraModel, intrinsics_row  # noqa: E402
 from rhot_app.geometry.transforms import inverse, rigid  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
-from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY  # noqa: E402
 from rhot_app.hand.skeleton import HandPose  # noqa: E402
 from rhot_app.handfit.session import HandFit  # noqa: E402
 from rhot_app.handfit.state import Anchor  # noqa: E402
@@ -87,7 +86,6 @@ def main() -> None:
     parser.add_argument("--from", dest="first", type=int, default=13)
     parser.add_argument("--to", dest="last", type=int, default=120)
     parser.add_argument("--square-m", type=float, default=0.0385)
-    parser.add_argument("--start", choices=("find", "landmarks"), default="find")
     parser.add_argument("--templates", action="store_true", help="by contours and templates, too")
     parser.add_argument("--overlay", type=Path, help="write the last images with the tracked contour there (PNG)")
     arguments = parser.parse_args()
@@ -98,19 +96,11 @@ def main() -> None:
     rig = rig_of(cameras)
     tracker = BareHandTracker(rig, foreground=[learn_skin(image) for image in first])
     t_ns = round(1e9 * arguments.first / 30.0)
-    if arguments.start == "landmarks":
-        begin = pose_of(rig, first, [one[arguments.first] for one in points])
-        joints = forward(tracker.model, begin).joints
-        away = [np.linalg.norm(camera.project(joints) - one[arguments.first], axis=1)
-                for camera, one in zip(cameras, points, strict=True)]
-        print(f"the start fits its landmarks to px: median {np.median(away):.1f}, worst {np.max(away):.1f}")
-    else:
-        found = tracker.find(first, t_ns)
-        print("found" if found else "no hand found")
-        if not found:
-            return
-        state = tracker.filter.newest.state
-        begin = HandPose(root_of(state), state[ANGLES:VELOCITY].copy())
+    begin = pose_of(rig, first, [one[arguments.first] for one in points])
+    joints = forward(tracker.model, begin).joints
+    away = [np.linalg.norm(camera.project(joints) - one[arguments.first], axis=1)
+            for camera, one in zip(cameras, points, strict=True)]
+    print(f"the start fits its landmarks to px: median {np.median(away):.1f}, worst {np.max(away):.1f}")
     ways = ("contours", "contours and templates") if arguments.templates else ("contours",)
     for way in ways:  # from the same pose, in the same images
         tracker.start(begin, t_ns)

@@ -8,7 +8,8 @@ bare otherwise, and `landmarks`, what a detector reports of 21 joints with the m
 (`simulator.nodes.landmark_detector`). In a case with `-file` the hand is as its file says. Otherwise the drawn hand's
 bones are off by 5 % and its radii by 8 %, before clutter, and the size is estimated.
 
-All start from the true pose of the hand at rest; with `--found`, from what they find themselves. Errors and consistency
+All start from the true pose of the hand at rest; with `--found`, markers from what they find and contours from a pose
+that is shown. Errors and consistency
 are of the moving hand: `in 3 sigma` is the part of the joints' errors within their stated 3 sigma. `start s` is the
 time until the hand at rest is tracked. Searches beside the frames end before the next frame, so their time is not in
 it.
@@ -35,10 +36,11 @@ ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand"), str(ROOT / "benchmarks")]
 
 from bare_hand import CHI2_3, MOTIONS, mistaken  # noqa: E402
-from bare_scenes import DISTANCE_M, rig_of  # noqa: E402
+from bare_scenes import DISTANCE_M, near, rig_of  # noqa: E402
 from pictures import picture, two_cameras, wall  # noqa: E402
 from shipped_rig import RIGHT_HAND  # noqa: E402
 
+from rhot_app.barehand.start import start_pose_file  # noqa: E402
 from rhot_app.barehand.surface import capsules_of, ray_to_capsule, surface_of  # noqa: E402
 from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
@@ -148,7 +150,8 @@ def give_start(tracker: Tracker, pose: HandPose) -> None:
 def track(shown: Film, observe: str, case: str, start: HandPose | None) -> list[HandState | None]:
     """The last state after every step, None while the hand is not tracked."""
     rig = msgspec.structs.replace(shown.rig, tracker=TrackerSettings(
-        "estimator", observe=observe, float_scale=not case.endswith("-file")))
+        "estimator", observe=observe, float_scale=not case.endswith("-file"),
+        start_poses=(start_pose_file(near(shown.poses[0])),)))
     tracker, states = make_tracker(rig), []
     nodes = None
     if start is not None:

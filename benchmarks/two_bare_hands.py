@@ -34,7 +34,7 @@ ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand"), str(ROOT / "benchmarks")]
 
 from bare_hand import CHI2_3  # noqa: E402
-from bare_scenes import DISTANCE_M, model_and_surface, rig_of  # noqa: E402
+from bare_scenes import DISTANCE_M, model_and_surface, near, rig_of  # noqa: E402
 from pictures import picture_of, taken, two_cameras, wall  # noqa: E402
 from shipped_rig import LEFT_HAND  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
@@ -42,7 +42,7 @@ from tables import arguments, publish, table  # noqa: E402
 from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.skeleton import HandPose  # noqa: E402
-from rhot_app.project import Rig, TrackerSettings  # noqa: E402
+from rhot_app.project import Rig  # noqa: E402
 from rhot_app.simulator.scene.motion import load_motion  # noqa: E402
 from rhot_app.state import HandState  # noqa: E402
 from rhot_app.tracking.trackers import make_tracker  # noqa: E402
@@ -57,7 +57,7 @@ MOTIONS = ("grasp", "spread"), ("pinch", "grasp"), ("spread", "pinch")  # of rig
 ASIDE_M = 0.1  # of each hand from the middle
 IN_FRONT_M = 0.05
 OUT_M = 0.35  # so much farther to the left, no camera sees a hand
-STILL = 20  # frames for the search
+STILL = 20  # frames for the start
 CASES = "alone", "apart", "crossing", "leaving"
 
 
@@ -102,8 +102,9 @@ def film(case: str, seed: int, frames: int, still: int = STILL) -> Film:
     walls = [wall(camera, 10 * seed + k, False) for k, camera in enumerate(cameras)]
     images = [[picture_of([(model_and_surface(side)[1], poses[side][k]) for side in sides], camera, walls[c], k)
                for c, camera in enumerate(cameras)] for k in range(still + frames)]
-    rig = msgspec.structs.replace(rig_of(cameras), tracker=TrackerSettings("estimator",
-                                                                                         observe="contours"))
+    rig = rig_of(cameras, shown=[near(one[0], number) for number, one in enumerate(poses.values())])
+    rig = msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, kind="estimator",
+                                                                       observe="contours"))
     if case != "alone":
         rig = msgspec.structs.replace(rig, other_hand=LEFT_HAND)
     return Film(rig, poses, shown, [taken(one, 0) for one in walls], images)

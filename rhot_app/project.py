@@ -6,7 +6,7 @@ docs/rig.md describes the format. Nothing else on the master is configured anywh
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Final, Literal, NamedTuple
 
@@ -161,6 +161,12 @@ Observe = Literal["markers", "landmarks", "contours", "both", "landmarks_and_con
 """
 
 
+def _require_angles(names: Iterable[str], purpose: str) -> None:
+    unknown = sorted(set(names) - set(ANGLES))
+    if unknown:
+        raise ValueError(f"there is no joint angle {unknown[0]!r} {purpose}; they are {', '.join(ANGLES)}")
+
+
 class PalmPlane(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A plane on which the palm slides. `normal`: along the back of the hand, rig frame, of any length. `distance_m`:
     of the palm's origin, the wrist, from the rig frame's origin along it."""
@@ -173,6 +179,19 @@ class PalmPlane(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("the normal of a plane is not 0, 0, 0")
 
 
+class StartPose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A pose that a bare hand takes to be tracked by its contours: the palm's frame in the rig frame, as a camera's
+    pose, and joint angles of `hand.skeleton.ANGLES` that differ from a relaxed hand's."""
+
+    rotation_wxyz: tuple[float, float, float, float]
+    translation_m: tuple[Metres, Metres, Metres]
+    angles_deg: dict[str, Annotated[float, Meta(ge=-180, le=180)]] = {}
+
+    def __post_init__(self) -> None:
+        CameraPose(self.rotation_wxyz, self.translation_m)
+        _require_angles(self.angles_deg, "to start with")
+
+
 class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which tracker makes a hand of the markers, and what it may assume.
 
@@ -182,7 +201,8 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     2.2 to 2.4). `float_scale`: estimate the hand's size as it moves. `observe`: paint, landmarks, the contours of the
     bare hand, or two at once. `locked_deg`: angles of `hand.skeleton.ANGLES` that the hand holds there, or
     about there with a standard deviation. `palm_plane`:
-    the palm slides on it; one camera then suffices.
+    the palm slides on it; one camera then suffices. `start_poses`: of the hand and the other hand, in which contours
+    begin to be followed; without them one that the cameras see well (`barehand.start`).
     """
 
     kind: TrackerKind = "classic"
@@ -193,6 +213,7 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     observe: Observe = "markers"
     locked_deg: dict[str, float | tuple[float, Sd]] = {}
     palm_plane: PalmPlane | None = None
+    start_poses: Annotated[tuple[StartPose, ...], Meta(max_length=2)] = ()
 
     @property
     def by_markers(self) -> bool:
@@ -220,9 +241,7 @@ class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.kind == "classic" and self.observe != "markers":
             raise ValueError(f"the classic tracker knows markers only, and observe is \"{self.observe}\"; choose the "
                              "kind \"estimator\", or take observe away")
-        unknown = sorted(set(self.locked_deg) - set(ANGLES))
-        if unknown:
-            raise ValueError(f"there is no joint angle {unknown[0]!r} to lock; they are {', '.join(ANGLES)}")
+        _require_angles(self.locked_deg, "to lock")
 
 
 class CameraCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -110,7 +110,8 @@ class HandState:
 @dataclass(frozen=True, slots=True)
 class SeenContour:
     """What was seen of a bare hand in one image of a camera, for people to look at; places px, raw. `t_node_ns`: of the
-    image by its node's clock, 0 when that is not known. `hand`: 0 the rig's hand, 1 its other one.
+    image by its node's clock, 0 when that is not known. `hand`: 0 the rig's hand, 1 its other one. `shown`: no hand was
+    seen; this is the pose that it is to take.
 
     `contour` (N, 2): where the estimated hand's contour crosses the slices; `outline` (N,): before the background, not
     within the hand. `slices` (N, 4): their ends, x and y twice. `edges` (M, 2), `of_hand` (M,): which are the hand's.
@@ -125,6 +126,7 @@ class SeenContour:
     of_hand: NDArray[np.bool_]
     t_node_ns: int = 0
     hand: int = 0
+    shown: bool = False
 
 
 def no_hand(t_ns: int, condition: Condition, cameras: tuple[str, ...] = (), filter_s: float = 0.0,

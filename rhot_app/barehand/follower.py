@@ -1,4 +1,4 @@
-"""Tracks a bare hand from images alone: searches for it while there is none, and decides when it is lost."""
+"""Tracks a bare hand from images alone: waits until it takes its start pose, and decides when it is lost."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.key_frames import KeyFrames
-from rhot_app.barehand.relocalisation import SAME_POSE_M
+from rhot_app.barehand.start import HELD_NS, MAJORITY
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
@@ -19,25 +19,19 @@ from rhot_app.state import Condition, HandState, no_hand
 from rhot_node.detect.foreground import Foreground, foreground_at, gain_of, learn_skin
 
 Image = NDArray[np.uint8]
-Points = NDArray[np.float64]
-
-MAJORITY: Final = 0.5
-"""Part of the expected contour that must be found, and of the joints that must lie on foreground: more than half."""
-
-FASTEST_M_S: Final = 4.0
-"""m/s: twice the speed of the fastest motion in `resources/motions`. Chosen, not measured."""
 
 BLIND_NS: Final = 250_000_000
-"""ns: after longer without any image, a hand at `FASTEST_M_S` may have left the image, and the track is lost."""
+"""ns: after longer without any image the track is lost: a hand at 4 m/s, twice the speed of the fastest motion in
+`resources/motions`, may have left the image."""
 
 
 class HandFollower:
-    """One bare hand before the cameras of a rig: search, confirmation, tracking and loss."""
+    """One bare hand before the cameras of a rig: start, tracking and loss."""
 
     def __init__(self, rig: Rig, foreground: Sequence[Foreground] | None, *, known_size: bool,
                  empty_until_ns: int = 0) -> None:
-        """`foreground`: each camera's model; None: the colours of skin are learnt from every image that is searched.
-        `empty_until_ns`: master time before which no hand is searched for."""
+        """`foreground`: each camera's model; None: the colours of skin are learnt from every image until a hand has
+        taken the start pose. `empty_until_ns`: master time before which none is expected."""
         self.tracker = BareHandTracker(rig, known_size=known_size, foreground=foreground)
         self.key_frames = KeyFrames(self.tracker.model)
         self.starts = 0
@@ -45,7 +39,7 @@ class HandFollower:
         self._learns_skin, self._empty_until_ns = foreground is None, empty_until_ns
         self._names = tuple(node.name for node in rig.nodes)
         self._following = False
-        self._proposed: tuple[int, Points] | None = None
+        self._begun_ns: int | None = None
         self._count, self._image_ns = 0, 0
 
     @property
@@ -58,17 +52,16 @@ class HandFollower:
         self.tracker.foreground, self._learns_skin = list(foreground), False
 
     def start(self, pose: HandPose, t_ns: int) -> None:
-        """Start a confirmed track at a pose that somebody has shown (`BareHandTracker.start`)."""
-        self.tracker.start(pose, t_ns, verified=True)
-        self._following, self._image_ns = True, t_ns
+        """Start a track at a pose that somebody has shown (`BareHandTracker.start`)."""
+        self.tracker.start(pose, t_ns)
+        self._following, self._image_ns, self._empty_until_ns = True, t_ns, t_ns
         self._started()
 
     def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
         """The state after one image (H, W, 3) RGB of each camera, None where it has none, of master times `t_ns`.
         LOST or SEARCHING, without numbers, where no hand is found."""
         begun, following = time.perf_counter(), self._following
-        if not following and not self._find(images, min(t_ns)):
-            self._proposed = None
+        if not following and self._begun_ns is None and not self._begin(images, min(t_ns)):
             return self._none(min(t_ns), begun)
         state = self.tracker.step(images, t_ns)
         if any(image is not None for image in images):
@@ -76,7 +69,10 @@ class HandFollower:
             self._image_ns = max(t_ns)
         else:
             good = max(t_ns) - self._image_ns < BLIND_NS
-        self._following = good and (following or self._confirmed(state))
+        followed = following
+        if self._begun_ns is not None and (not good or min(t_ns) - self._begun_ns >= HELD_NS):
+            self._begun_ns, followed = None, good and self.tracker.holds(self.tracker.maps_of(images))
+        self._following = good and followed
         if not self._following:
             return self._none(min(t_ns), begun)
         if following:
@@ -90,15 +86,19 @@ class HandFollower:
     def _started(self) -> None:
         """Count a new track. Its hand may be another one than before, so the key frames begin anew."""
         self.starts += 1
-        self._proposed = None
+        self._begun_ns = None
         self.key_frames.clear()
 
-    def _find(self, images: Sequence[Image | None], t_ns: int) -> bool:
+    def _begin(self, images: Sequence[Image | None], t_ns: int) -> bool:
+        """Whether a hand has taken the start pose in these images."""
         if any(image is None for image in images) or t_ns < self._empty_until_ns:
             return False
         if self._learns_skin:
             self.tracker.foreground = [learn_skin(image) for image in images if image is not None]
-        return self.tracker.find(images, t_ns)
+        if not self.tracker.begin(images, t_ns):
+            return False
+        self._begun_ns = t_ns
+        return True
 
     def _supported(self, images: Sequence[Image | None]) -> bool:
         """Whether most of the expected contour is found in these images."""
@@ -124,17 +124,6 @@ class HandFollower:
                 if np.mean(np.array(values) > 0.5) <= MAJORITY:
                     return False
         return all(mostly_inside) if whole else any(mostly_inside)
-
-    def _confirmed(self, state: HandState) -> bool:
-        """Whether the search in the images before found the same pose. Searches are random: two agree on a wrong pose
-        less probably than one is wrong."""
-        before, self._proposed = self._proposed, (state.t_master_ns, state.joint_positions)
-        if before is None:
-            return False
-        centre, earlier = state.joint_positions.mean(axis=0), before[1].mean(axis=0)
-        pace = float(np.linalg.norm(centre - earlier)) / max(1e-9 * (state.t_master_ns - before[0]), 1e-3)
-        shape = np.linalg.norm((state.joint_positions - centre) - (before[1] - earlier), axis=1)
-        return pace < FASTEST_M_S and float(np.mean(shape)) < SAME_POSE_M
 
     def _none(self, t_ns: int, begun: float) -> HandState:
         self._count += 1

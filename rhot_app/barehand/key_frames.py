@@ -98,7 +98,7 @@ class KeyFrames:
     def __init__(self, model: HandModel) -> None:
         self._model = model
         self.kept: list[KeyFrame] = []
-        self._last_s, self._begun_anew = -np.inf, 0
+        self._last_s = -np.inf
         self._prior = np.diag(1.0 / SHAPE_SD**2)
 
     def clear(self) -> None:
@@ -106,11 +106,7 @@ class KeyFrames:
         self.kept, self._last_s = [], -np.inf
 
     def offer(self, tracker: BareHandTracker) -> None:
-        """Keep the newest frames of `tracker` if they add more information on the shape than a kept one does. Those
-        before the track began anew, perhaps with another hand, are discarded."""
-        if tracker.begun_anew != self._begun_anew:
-            self.clear()
-            self._begun_anew = tracker.begun_anew
+        """Keep the newest frames of `tracker` if they add more information on the shape than a kept one does."""
         knot = tracker.filter.newest
         frames = tuple(in_a_fit(frame) for frame in tracker.frames if frame is not None)
         if not frames or abs(knot.t_s - self._last_s) < MIN_INTERVAL_S:

@@ -1,8 +1,7 @@
-"""Finds a hand anywhere and in any pose, in the foreground of one image of each camera.
+"""The start of a bare hand that contours show: a pose is shown to the person, and the hand takes it (Rehg 1995).
 
-Candidates are positions where the foreground is as thick as a palm. At each, many rotations of a relaxed hand are
-scored by the foreground (`silhouette`), and the best of them with other postures of the fingers. A short search about
-each of the best selects those for a long one, by their log odds.
+Whether the hand has taken it is decided by the foreground of one image of each camera (`silhouette`): most joints lie
+on it, and the best pose near the shown one is more probable there than no hand.
 """
 
 from __future__ import annotations
@@ -10,105 +9,168 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import product
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from rhot_app.barehand.silhouette import CORRELATED, LogOddsMaps, log_odds_maps, score, score_steps, search
 from rhot_app.barehand.surface import SHAPE, Surface
-from rhot_app.geometry.camera import CameraModel, pixels_per_metre_facing, project_with_slope
-from rhot_app.geometry.transforms import rigid
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.transforms import quaternion_from_rotation, rigid, rotation_from_quaternion
+from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
-from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS, HandPose
+from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, FLEXIONS, JOINTS, HandPose
+from rhot_app.project import Rig, StartPose
 
 Array = NDArray[np.float64]
-_Candidate = tuple[float, Array, Array]  # a score, world_from_palm and angles
+ForegroundMaps = Sequence[NDArray[np.float32] | None]
+"""Foreground probabilities (h, w) of every STEP-th pixel of each camera, None of a camera without an image."""
 
 STEP = 8
 """px: spacing of the pixels of the foreground map."""
 
-ROTATIONS = 400
-"""Rotations of a relaxed hand that are scored at a candidate: 25 degrees apart."""
+START_SD = 0.015, 0.2, 0.2
+"""m, rad and rad: standard deviations of position, rotation and angles of a given start, such as a pose that a person
+takes: about a thumb's breadth."""
 
-TURNS = 60
-"""Rotations of a palm on a plane about its normal: 6 degrees apart. Chosen, not tuned."""
+MAJORITY = 0.5
+"""Part of the expected contour that must be found, and of the joints that must lie on foreground: more than half."""
 
-RESCORED = 80
-"""Best rotations, of all candidates, that are scored with the other postures. Chosen, not tuned."""
+HELD_NS = 300_000_000
+"""ns: so long a hand holds the start pose before it is followed. Chosen: a hand that passes by is gone by then."""
 
-KEPT, FIRST_ROUNDS = 20, 15
-"""Best poses about which a short search is made, and its rounds (`silhouette.search`). Chosen: enough to rank them."""
+FOUND = 0.85
+"""Part of the expected contour that is found of a hand that is followed from its start pose. Of drawn hands with errors
+below 3 mm 0.88 to 1.0 was found, of wrong poses on hands, forearms and faces mostly less."""
 
-REFINED, LAST_ROUNDS = 4, 120
-"""Best poses of the short searches about which a long one is made, and its rounds. Chosen, not tuned."""
+AGREEMENT = 0.4
+"""Log odds per pixel of such a hand and its ring, if every other pixel were foreground. Of the same hands 0.46 to 0.99;
+of wrong poses 0.46 at most, and then less of the contour was found."""
 
-PALMS, PEAKS = 6, 24
-"""Most candidate positions of a palm, of all cameras together, and most thick parts of each camera's foreground that
-they are triangulated from. Chosen: a scene has fewer."""
+NEAR_SHARE = 0.25
+"""Part of the joints of the shown pose that must lie on foreground before a hand is looked for there. Chosen: fingers
+that are a finger's breadth off miss the hand."""
+
+ROUNDS = 15
+"""Rounds of a search about a pose (`silhouette.search`). Chosen: enough to rank postures."""
+
+UPRIGHT = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""camera_from_palm of a hand that shows its palm to a camera, fingers up."""
+
+HEIGHT_PART, NEAR_M, FAR_M = 0.5, 0.25, 1.5
+"""Part of an image's height that a shown hand fills, and the bounds of its distance, m. Chosen: it stays in the image
+when it moves by its own length."""
+
+ASIDE_M = 0.1
+"""m: of a shown hand from the middle, where there are two."""
 
 _CURLS_DEG = ((5.0, 10.0, 5.0), (20.0, 30.0, 20.0), (65.0, 80.0, 45.0))  # MCP, PIP, DIP: open, relaxed, closed
+_MIDDLE_TIP = JOINTS.index("middle_tip")
 _THUMB_STEP = 0.5  # rad to either side of a relaxed thumb: a third of its range
-_SPREAD = 0.03, 0.35, 0.35  # m, rad, rad: prior standard deviations about a scored pose, which are as far apart
-_PALM_RADIUS = 0.36, 1.7  # bounds, relative to half the palm's breadth; from the side, it is half as thick
 
 
-def find_hand(foreground: Sequence[NDArray[np.float32] | None], cameras: Sequence[CameraModel], model: HandModel,
-              surface: Surface, rng: np.random.Generator, plane: PalmOnPlane | None = None) -> HandPose | None:
-    """The most probable pose, of the file's shape, in foreground probabilities (h, w) of every STEP-th pixel of each
-    camera, None of a camera without an image. `plane`: on which the palm lies.
-
-    Returns None without foreground as thick as a palm, or if every candidate fails this test: the hand and its ring,
-    without the forearm, must be more probable than if each pixel were foreground with probability 0.5. Otherwise a
-    large foreground, such as a face, is accepted for the few pixels that a fist covers.
-    """
-    size = np.zeros(SHAPE)
-    used = [c for c, one in enumerate(foreground) if one is not None]
-    maps = [one for one in foreground if one is not None]
-    lenses = [cameras[c].camera_from_world[:3] for c in used], [cameras[c].intrinsics for c in used]
-    odds, even = log_odds_maps(maps, STEP, *lenses), log_odds_maps(maps, STEP, *lenses, rate=0.5)
-    breadth = 0.5 * float(model.base[1, 1] - model.base[4, 1] + model.radii[1, 0] + model.radii[4, 0])
-    centres = _palm_centres(maps, [cameras[c] for c in used], breadth)
-    found: list[_Candidate] = []
-    postures = _postures(model)
-    if plane is None:
-        turns = Rotation.random(ROTATIONS, random_state=int(rng.integers(2**31))).as_matrix()
-    else:
-        met = [plane.met_by(cameras[used[0]].centre, centre) for centre in centres]
-        centres, turns = [centre for centre in met if centre is not None], plane.turns(TURNS)
-    tried: list[_Candidate] = []
-    middle = np.array([0.6 * model.base[2, 0], 0.0, 0.0])
-
-    def try_pose(world: Array, angles: Array) -> None:
-        value = float(score_steps(surface, world, angles, np.zeros((1, 27)), model.limits, size, odds)[0])
-        tried.append((value, world, angles))
-
-    for centre, turn in product(centres, turns):
-        try_pose(rigid(turn, centre - turn @ middle), postures[0])
-    tried.sort(key=lambda one: -one[0])
-    for (_, world, _), angles in product(tried[:RESCORED], postures[1:]):
-        try_pose(world, angles)
-    tried.sort(key=lambda one: -one[0])
-    covariance = np.diag(np.repeat(np.square(_SPREAD), (3, 3, 21)))
-    covariance[6:, 6:] = np.linalg.inv(model.pose_prior.information + np.eye(21) / _SPREAD[2] ** 2)
+def shown_pose(rig: Rig, cameras: Sequence[CameraModel], model: HandModel, plane: PalmOnPlane | None = None,
+               aside: float = 0.0) -> HandPose:
+    """The pose that a hand is to take: the rig's; else a relaxed hand in the middle of the cameras' views that shows
+    the first camera its palm, or that lies on the `plane`. `aside`: m to the first camera's right."""
+    angles = model.pose_prior.mean.copy()
+    for given in rig.tracker.start_poses[:1]:
+        for name, degrees in given.angles_deg.items():
+            angles[ANGLES.index(name)] = np.radians(degrees)
+        return HandPose(rigid(rotation_from_quaternion(given.rotation_wxyz), np.array(given.translation_m)), angles)
+    first = cameras[0]
+    middle, turn = _middle(rig, cameras, model), first.world_from_camera[:3, :3] @ UPRIGHT
     if plane is not None:
-        covariance = plane.narrowed(covariance)
-    for _, world, angles in _distinct(tried, KEPT):
-        moved, bent = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
-        bent = choose_postures(surface, moved, bent, model, size, odds)
-        found.append((log_odds(surface, moved, bent, model, size, odds), moved, bent))
-    found.sort(key=lambda one: -one[0])
-    refined = []
-    for _, world, angles in found[:REFINED]:
-        moved, bent = search(surface, world, angles, covariance, model.limits, size, odds, rng, LAST_ROUNDS)
-        moved, bent = settle(surface, moved, bent, covariance, model, size, odds, rng)
-        if score(surface, moved, bent, size, even)[1][:, [0, 2]].sum() > 0.0:
-            refined.append((log_odds(surface, moved, bent, model, size, odds), moved, bent))
-    if not refined:
+        met = plane.met_by(first.centre, middle)
+        middle = middle if met is None else met
+        turn = plane.facing(-first.world_from_camera[:3, 1])
+    middle = middle + aside * first.world_from_camera[:3, 0]
+    centre = np.array([0.5 * _length(model), 0.0, 0.0])
+    return HandPose(rigid(turn, middle - turn @ centre), angles)
+
+
+def start_pose_file(pose: HandPose) -> StartPose:
+    """A pose as a rig file has it."""
+    w, x, y, z = (float(value) for value in quaternion_from_rotation(pose.world_from_palm[:3, :3]))
+    px, py, pz = (float(value) for value in pose.world_from_palm[:3, 3])
+    return StartPose((w, x, y, z), (px, py, pz), dict(zip(ANGLES, np.degrees(pose.angles).tolist(), strict=True)))
+
+
+def _length(model: HandModel) -> float:
+    """m: of an open hand, from the wrist to the middle finger's tip."""
+    return float(forward(model, HandPose(np.eye(4), np.zeros(21))).joints[_MIDDLE_TIP, 0])
+
+
+def _middle(rig: Rig, cameras: Sequence[CameraModel], model: HandModel) -> Array:
+    """(3,) m: where the cameras' axes come nearest to each other, if that is before all of them; else before their
+    middle, where the rig was calibrated for, or where a hand is as large as HEIGHT_PART."""
+    axes = np.array([camera.world_from_camera[:3, 2] for camera in cameras])
+    centres = np.array([camera.centre for camera in cameras])
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    met, *_ = np.linalg.lstsq(across.sum(axis=0), np.einsum("cij,cj->i", across, centres), rcond=1e-3)
+    depths = np.sum((met - centres) * axes, axis=1)
+    if len(cameras) > 1 and (depths > NEAR_M).all() and (depths < FAR_M).all():
+        return np.asarray(met)
+    distance = cameras[0].intrinsics[1] * _length(model) / (HEIGHT_PART * cameras[0].height)
+    if rig.calibration is not None:
+        distance = rig.calibration.distance_m
+    distance = np.clip(distance, NEAR_M, FAR_M)
+    return np.asarray(centres.mean(axis=0) + distance * axes[0])
+
+
+def taken_pose(shown: HandPose, maps: ForegroundMaps, cameras: Sequence[CameraModel], model: HandModel,
+               surface: Surface, rng: np.random.Generator, plane: PalmOnPlane | None = None) -> HandPose | None:
+    """The pose about the `shown` one that a hand of the file's shape has taken in foreground maps; None without.
+
+    In every map some of the joints must lie on foreground where they are shown, and most where they are found.
+    `agreement` must be positive there. All this only saves work: whether it is the hand is told by `holds`.
+    """
+    used = [camera for camera, one in zip(cameras, maps, strict=True) if one is not None]
+    known = [one for one in maps if one is not None]
+    if not known or not _on_foreground(shown, known, used, model, NEAR_SHARE):
         return None
-    _, world, angles = max(refined, key=lambda one: one[0])
-    return HandPose(world, angles)
+    lenses = [camera.camera_from_world[:3] for camera in used], [camera.intrinsics for camera in used]
+    covariance = np.diag(np.repeat(np.square(START_SD), (3, 3, 21)))
+    covariance[6:, 6:] = np.linalg.inv(model.pose_prior.information + np.eye(21) / START_SD[2] ** 2)
+    size = np.zeros(SHAPE)
+    world, angles = settle(surface, shown.world_from_palm, shown.angles, covariance, model, size,
+                           log_odds_maps(known, STEP, *lenses), rng, plane)
+    found = HandPose(world, angles)
+    if agreement(found, size, maps, cameras, surface) <= 0.0 or not _on_foreground(found, known, used, model, MAJORITY):
+        return None
+    return found
+
+
+def agreement(pose: HandPose, size: Array, maps: ForegroundMaps, cameras: Sequence[CameraModel],
+              surface: Surface) -> float:
+    """Log odds per pixel of a hand of the shape `size` (SHAPE,) in foreground maps, and of the ring about it, if each
+    pixel of the rest were foreground with probability 0.5: a large foreground, such as a face, has less."""
+    used = [(camera, one) for camera, one in zip(cameras, maps, strict=True) if one is not None]
+    even = log_odds_maps([one for _, one in used], STEP, [camera.camera_from_world[:3] for camera, _ in used],
+                         [camera.intrinsics for camera, _ in used], rate=0.5)
+    _, parts = score(surface, pose.world_from_palm, pose.angles, size, even)
+    return float((parts[:, 0] + parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
+
+
+def _on_foreground(pose: HandPose, maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraModel],
+                   model: HandModel, share: float) -> bool:
+    joints = forward(model, pose).joints
+    return all(min(joints_on_foreground(camera, joints, one, STEP)) > share
+               for camera, one in zip(cameras, maps, strict=True))
+
+
+def joints_on_foreground(camera: CameraModel, joints: Array, probability: NDArray[np.float32],
+                         step: int) -> tuple[float, float]:
+    """Part of `joints` (J, 3) m, world, that project into a camera's image where the foreground (h, w) of every
+    `step`-th pixel is known, and the part of these that lie on foreground."""
+    places = camera.project(joints)
+    with np.errstate(invalid="ignore"):
+        inside = np.all((places > -0.5) & (places < [camera.width - 0.5, camera.height - 0.5]), axis=1)
+    rows, columns = probability.shape
+    x, y = (places[inside] // step).astype(int).T
+    shown = probability[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)]
+    shown = shown[~np.isnan(shown)]
+    return len(shown) / len(places), float(np.mean(shown > 0.5)) if len(shown) else 0.0
 
 
 def log_odds(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array, odds: LogOddsMaps) -> float:
@@ -125,9 +187,9 @@ def settle(surface: Surface, world: Array, angles: Array, covariance: Array, mod
     if plane is not None:
         covariance = plane.narrowed(covariance)
     angles = choose_postures(surface, world, angles, model, size, odds)
-    moved, bent = search(surface, world, angles, covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
+    moved, bent = search(surface, world, angles, covariance, model.limits, size, odds, rng, ROUNDS)
     bent = choose_postures(surface, moved, bent, model, size, odds)
-    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, odds, rng, FIRST_ROUNDS)
+    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, odds, rng, ROUNDS)
 
 
 def choose_postures(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array,
@@ -158,93 +220,3 @@ def choose_postures(surface: Surface, world: Array, angles: Array, model: HandMo
         best = int(np.argmax(score_steps(surface, world, angles, steps, model.limits, size, odds)))
         angles += steps[best, 6:]
     return angles
-
-
-def _distinct(tried: list[_Candidate], most: int) -> list[_Candidate]:
-    """The best poses of which no two are nearer than half a radian and `_SPREAD[0]`, m."""
-    kept: list[_Candidate] = []
-    for one in tried:
-        if all(np.trace(one[1][:3, :3].T @ other[1][:3, :3]) < 1.0 + 2.0 * np.cos(0.5)
-               or np.linalg.norm(one[1][:3, 3] - other[1][:3, 3]) > _SPREAD[0] for other in kept):
-            kept.append(one)
-            if len(kept) == most:
-                break
-    return kept
-
-
-def _postures(model: HandModel) -> list[Array]:
-    """Angles (21,) of a relaxed, an open, a closed and a pointing hand; locked angles are those of the prior."""
-    out = []
-    for curl in _CURLS_DEG:
-        angles = model.pose_prior.mean.copy()
-        for flexions in FLEXIONS[1:]:
-            angles[list(flexions)] = np.radians(curl)
-        out.append(angles)
-    pointing = out[2].copy()
-    pointing[list(FLEXIONS[1])] = np.radians(_CURLS_DEG[0])
-    held = list(model.locked)
-    for angles in (*out, pointing):
-        angles[held] = model.pose_prior.mean[held]
-    return [out[1], out[0], out[2], pointing]
-
-
-def _palm_centres(maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraModel], breadth: float) -> list[Array]:
-    """Candidate positions (3,) m of palms: thick foreground triangulated from two cameras, or placed by its size before
-    one."""
-    peaks = [_largest_discs(one) for one in maps]
-    found: list[tuple[float, Array]] = []
-    for a in range(len(maps)):
-        for b in range(a):
-            for p, q in product(peaks[a], peaks[b]):
-                rays = [cameras[k].undistort(peak[None, :2])[0] for k, peak in ((a, p), (b, q))]
-                matrices = [cameras[k].camera_from_world[:3] for k in (a, b)]
-                point = cv2.triangulatePoints(matrices[0], matrices[1], rays[0].reshape(2, 1), rays[1].reshape(2, 1))
-                place = (point[:3] / point[3]).ravel()
-                error = 0.0
-                for k, peak in ((a, p), (b, q)):
-                    pixel = cameras[k].project(place)[0]
-                    error += float(np.linalg.norm(pixel - peak[:2]) / peak[2]) if np.isfinite(pixel).all() else np.inf
-                    error += _size_error(cameras[k], place, peak[2], breadth)
-                if np.isfinite(error):
-                    found.append((error, place))
-    if len(maps) == 1:
-        camera = cameras[0]
-        for peak in peaks[0]:
-            ray = camera.world_from_camera[:3, :3] @ np.append(camera.undistort(peak[None, :2])[0], 1.0)
-            place = camera.centre + _scale(camera, camera.centre + ray) * breadth / peak[2] * ray
-            if np.isfinite(place).all():
-                found.append((0.0, place))
-    found.sort(key=lambda one: one[0])
-    return [place for _, place in found[:PALMS]]
-
-
-def _scale(camera: CameraModel, place: Array) -> float:
-    """px per m of what faces the camera at a position; NaN where it sees nothing."""
-    _, slopes = project_with_slope(place[None], camera.camera_from_world, camera.intrinsics)
-    return pixels_per_metre_facing(slopes[0], camera.camera_from_world)
-
-
-def _size_error(camera: CameraModel, place: Array, radius: float, breadth: float) -> float:
-    """Absolute log ratio of a radius px to that of a palm at a position; inf beyond _PALM_RADIUS."""
-    ratio = radius / (_scale(camera, place) * breadth)
-    return abs(float(np.log(ratio))) if _PALM_RADIUS[0] < ratio < _PALM_RADIUS[1] else np.inf
-
-
-def _largest_discs(probability: NDArray[np.float32]) -> list[Array]:
-    """(3,) px centre x, y and radius of the largest discs inside the foreground, largest first, with distinct
-    centres."""
-    solid = (probability > 0.5).astype(np.uint8)
-    distance = cv2.distanceTransform(cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_REPLICATE), cv2.DIST_L2, 5)
-    distance = distance[1:-1, 1:-1].copy()
-    ridge = (distance >= cv2.dilate(distance, np.ones((3, 3)))) & (distance > 1.0)
-    rows, columns = np.nonzero(ridge)
-    order = np.argsort(-distance[rows, columns])
-    out: list[Array] = []
-    for k in order:
-        radius = float(distance[rows[k], columns[k]])
-        place = np.array([(columns[k] + 0.5) * STEP - 0.5, (rows[k] + 0.5) * STEP - 0.5, radius * STEP])
-        if all(np.linalg.norm(place[:2] - other[:2]) > 0.7 * other[2] for other in out):
-            out.append(place)
-            if len(out) == PEAKS:
-                break
-    return out

@@ -28,7 +28,16 @@ from rhot_app.barehand.contours import STEP_M, contour_points
 from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
 from rhot_app.barehand.relocalisation import ODDS_DROP, Relocaliser, pose_of
-from rhot_app.barehand.start import STEP
+from rhot_app.barehand.start import (
+    AGREEMENT,
+    FOUND,
+    START_SD,
+    STEP,
+    ForegroundMaps,
+    agreement,
+    shown_pose,
+    taken_pose,
+)
 from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, PALM, SHAPE, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
@@ -75,10 +84,6 @@ REACH = 3.0
 
 LONGEST_PX = REACH * CONFUSED_PX + 6.0
 """px: half of the longest slice. Farther away, the edges of other fingers are as probable."""
-
-START_SD = 0.015, 0.2, 0.2
-"""m, rad and rad: standard deviations of position, rotation and angles of a given start, such as one from landmarks:
-about a thumb's breadth."""
 
 PASSES, START_PASSES = 2, 6
 """Searches of an image, and of the first one after a start or a relocalisation. Each search halves the standard
@@ -130,11 +135,12 @@ class BareHandTracker:
     """One bare hand before the cameras of a rig."""
 
     def __init__(self, rig: Rig, *, mode: Literal["contour", "feature"] = "contour", known_size: bool = True,
-                 foreground: Sequence[Foreground] | None = None, row_s: Sequence[float] | None = None) -> None:
+                 foreground: Sequence[Foreground] | None = None, row_s: Sequence[float] | None = None,
+                 aside: float = 0.0) -> None:
         """`mode`: slices across the visible contour, or across the links' axes (`features`). `known_size`: the prior of
         lengths and radii is the rig's hand file with the standard deviations there; otherwise the variation of adults
         about it. `foreground`: each camera's model of hand and background; uninformative by default. `row_s`: each
-        camera's time between two rows, s; 0 by default."""
+        camera's time between two rows, s; 0 by default. `aside`: see `shown_pose`."""
         self.mode = mode
         self.model = with_locked(build_model(rig.hand), rig.tracker.locked_deg)
         plane = rig.tracker.palm_plane
@@ -160,19 +166,19 @@ class BareHandTracker:
         self.constraints: list[Residual] = [JointLimits(self.model.limits)]
         if self.plane is not None:
             self.constraints.append(self.plane)
-        self.tracking = self.verified = False
+        self.tracking = False
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
-        self._sequence, self._epoch_ns, self._first_update, self.begun_anew = 0, 0, False, 0
+        self._sequence, self._epoch_ns, self._first_update = 0, 0, False
         self.relocaliser = Relocaliser(self.model, self.surface, self.cameras, self.plane)
+        self.start_pose = shown_pose(rig, self.cameras, self.model, self.plane, aside)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
     def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD,
-              size: Array | None = None, verified: bool = False) -> None:
+              size: Array | None = None) -> None:
         """Start a track at a pose whose position, rotation and angles have standard deviations `place_sd`, m, rad and
-        rad. `size` (SHAPE,): the shape to start with, 0 by default. `verified`: something else than contours shows the
-        pose, a person or markers; only then is the state ever TRACKING, as contours also fit what is no hand."""
-        self.verified = verified
+        rad. `size` (SHAPE,): the shape to start with, 0 by default. Contours also fit what is no hand, so something
+        else must have shown the pose: a person who has taken `start_pose`, or markers."""
         self._epoch_ns = t_ns
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, place_sd[:2])
         known = np.linalg.inv(covariance[6:POSE, 6:POSE]) + np.eye(POSE - 6) / place_sd[2] ** 2
@@ -185,24 +191,40 @@ class BareHandTracker:
         self.relocaliser.restart()
         self.frames = [None] * len(self.cameras)
 
-    def find(self, images: Sequence[Image | None], t_ns: int) -> bool:
-        """Search the whole images for a hand and start a track at the most probable pose. False without any."""
-        maps = [None if image is None else foreground_map(image, learnt, STEP)
+    def begin(self, images: Sequence[Image | None], t_ns: int) -> bool:
+        """Start a track if a hand has taken `start_pose` in these images. Returns whether it has."""
+        pose = self.taken(self.maps_of(images))
+        self.tracking = pose is not None
+        if pose is not None:
+            self.start(pose, t_ns)
+        return self.tracking
+
+    def maps_of(self, images: Sequence[Image | None]) -> list[NDArray[np.float32] | None]:
+        """Foreground probabilities of every STEP-th pixel of each image; None without an image."""
+        return [None if image is None else foreground_map(image, learnt, STEP)
                 for image, learnt in zip(images, self.foreground, strict=True)]
-        pose = self.relocaliser.search_globally(maps, self.relocaliser.rng)
-        if pose is None:
-            self.tracking = False
-            return False
-        self.start(pose, t_ns)
-        return True
+
+    def taken(self, maps: ForegroundMaps) -> HandPose | None:
+        """The pose about `start_pose` that a hand has taken (`start.taken_pose`)."""
+        return taken_pose(self.start_pose, maps, self.cameras, self.model, self.surface, self.relocaliser.rng,
+                          self.plane)
+
+    def holds(self, maps: ForegroundMaps, state: Array | None = None) -> bool:
+        """Whether the last images and these maps show a hand in the newest state, or in `state` (n,) at the maps' time:
+        FOUND of its contour and AGREEMENT of its foreground."""
+        found, expected = self.fit.slice_counts.sum(axis=(0, 1))
+        state = self.filter.newest.state if state is None else state
+        known = any(one is not None for one in maps)
+        return bool(found > FOUND * expected > 0.0 and known and AGREEMENT < agreement(
+            pose_of(state), state[BIAS:BIAS + SHAPE].copy(), maps, self.cameras, self.surface))
 
     def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
         """The hand after one image (H, W, 3) RGB of each camera, None without one, at master times `t_ns`. Raises
         TrackingError before a start."""
         begun = time.perf_counter()
         if not self.tracking:
-            raise TrackingError("the bare hand has no start; give one by start(pose, t_ns), or find one by "
-                                "find(images, t_ns)")
+            raise TrackingError("the bare hand has no start; give one by start(pose, t_ns), or by begin(images, t_ns) "
+                                "once it has taken its start pose")
         given = {c: image for c, image in enumerate(images) if image is not None}
         if given:
             newest = max(t_ns[c] for c in given)
@@ -217,15 +239,11 @@ class BareHandTracker:
         prediction, since_s = self.filter.predict(t_s), t_s - self.filter.newest.t_s
         self.prepare_update(images, t_s)
         self.frames = [frame if c in images else None for c, frame in enumerate(self.frames)]
-        maps, relocaliser, start, anew = self._maps(images), self.relocaliser, None, False
+        maps, relocaliser, start = self._maps(images), self.relocaliser, None
         odds = None if maps is None else relocaliser.odds_of(maps)
         if maps and odds and (self._first_update or relocaliser.search_due(odds, prediction[0], t_s)):
-            everywhere = relocaliser.global_search_due(maps, t_s)
-            start, anew, same = relocaliser.relocalise(maps, prediction, self.process.stationary, since_s, everywhere)
+            start = relocaliser.relocalise(maps, prediction, self.process.stationary, since_s)
             relocaliser.last_search_s = t_s
-            relocaliser.schedule_global_search(t_s, relocalised=start is not None, same=same)
-            if start is not None and anew:
-                prediction = self.restart(t_s, start, anew=True)
         initial = prediction[0] if start is None else start
         passes = START_PASSES if self._first_update or start is not None else PASSES
         knot = self._fit(images, late, t_s, prediction, initial, extra, passes)
@@ -233,9 +251,9 @@ class BareHandTracker:
             per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
             if start is not None and per_pixel < relocaliser.log_odds_per_pixel(odds, start) - ODDS_DROP:
                 # Edges have drawn the pose away from the foreground: restart there, without the prediction.
-                knot = self._fit(images, late, t_s, self.restart(t_s, start, anew=anew), start, extra, START_PASSES)
+                knot = self._fit(images, late, t_s, self._restart(t_s, start), start, extra, START_PASSES)
                 per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
-            relocaliser.average(per_pixel, first=self._first_update or anew)
+            relocaliser.average(per_pixel, first=self._first_update)
         self._first_update = False
         return knot
 
@@ -252,17 +270,13 @@ class BareHandTracker:
         share = min(max(t_s - last_s, 0.0) / SAME_POSE_S, 1.0) if cameras else 0.0
         self.filter.partial = Partial(PHALANGES, share)
 
-    def restart(self, t_s: float, start: Array, *, anew: bool = False) -> tuple[Array, Array]:
-        """Restart the filter at rest in the pose of the state `start`. The shape is that of `start`, with the newest
-        covariance of the shape; `anew`: the file's with its prior, and the track is another one. Returns state (n,) and
-        covariance (n, n)."""
+    def _restart(self, t_s: float, start: Array) -> tuple[Array, Array]:
+        """Restart the filter at rest in the pose and shape of the state `start`, with the newest covariance of the
+        shape. Returns state (n,) and covariance (n, n)."""
         pose = pose_of(start)
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
-        if anew:
-            self.begun_anew += 1
-        else:
-            state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
-            covariance[own, own] = self.filter.newest.covariance[own, own]
+        state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
+        covariance[own, own] = self.filter.newest.covariance[own, own]
         self.filter.start(t_s, state, covariance)
         return state, covariance
 
@@ -354,8 +368,7 @@ class BareHandTracker:
         t_ns = self._epoch_ns + round(1e9 * knot.t_s)
         return HandState(
             sequence=self._sequence - 1, t_master_ns=t_ns, t_receive_ns=t_ns,
-            condition=(Condition.TRACKING if self.verified and np.all(observing[[*range(6)]] >= 1)
-                       else Condition.PARTIAL),
+            condition=Condition.TRACKING if np.all(observing[[*range(6)]] >= 1) else Condition.PARTIAL,
             marker_ids=(), marker_positions=no_markers, marker_raw_positions=no_markers,
             marker_covariances=np.empty((0, 3, 3)), marker_knowledge=np.empty(0, np.uint8), camera_names=self.names,
             camera_pixels=np.empty((cameras, 0, 2)), camera_flags=np.empty((cameras, 0), np.uint16),

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from rhot_app.barehand.start import start_pose_file
 from rhot_app.errors import TrackingError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import exp_so3
@@ -55,7 +56,11 @@ LOSS_S: Final = (1.5, 2.0)
 """When cameras deliver no pictures, where a case says so."""
 
 START_SD: Final = (0.015, 0.2, 0.2)
-"""Standard deviations of a random start: place m, rotation rad, angles rad; a thumb's breadth and half a finger's."""
+"""Standard deviations of a random start, and of a person's hand about a pose that is shown: place m, rotation rad,
+angles rad; a thumb's breadth and half a finger's."""
+
+HOLDS_S: Final = 0.8
+"""How long a hand holds the pose that it was shown. Chosen: a person holds still for a second when asked to."""
 
 _OLD_NS = 1_000_000  # a state that is older than its newest picture by more says nothing of it
 _OLD_LIVE_NS = round(2e9 / RATE_HZ)  # live, a state waits for the edges of all cameras, up to a period
@@ -73,9 +78,10 @@ class EvaluatedTracker(Protocol):
 @dataclass(frozen=True)
 class Case:
     """One way to film a hand and to begin. `start`: "pose": the tracker is given the true pose at first, "random":
-    that pose with `START_SD`, "nothing". `lost`: cameras without pictures during `LOSS_S`; the case is then judged from
-    there on. `cameras`: how many the rig has. `known_size`: the hand was measured. `live`: nodes search the pictures
-    for the live tracker, which is given nothing. Every case shows the background alone at first."""
+    that pose with `START_SD`, "shown": a pose that the hand takes within `START_SD`, and holds for `HOLDS_S`. `lost`:
+    cameras without pictures during `LOSS_S`; the case is then judged from there on. `cameras`: how many the rig has.
+    `known_size`: the hand was measured. `live`: nodes search the pictures for the live tracker. Every case shows the
+    background alone at first."""
 
     name: str
     options: BareHandOptions
@@ -96,14 +102,14 @@ _MATCHED = BareHandOptions(forearm=False, enters_after_s=0.3)
 
 CASES: Final = (
     Case("matched", _MATCHED),
-    Case("mismatched, nothing given", _MISMATCH, "nothing", known_size=False),
+    Case("mismatched, shown start", _MISMATCH, "shown", known_size=False),
     Case("mismatched, random start", _MISMATCH, "random", known_size=False),
     Case("one camera lost 0.5 s", _MATCHED, lost=(1,)),
     Case("both cameras lost 0.5 s", _MATCHED, lost=(0, 1)),
     Case("random start", _MATCHED, "random"),
     Case("one camera alone", _MATCHED, cameras=1),
-    Case("live, matched", _MATCHED, "nothing", live=True),
-    Case("live, mismatched", _MISMATCH, "nothing", known_size=False, live=True),
+    Case("live, matched", _MATCHED, "shown", live=True),
+    Case("live, mismatched", _MISMATCH, "shown", known_size=False, live=True),
 )
 
 
@@ -134,7 +140,8 @@ def filmed(case: Case, seed: int, seconds: float, kept_in: Path | None) -> BareH
     """The sequence of a case and a seed."""
     rig = bare_hand_rig("right" if seed % 2 else "left")
     rig = msgspec.structs.replace(rig, hand=scaled_hand(rig.hand, SCALES[seed % len(SCALES)]))
-    options = replace(case.options, lost=tuple((camera, *LOSS_S) for camera in case.lost),
+    options = replace(case.options, holds_s=HOLDS_S * (case.start == "shown"),
+                      lost=tuple((camera, *LOSS_S) for camera in case.lost),
                       sleeve=case.options.forearm and seed % 3 == 0, facing="back" if seed % 4 == 0 else "palm")
     return bare_hand_sequence(rig, MOTIONS[seed % len(MOTIONS)], seconds, RATE_HZ, seed, options, kept_in)
 
@@ -153,11 +160,15 @@ def run_case(case: Case, make: MakeTracker, seeds: Iterable[int], seconds: float
 def run_sequence(case: Case, sequence: BareHandSequence, make: MakeTracker) -> EvaluatedRun:
     """A tracker through one sequence."""
     given = msgspec.structs.replace(sequence.tracker_rig, nodes=sequence.tracker_rig.nodes[:case.cameras])
+    if case.start == "shown":
+        held = sequence.truth_at(round(1e9 * sequence.source.moves_s)).pose
+        poses = (start_pose_file(_about(held, sequence.seed)),)
+        given = msgspec.structs.replace(given, tracker=msgspec.structs.replace(given.tracker, start_poses=poses))
     tracker = make(given, case)
     states: list[HandState | None] = []
     frames: list[BareHandFrame] = []
     step_s: list[float] = []
-    started = case.start == "nothing"
+    started = case.start == "shown"
     for frame in sequence.frames():
         if not started and frame.truth.in_view:
             cast(_Startable, tracker).start(_start(case, sequence.seed, frame), frame.t_ns[0])
@@ -187,9 +198,11 @@ def _stepped(tracker: EvaluatedTracker, images: Sequence[Picture | None], t_ns: 
 
 def _start(case: Case, seed: int, frame: BareHandFrame) -> HandPose:
     """What a tracker is told to begin with: the true pose, or one near it."""
-    pose = frame.truth.pose
-    if case.start == "pose":
-        return pose
+    return frame.truth.pose if case.start == "pose" else _about(frame.truth.pose, seed)
+
+
+def _about(pose: HandPose, seed: int) -> HandPose:
+    """A pose drawn about another one, with START_SD."""
     rng = np.random.default_rng([seed, 0x57A])
     place, turn, angles = START_SD
     world = pose.world_from_palm.copy()
@@ -303,7 +316,7 @@ def evaluate_bare_hand(make: MakeTracker, seeds: Iterable[int], seconds: float, 
     """Case by case, all seeds of it. A first sequence is run before anything is timed, so that all is compiled."""
     chosen = list(seeds)
     for case in (cases[0], *cases):
-        if case.start != "nothing":
+        if case.start != "shown":
             run_sequence(case, filmed(case, chosen[0], min(seconds, 0.5 + ENTRY_S), kept_in), make)
             break
     for number, case in enumerate(cases):

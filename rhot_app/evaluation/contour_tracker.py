@@ -1,5 +1,5 @@
 """The contour trackers as a user runs them, offline and live: they learn the background of the first pictures, then
-look for a hand."""
+wait for a hand that takes the start pose."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ which every case of the evaluation shows the background alone."""
 
 
 class ContourTracker:
-    """A `HandFollower` of the evaluation. `finds`: it looks for a hand from the beginning, else from `start` on."""
+    """A `HandFollower` of the evaluation. `waits`: it waits for a hand from the beginning, else from `start` on."""
 
-    def __init__(self, rig: Rig, *, known_size: bool, finds: bool) -> None:
+    def __init__(self, rig: Rig, *, known_size: bool, waits: bool) -> None:
         self._follower = HandFollower(rig, None, known_size=known_size)
-        self._finds = finds
+        self._waits = waits
         self._background = _Background(len(rig.nodes))
         self._learnt = False
 
     def start(self, pose: HandPose, t_ns: int) -> None:
         """Begin at a pose."""
         self._follower.start(pose, t_ns)
-        self._finds = True
+        self._waits = True
 
     def step(self, images: Sequence[Picture | None], t_ns: Sequence[int]) -> HandState:
         """The hand after one picture of each camera. Raises TrackingError while there is none."""
@@ -47,18 +47,19 @@ class ContourTracker:
             self._follower.set_foreground(self._background.learnt_from(images))
             self._learnt = True
             raise TrackingError("the background has been learnt.")
-        if not self._finds:
+        if not self._waits:
             raise TrackingError("there is no hand in the pictures yet.")
         return _tracked(self._follower.step(images, t_ns))
 
 
 class LiveContourTracker:
-    """A live `ContourEstimator` with nodes that search the pictures for it. It looks for a hand from the beginning. Its
+    """A live `ContourEstimator` with nodes that search the pictures for it. It waits for a hand from the beginning. Its
     searches take no time: they are waited for, so that a run can be repeated."""
 
     def __init__(self, rig: Rig, *, known_size: bool) -> None:
         """Raises RigError."""
-        settings = TrackerSettings("estimator", observe="contours", float_scale=not known_size)
+        settings = TrackerSettings("estimator", observe="contours", float_scale=not known_size,
+                                   start_poses=rig.tracker.start_poses)
         self._rig = msgspec.structs.replace(rig, tracker=settings)
         self._background = _Background(len(rig.nodes))
         self._nodes: SearchedNodes | None = None

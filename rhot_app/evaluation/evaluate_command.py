@@ -110,7 +110,7 @@ def _bare_hand(args: argparse.Namespace) -> int:
     def tracker(rig: Rig, case: Case) -> EvaluatedTracker:
         if case.live:
             return LiveContourTracker(rig, known_size=case.known_size)
-        return ContourTracker(rig, known_size=case.known_size, finds=case.start == "nothing")
+        return ContourTracker(rig, known_size=case.known_size, waits=case.start == "shown")
 
     cases = [case for case in CASES if args.cases is None or case.name.startswith(args.cases)]
     seeds, seconds = 10 if args.seeds is None else args.seeds, 3.0 if args.seconds is None else args.seconds

@@ -85,27 +85,31 @@ def learn_backgrounds(videos: Sequence[CameraVideo], seconds: float | None = Non
 # -- The whole run ----------------------------------------------------------------------------------------------------
 
 def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[Foreground] | None, *,
-                 known_size: bool = True, empty_s: float = 0.0, out: Path | None = None, pictures: Path | None = None,
-                 again: bool = False, hand_file: Path | None = None, progress: Progress = silent) -> BareHandSummary:
+                 known_size: bool = True, empty_s: float = 0.0, start_frame: int | None = None,
+                 out: Path | None = None, pictures: Path | None = None, again: bool = False,
+                 hand_file: Path | None = None, progress: Progress = silent) -> BareHandSummary:
     """Track the bare hand of `rig`, whose nodes are the videos' cameras in their order.
 
-    `foreground`: as learnt of each camera's background, or None. `empty_s`: so long no hand is looked for. `out`: a
-    table of the states (docs/export.md). `pictures`: an .avi or .mp4 file, or a folder of PNG files, with what was
-    found. `hand_file`: where the rig's hand, adapted to the one that was found last, is written; what was there is kept
-    beside it; a loss is noted where too little was seen of it (`errors.note_loss`). Files appear when they are whole.
-    Raises RecordingError, ExportError, RigError.
+    `foreground`: as learnt of each camera's background, or None. `empty_s`: so long no hand is expected.
+    `start_frame`: the frame set, from 0, in which the hand is in its start pose, which no check confirms; None: it is
+    followed from where it is seen to have taken that. `out`: a table of the states (docs/export.md). `pictures`: an
+    .avi or .mp4 file, or a folder of PNG files, with what was found. `hand_file`: where the rig's hand, adapted to the
+    one that was found last, is written; what was there is kept beside it; a loss is noted where too little was seen of
+    it (`errors.note_loss`). Files appear when they are whole. Raises RecordingError, ExportError, RigError.
     """
     check_outputs(videos, out, pictures, again, hand_file)
     first, last = overlap(videos)
     run = HandFollower(rig, foreground, known_size=known_size,
-                       empty_until_ns=first + round(1e9 * empty_s) if empty_s else first)
+                       empty_until_ns=first + round(1e9 * empty_s) if start_frame is None else last + 1)
     spent: list[tuple[int, bool]] = []
     begun = time.perf_counter()
     with contextlib.ExitStack() as stack:
         table = stack.enter_context(open_table(rig, videos[0].path.name, out)) if out is not None else None
         fps = 1e9 / min(video.period_ns for video in videos)
         drawn = stack.enter_context(whole_pictures(pictures, fps)) if pictures is not None else None
-        for frames in frame_sets(videos):
+        for number, frames in enumerate(frame_sets(videos)):
+            if number == start_frame:
+                run.start(run.tracker.start_pose, frames.first_ns)
             progress("tracking", min(max((frames.first_ns - first) / max(last - first, 1), 0.0), 1.0))
             state = run.step(frames.images, frames.t_ns)
             spent.append((state.t_master_ns, state.tracked))
@@ -113,6 +117,9 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
                 table.add(state)
             if drawn is not None:
                 drawn.add(side_by_side(run, frames, state))
+        if start_frame is not None and start_frame >= len(spent):
+            raise RecordingError(f"--start {start_frame}: the videos show {len(spent)} frames together, 0 to "
+                                 f"{len(spent) - 1}. Give the number of one of them.")
         if table is not None:
             table.finish()
     seconds = time.perf_counter() - begun

@@ -1,4 +1,4 @@
-"""Searches pictures of an instant for the hand's contours, and for the hand itself, as the bare hand's tracker does.
+"""Searches pictures of an instant for the hand's contours, as the bare hand's tracker does.
 
 Images of one instant are weighed once. Each pass halves how far from the contour an edge may be.
 """
@@ -12,29 +12,21 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import MISSED, in_a_fit
-from rhot_app.barehand.contours import SILHOUETTE, STEP_M
+from rhot_app.barehand.contour_residual import in_a_fit
+from rhot_app.barehand.contours import STEP_M
+from rhot_app.barehand.start import START_SD
 from rhot_app.barehand.surface import FOREARM_TURN, SHAPE
-from rhot_app.barehand.tracker import START_PASSES, START_SD, BareHandTracker
+from rhot_app.barehand.tracker import START_PASSES, BareHandTracker
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
-from rhot_app.hand.skeleton import HandPose
 from rhot_app.handfit.solve import Evidence, Freedom, Solver, free_numbers
 from rhot_app.handfit.state import Contour, FitState, Instant
-from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import Foreground, learn_skin
 
 Array = NDArray[np.float64]
-
-SEARCHES = 8
-"""Random searches at most; one in three finds an open hand in drawn pictures without a background (chosen: 30 s)."""
-
-FOUND = 1.0 - float(MISSED[SILHOUETTE])
-"""Part of the contour that is found of a hand that is where it is estimated."""
-
 
 def fit_to_contours(solver: Solver, rig: Rig, state: FitState, instants: Sequence[int], freedom: Freedom,
                     anchor_sd_px: float) -> FitState:
@@ -60,31 +52,6 @@ def fit_to_contours(solver: Solver, rig: Rig, state: FitState, instants: Sequenc
                                    "the hand first: drag the wrist, the knuckles and the fingertips there.")
         state = state.change(k, replace(state.instants[k], contour=contour))
     return state
-
-
-def find_hand(rig: Rig, hand: HandAnatomy, instant: Instant, progress: Progress) -> HandPose:
-    """The pose of a hand that may be anywhere: of some random searches by the colours of skin, the one whose
-    contour is found best. Raises CalibrationError when there is nothing of a hand's size and colour."""
-    tracker = _tracker(rig, hand, instant)
-    images = [image for _, image in sorted(instant.images.items())]
-    tracker.foreground = [learn_skin(image) for image in images]
-    best: tuple[float, Array] | None = None
-    for number in range(SEARCHES):
-        progress("looking for the hand", number / SEARCHES)
-        if not tracker.find(images, 0):
-            continue
-        state = tracker.update(dict(enumerate(images)), 0).state
-        counts = tracker.fit.slice_counts.sum(axis=(0, 1))
-        found = float(counts[0] / max(counts[1], 1.0))
-        best = (found, state) if best is None or found > best[0] else best
-        if found > FOUND:
-            break
-    if best is None:
-        raise CalibrationError(f"No hand was found by the colour of skin in {instant.name}. Drag the wrist, the "
-                               "knuckles and the fingertips to their places instead.")
-    world = np.eye(4)
-    world[:3] = best[1][:ANGLES].reshape(3, 4)
-    return HandPose(world, np.clip(best[1][ANGLES:VELOCITY], tracker.model.limits[:, 0], tracker.model.limits[:, 1]))
 
 
 def _tracker(rig: Rig, hand: HandAnatomy, instant: Instant) -> BareHandTracker:

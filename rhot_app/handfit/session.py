@@ -19,9 +19,10 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel, neutral_pose
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, JOINTS, HandPose
-from rhot_app.handfit.contour_search import find_hand, fit_to_contours
+from rhot_app.handfit.contour_search import fit_to_contours
 from rhot_app.handfit.hand_shape import SIZE, Shapes
 from rhot_app.handfit.history import History
+from rhot_app.handfit.landmark_anchors import landmark_anchors, poses_of
 from rhot_app.handfit.pictures import require_calibrated, require_size
 from rhot_app.handfit.quantities import Number, numbers_of, sd_of, value_of, with_value
 from rhot_app.handfit.solve import (
@@ -319,10 +320,29 @@ class HandFit:
         return fit_to_contours(self.solver, self.rig, self._bare(), self._wanted(), self.freedom, self.anchor_sd_px)
 
     def with_found_hand(self, progress: Progress) -> FitState:
-        """The state with the hand looked for by the colours of skin. Raises CalibrationError, and takes seconds."""
-        state = self._bare()
-        one = state.instants[self.current]
-        return state.change(self.current, replace(one, pose=find_hand(self.rig, self.hand, one, progress), anchors=()))
+        """The state with the joints anchored where the landmark networks see them, and the pose fitted to these
+        anchors. Raises CalibrationError without a hand of the rig's side, KeypointError without networks."""
+        state, k = self._bare(), self.current
+        one = state.instants[k]
+        anchors = landmark_anchors(one, self.hand.side == "right", progress)
+        if not anchors:
+            raise CalibrationError(f"No {self.hand.side} hand was found in {one.name}. Drag the wrist, the knuckles "
+                                   "and the fingertips to their places instead.")
+        free, best = free_numbers(state, [k], "pose"), None
+        for pose in poses_of(anchors, self.shapes.model(state.shape), self.cameras):
+            begun = state.change(k, replace(one, pose=pose, anchors=anchors))
+            try:
+                found = self.solver.solve(begun, Evidence(begun, FREE_SD, self.anchor_sd_px), free)
+            except CalibrationError:  # turned so, a joint is behind a camera
+                continue
+            misses = [np.linalg.norm(self.cameras[a.camera].project(self.solver.places(
+                found.shape, found.instants[k])[0][a.joint])[0] - a.pixel) for a in anchors]
+            if best is None or np.mean(misses) < best[0]:
+                best = float(np.mean(misses)), found
+        if best is None:
+            raise CalibrationError(f"The hand in {one.name} fits no pose before the cameras. Are the pictures of the "
+                                   "rig's cameras, in their order?")
+        return best[1]
 
     def fit_to_anchors(self) -> None:
         """Take what `fitted_to_anchors` says."""

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from rhot_app.barehand.contour_residual import COLUMNS, compressed, gathered
 from rhot_app.barehand.contours import NEAREST_M, project
 from rhot_app.barehand.joints import add_lengths
+from rhot_app.barehand.start import START_SD
 from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENGTH, RADIUS, SHAPE
-from rhot_app.barehand.tracker import FOREARM_SD, START_SD
+from rhot_app.barehand.tracker import FOREARM_SD
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import Dense, minimise
 from rhot_app.estimation.residual import UNIT, Rows

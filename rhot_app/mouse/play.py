@@ -16,14 +16,15 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.start import start_pose_file
 from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.engine.pipeline import warm_up
 from rhot_app.evaluation.data_sets import Order, Watch, data_set, data_sets_folder
 from rhot_app.evaluation.searched_nodes import SearchedNodes
 from rhot_app.evaluation.track import Timed
-from rhot_app.geometry.transforms import exp_so3
+from rhot_app.geometry.transforms import exp_so3, rigid
 from rhot_app.hand.model import build_model
-from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS, TIP_ROLES
+from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS, TIP_ROLES, HandPose
 from rhot_app.mouse.model import FLAT_DEG, up_of, with_mouse_model
 from rhot_app.mouse.pointer import Mouse, MouseSettings, MouseState
 from rhot_app.mouse.script import FACINGS, Script, Side, home_pose, motion_file
@@ -219,8 +220,11 @@ def twin_scene(set_up: SetUp, seed: int) -> Scene:
 
 
 def tracked_rig(rig: Rig, set_up: SetUp, scene: Scene) -> Rig:
-    """The rig of the tracker, with the prior knowledge of table and hand."""
-    tracker = TrackerSettings("estimator", observe=set_up.observe)
+    """The rig of the tracker, with the prior knowledge of table and hand, and the pose in which a script begins."""
+    rest = HandPose(rigid(home_pose(scene.settings.facing), rest_place(scene)),
+                    np.radians([FLAT_DEG.get(name, 0.0) for name in ANGLES]))
+    poses = (start_pose_file(rest),) if set_up.observe == "contours" else ()
+    tracker = TrackerSettings("estimator", observe=set_up.observe, start_poses=poses)
     rig = msgspec.structs.replace(rig, nodes=rig.nodes[:set_up.cameras], tracker=tracker)
     return with_mouse_model(rig, drawn_plane(scene)) if set_up.modelled else rig
 
@@ -230,9 +234,13 @@ def drawn_plane(scene: Scene) -> PalmPlane:
     rng = np.random.default_rng([scene.seed, 0x91A])
     turn = exp_so3(PLANE_SD[1] * rng.normal(size=3)) @ home_pose(scene.settings.facing)
     normal = turn[:, 2]
-    rest = scene.centre + np.array([0.0, WRIST_BELOW_CENTRE_M, 0.0])
     return PalmPlane((float(normal[0]), float(normal[1]), float(normal[2])),
-                     float(normal @ rest + PLANE_SD[0] * rng.normal()))
+                     float(normal @ rest_place(scene) + PLANE_SD[0] * rng.normal()))
+
+
+def rest_place(scene: Scene) -> Array:
+    """(3,) m: of the wrist of a hand at rest."""
+    return np.asarray(scene.centre + np.array([0.0, WRIST_BELOW_CENTRE_M, 0.0]))
 
 
 def drawn_posture(seed: int) -> dict[str, float]:

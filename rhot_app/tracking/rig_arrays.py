@@ -128,13 +128,14 @@ def rigs_of_hands(rig: Rig) -> list[tuple[Rig, NDArray[np.intp]]]:
     rig, own = without_objects(rig)
     if rig.other_hand is None:
         return [(rig, own)]
-    found = []
-    for hand, wanted in ((rig.hand, False), (rig.other_hand, True)):
+    found, poses = [], rig.tracker.start_poses
+    for number, (hand, wanted) in enumerate(((rig.hand, False), (rig.other_hand, True))):
         columns = np.flatnonzero([(one.role or "").startswith(OTHER_HAND) == wanted for one in rig.markers.markers])
         alone = tuple(msgspec.structs.replace(one, role=(one.role or "").removeprefix(OTHER_HAND) or None)
                       for one in (rig.markers.markers[m] for m in columns))
         markers = msgspec.structs.replace(rig.markers, markers=alone)
-        found.append((msgspec.structs.replace(rig, markers=markers, hand=hand, other_hand=None,
+        tracker = msgspec.structs.replace(rig.tracker, start_poses=poses[number:number + 1])
+        found.append((msgspec.structs.replace(rig, markers=markers, hand=hand, other_hand=None, tracker=tracker,
                                               filters=FilterSettings()), own[columns]))
     return found
 

@@ -11,15 +11,16 @@ from pictures import picture, two_cameras, wall
 from shipped_markers import RHOT6
 from shipped_rig import LEFT_MODEL, RIGHT_HAND, RIGHT_MODEL
 
+from rhot_app.barehand.start import start_pose_file
 from rhot_app.barehand.surface import SHAPE, Surface, surface_of
 from rhot_app.evaluation.searched_nodes import SearchedNodes
 from rhot_app.geometry.camera import LENS, CameraModel, rig_intrinsics
-from rhot_app.geometry.transforms import quaternion_from_rotation
+from rhot_app.geometry.transforms import exp_so3, quaternion_from_rotation
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.project import CameraPose, Rig, RigNode
+from rhot_app.project import CameraPose, Rig, RigNode, TrackerSettings
 from rhot_app.simulator.scene.motion import load_motion
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
@@ -33,15 +34,24 @@ def model_and_surface(side: str = "right") -> tuple[HandModel, Surface]:
     return model, surface_of(model)
 
 
-def rig_of(cameras: list[CameraModel], hand: HandAnatomy = RIGHT_HAND) -> Rig:
-    """A rig with these cameras and this hand; nobody wears its markers."""
+def rig_of(cameras: list[CameraModel], hand: HandAnatomy = RIGHT_HAND, shown: Sequence[HandPose] = ()) -> Rig:
+    """A rig with these cameras and this hand; nobody wears its markers. `shown`: the start poses of its hands."""
     nodes = tuple(
         RigNode(k + 1, f"camera {k + 1}",
                 rig_intrinsics((camera.width, camera.height), camera.intrinsics[:LENS]),
                 CameraPose(tuple(float(v) for v in quaternion_from_rotation(camera.world_from_camera[:3, :3])),
                            tuple(float(v) for v in camera.centre)))
         for k, camera in enumerate(cameras))
-    return Rig("bare", nodes, RHOT6, hand)
+    return Rig("bare", nodes, RHOT6, hand, tracker=TrackerSettings(start_poses=tuple(map(start_pose_file, shown))))
+
+
+def near(pose: HandPose, seed: int = 0) -> HandPose:
+    """A pose about as far from another one as a person's is from a picture of it."""
+    rng = np.random.default_rng([seed, 0x57A])
+    world = pose.world_from_palm.copy()
+    world[:3, 3] += rng.normal(0.0, 0.01, 3)
+    world[:3, :3] = exp_so3(rng.normal(0.0, 0.12, 3)) @ world[:3, :3]
+    return HandPose(world, pose.angles + rng.normal(0.0, 0.12, len(pose.angles)))
 
 
 def state_of(pose: HandPose) -> np.ndarray:
@@ -105,5 +115,5 @@ class ShownNodes(SearchedNodes):
 
     def show_until_tracked(self, images: Sequence[np.ndarray | None], frames: int = 40,
                            pixels: Sequence[np.ndarray] | None = None) -> None:
-        """The same images until a hand is found."""
+        """The same images until a hand is followed."""
         self.show_until(lambda: self.tracked, images, frames, pixels)

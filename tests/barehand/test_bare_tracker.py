@@ -1,19 +1,17 @@
-"""The tracker on drawn pictures: follows, mixes kinds, goes on with one camera, starts from nothing."""
+"""The tracker on drawn pictures: follows, mixes kinds, goes on with one camera, begins in a pose that is shown."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from bare_scenes import model_and_surface, poses, rig_of, scene, state_of
+from bare_scenes import model_and_surface, near, poses, rig_of, scene, state_of
 
 from rhot_app.barehand.overlay import overlay
-from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.residual import Rows
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.motion.hand_process import BIAS, MOTION
-from rhot_app.hand.skeleton import HandPose
 from rhot_app.state import Condition
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground
 
@@ -35,7 +33,7 @@ def errors_mm(tracker: BareHandTracker, pose) -> np.ndarray:
 def test_a_hand_is_tracked_from_a_given_start(film, mode, most_mm) -> None:
     tracker = BareHandTracker(rig_of(film[0][0]), mode=mode)
     moving = poses("grasp", TIMES)
-    tracker.start(moving[0], 0, verified=True)
+    tracker.start(moving[0], 0)
     for t, pose, (_, images, _) in zip(TIMES, moving, film, strict=True):
         state = tracker.step(images, [round(1e9 * t)] * 2)
         assert errors_mm(tracker, pose).mean() < most_mm
@@ -74,39 +72,23 @@ def test_a_step_without_a_start_raises_an_error_with_advice(film) -> None:
         tracker.step(film[0][1], [0, 0])
 
 
-def test_a_hand_is_found_without_a_given_start(film) -> None:
-    cameras, images, walls = film[0]
-    known = [learn_skin(image, learn_background(skin_foreground(), [empty]))
-             for image, empty in zip(images, walls, strict=True)]
-    tracker = BareHandTracker(rig_of(cameras), foreground=known)
-    assert tracker.find(images, 0)
-    state = tracker.step(images, [0, 0])
-    assert state.condition is Condition.PARTIAL, "nothing but contours has shown it"
-    assert np.median(errors_mm(tracker, poses("grasp", TIMES)[0])) < 10.0
-
-
-def test_a_track_far_from_the_hand_begins_anew_at_the_hand(film) -> None:
-    """It may have been mistaken for its forearm. What was learnt there of its shape is wrong."""
+@pytest.mark.parametrize("known", [True, False], ids=["before a learnt background", "by its skin"])
+def test_a_hand_that_takes_the_start_pose_is_tracked(film, known) -> None:
     cameras, images, walls = film[0]
     pose = poses("grasp", TIMES)[0]
-    tracker = BareHandTracker(rig_of(cameras), known_size=False,
-                              foreground=[learn_background(skin_foreground(), [empty]) for empty in walls])
-    wrong = pose.world_from_palm.copy()
-    wrong[:3, 3] -= 0.15 * wrong[:3, 0]
-    large = np.zeros(SHAPE)
-    large[:2] = 0.3
-    tracker.start(HandPose(wrong, pose.angles), 0, size=large)
-    for k in range(30):
-        tracker.step(images, [round(1e9 * k / FPS)] * 2)
-    assert np.median(errors_mm(tracker, pose)) < 3.0
-    assert np.abs(tracker.filter.newest.state[BIAS:BIAS + 2]).max() < 0.1
+    learnt = [learn_skin(image, learn_background(skin_foreground(), [empty]) if known else None)
+              for image, empty in zip(images, walls, strict=True)]
+    tracker = BareHandTracker(rig_of(cameras, shown=[near(pose)]), foreground=learnt)
+    assert tracker.begin(images, 0)
+    assert tracker.step(images, [0, 0]).condition is Condition.TRACKING
+    assert np.median(errors_mm(tracker, pose)) < 2.0
 
 
-def test_no_hand_is_found_in_an_empty_scene(film) -> None:
+def test_no_hand_is_taken_for_one_in_an_empty_scene(film) -> None:
     cameras, _, walls = film[0]
-    tracker = BareHandTracker(rig_of(cameras),
+    tracker = BareHandTracker(rig_of(cameras, shown=[poses("grasp", TIMES)[0]]),
                               foreground=[learn_background(skin_foreground(), [empty]) for empty in walls])
-    assert not tracker.find(walls, 0)
+    assert not tracker.begin(walls, 0)
 
 
 def test_the_overlay_draws_the_contour(film) -> None:

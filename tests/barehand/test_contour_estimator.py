@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -10,8 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from bare_scenes import DISTANCE_M, ShownNodes, model_and_surface, poses, rig_of, scene
-from patience import PATIENCE_S, eventually
+from bare_scenes import DISTANCE_M, ShownNodes, model_and_surface, near, poses, rig_of, scene
 from pictures import look_at, picture, taken, wall
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
@@ -19,7 +17,6 @@ from shipped_markers import RHOT6
 from shipped_rig import RIGHT_MODEL
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
-from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import RigError
 from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS
 from rhot_app.geometry.camera import CameraModel
@@ -27,7 +24,6 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import FLEXIONS, JOINTS, HandPose
 from rhot_app.project import Rig, TrackerSettings, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
-from rhot_app.tracking.contours.evidence import joints_of
 from rhot_app.tracking.contours.finder import Finder
 from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.tracker import CameraFrame, ShowsContours
@@ -45,15 +41,17 @@ def film() -> list[tuple[list, list, list]]:
     return [scene(pose, k) for k, pose in enumerate(poses("grasp", TIMES))]
 
 
-def bare_rig(cameras: list[CameraModel], observe: str = "contours", markers: str = "rhot6") -> Rig:
-    rig = msgspec.structs.replace(rig_of(cameras), markers=load_markers(resource_path(
-        "markers", f"{markers}.json")))
-    return msgspec.structs.replace(rig, tracker=TrackerSettings("estimator", observe=observe))
+def bare_rig(cameras: list[CameraModel], observe: str = "contours", markers: str = "rhot6",
+             shown: HandPose | None = None) -> Rig:
+    rig = msgspec.structs.replace(rig_of(cameras, shown=[shown or near(poses("grasp", TIMES)[0])]),
+                                  markers=load_markers(resource_path("markers", f"{markers}.json")))
+    return msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, kind="estimator",
+                                                                        observe=observe))
 
 
 def shown_nodes(film: list[tuple[list, list, list]], observe: str = "contours", markers: str = "rhot6",
-                **options: Any) -> ShownNodes:
-    return ShownNodes(bare_rig(film[0][0], observe, markers), film[0][2], **options)
+                shown: HandPose | None = None, **options: Any) -> ShownNodes:
+    return ShownNodes(bare_rig(film[0][0], observe, markers, shown), film[0][2], **options)
 
 
 def curled(pose: HandPose) -> HandPose:
@@ -69,7 +67,7 @@ def error_mm(state: HandState, pose: HandPose) -> float:
 
 
 def follow(nodes: ShownNodes, film: list[tuple[list, list, list]]) -> None:
-    """An empty scene, a hand that waits until it is found, then the whole motion."""
+    """An empty scene, a hand that holds the pose that is shown until it is followed, then the whole motion."""
     nodes.show(film[0][2], 3)
     assert nodes.states and not any(state.tracked for state in nodes.states)
     nodes.show_until_tracked(film[0][1], 37)
@@ -79,7 +77,9 @@ def follow(nodes: ShownNodes, film: list[tuple[list, list, list]]) -> None:
 
 @dataclass(frozen=True)
 class Run:
-    """Of a hand that is found, moves, is seen by one camera only for eight frames, and goes."""
+    """Of a hand that takes its start pose, moves, is seen by one camera only for eight frames, and goes."""
+
+    waiting: list
 
     followed: HandState
     drawn: list
@@ -92,17 +92,24 @@ class Run:
 @pytest.fixture(scope="module", params=[False, True], ids=["live", "from a log"])
 def run(film, request) -> Run:
     nodes = shown_nodes(film, forget=request.param)
-    with pytest.MonkeyPatch.context() as patched:
-        if request.param:  # a log's maps are no others
-            patched.setattr(Finder, "search_everywhere", lambda *_: None)
-            patched.setattr(Finder, "found", lambda _: (poses("grasp", TIMES)[0], FIRST_NS))
-        follow(nodes, film)
+    nodes.show(film[0][2], 3)
     assert isinstance(nodes.tracker, ShowsContours)
+    waiting = nodes.tracker.seen()
+    follow(nodes, film)
     followed, drawn, asked, before = nodes.states[-1], nodes.tracker.seen(), list(nodes.asked), len(nodes.states)
     nodes.show([film[-1][1][0], None], 8)
     alone = nodes.states[before:]
     nodes.show(film[0][2], 20)
-    return Run(followed, drawn, asked, alone, nodes.tracker.seen(), nodes.states[-1])
+    return Run(waiting, followed, drawn, asked, alone, nodes.tracker.seen(), nodes.states[-1])
+
+
+def test_the_start_pose_is_shown_while_there_is_no_hand(film, run: Run) -> None:
+    joints = forward(model_and_surface()[0], poses("grasp", TIMES)[0]).joints
+    for seen, camera in zip(run.waiting, film[0][0], strict=True):
+        assert seen.shown and not len(seen.slices) and not len(seen.edges)
+        apart = np.linalg.norm(seen.contour.mean(axis=0) - camera.project(joints).mean(axis=0))
+        assert len(seen.contour) > 50 and apart < 60.0
+    assert all(seen.shown for seen in run.drawn_at_last) and not any(seen.shown for seen in run.drawn)
 
 
 def test_a_hand_is_found_tracked_and_lost(film, run: Run) -> None:
@@ -115,7 +122,6 @@ def test_a_hand_is_found_tracked_and_lost(film, run: Run) -> None:
         apart = np.linalg.norm(seen.edges[seen.of_hand][:, None] - seen.contour[None], axis=2).min(axis=1)
         assert np.median(apart) < 2.0 and (seen.edges < [camera.width, camera.height]).all()
     assert last.marker_ids == RHOT6.ids and np.isnan(last.marker_positions).all()
-    assert run.drawn_at_last == []
     assert run.lost.condition is Condition.LOST and np.isnan(run.lost.joint_positions).all()
 
 
@@ -145,7 +151,7 @@ def test_maps_that_come_before_the_last_edges_confirm_the_hand(film) -> None:
 def test_a_hand_is_found_and_tracked_by_slow_cameras(film) -> None:
     """Of a hand that is found after the first camera's frame, the second one's edges come first."""
     nodes = shown_nodes(film)
-    for number in range(13):
+    for number in range(16):
         nodes.step(number, film[0][1 if number >= 3 else 2], times_ns=[FIRST_NS + 4 * number * PERIOD_NS] * 2)
     assert nodes.states[-1].tracked and error_mm(nodes.states[-1], poses("grasp", TIMES)[0]) < 5.0
     assert nodes.states[-1].t_master_ns == FIRST_NS + 4 * number * PERIOD_NS, "no camera's edges wait for a frame"
@@ -171,90 +177,28 @@ def test_a_camera_with_a_wrong_pose_gives_a_resting_hand_no_velocity(film, apart
 
 
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
-def test_a_confused_finger_is_relocalised(film, monkeypatch) -> None:
-    pose, nodes = poses("grasp", TIMES)[0], shown_nodes(film)
-    with monkeypatch.context() as patched:
-        patched.setattr(Finder, "found", lambda _: (curled(pose), FIRST_NS))
-        nodes.show(film[0][1], 20)
+def test_a_confused_finger_is_relocalised(film) -> None:
+    """The hand takes the shown pose but for one finger."""
+    pose = poses("grasp", TIMES)[0]
+    nodes = shown_nodes(film, shown=curled(pose))
+    nodes.show_until_tracked(film[0][1])
+    nodes.show(film[0][1], 20)
     tip = forward(model_and_surface()[0], pose).joints[INDEX_TIP]
-    assert nodes.states[-1].tracked
     assert np.linalg.norm(nodes.states[-1].joint_positions[INDEX_TIP] - tip) < 0.01
 
 
-class SlowSearches(ShownNodes):
-    """Of the searches of the whole image, the first one has a given result, and the second one ends when `ended` is
-    set; only that one is not waited for."""
-
-    def __init__(self, film: list[tuple[list, list, list]], first: HandPose) -> None:
-        super().__init__(bare_rig(film[0][0]), film[0][2])
-        self.ended, self.searches = threading.Event(), 0
-        relocaliser = self.tracker.hand.relocaliser
-        find = relocaliser.search_globally
-
-        def search(maps, rng):
-            self.searches += 1
-            if self.searches == 2:
-                self.ended.wait(PATIENCE_S)
-            return first if self.searches == 1 else find(maps, rng)
-        relocaliser.search_globally = search
-        self.tracker.wait = lambda: eventually(lambda: (self.searches == 2 and not self.ended.is_set()) or not any(
-            thread.name == "searches for a hand" for thread in threading.enumerate()))
-
-
-def test_a_wrong_start_is_corrected_before_a_slow_second_search_ends(film) -> None:
-    pose = poses("grasp", TIMES)[0]
-    nodes = SlowSearches(film, curled(pose))
-    tracker, tip = nodes.tracker, forward(model_and_surface()[0], pose).joints[INDEX_TIP]
-    nodes.show_until(lambda: tracker.tracking, film[0][1], 45)
-    nodes.show_until(lambda: np.linalg.norm(joints_of(tracker.hand, tracker.hand.filter.newest.state)[INDEX_TIP]
-                                            - tip) < 0.01, film[0][1], 45)
-    assert not tracker.confirmed
-    nodes.ended.set()
-    nodes.show_until(lambda: tracker.confirmed, film[0][1], 45)
-
-
-def test_a_search_that_outlasts_its_track_finds_the_next_one(film) -> None:
-    pose = poses("grasp", TIMES)[0]
-    wrong = pose.world_from_palm.copy()
-    wrong[:3, 3] += 0.4 * film[0][0][0].world_from_camera[:3, 0]  # from where no edge of the hand leads to it
-    nodes = SlowSearches(film, HandPose(wrong, pose.angles))
-    nodes.show_until(lambda: nodes.tracker.tracking, film[0][1], 45)
-    nodes.show_until(lambda: not nodes.tracker.tracking, film[0][1], 45)
-    nodes.ended.set()
-    nodes.show_until(lambda: nodes.tracker.tracking, film[0][1], 45)
-    assert nodes.searches == 2
-
-
-@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
-@pytest.mark.parametrize(("off_m", "turn_deg"), [(0.03, 14.0), (0.12, 0.0)])
-def test_a_hand_with_a_wrong_start_is_relocalised(film, monkeypatch, off_m, turn_deg) -> None:
-    """It is tracked a little off and rotated, so that fingers are confused, or far off. Two patched searches confirm
-    it."""
-    pose = poses("grasp", TIMES)[0]
-    wrong = pose.world_from_palm.copy()
-    wrong[:3, :3] = wrong[:3, :3] @ Rotation.from_euler("z", turn_deg, degrees=True).as_matrix()
-    wrong[:3, 3] -= off_m * wrong[:3, 0]
+def test_a_hand_that_is_lost_is_followed_again_from_its_start_pose_only(film) -> None:
     nodes = shown_nodes(film)
-    with monkeypatch.context() as patched:
-        patched.setattr(Finder, "found", lambda _: (HandPose(wrong, pose.angles), FIRST_NS + nodes.number * PERIOD_NS))
-        patched.setattr(Finder, "verify", lambda *_: False)
-        nodes.show_until_tracked(film[0][1], 20)
-    assert error_mm(nodes.states[-1], pose) > 10.0, "it is wrong"
-    nodes.show(film[0][1], 45)
-    assert nodes.states[-1].tracked and error_mm(nodes.states[-1], pose) < 3.0
-
-
-def test_global_searches_have_growing_intervals_and_need_two_cameras(film) -> None:
-    hand = BareHandTracker(bare_rig(film[0][0]))
-    both, one = [np.zeros((2, 2), np.float32)] * 2, [np.zeros((2, 2), np.float32), None]
-    hand.start(poses("grasp", TIMES)[0], 0)
-    assert not any(hand.relocaliser.global_search_due(one, t_s) for t_s in np.arange(0.0, 20.0, 0.1))
-    times = [t_s for t_s in np.arange(0.0, 20.0, 0.05) if hand.relocaliser.global_search_due(both, float(t_s))]
-    assert times[0] < 0.5 and 4 <= len(times) <= 8 and np.diff(times).max() > 3.0
-    hand.relocaliser.schedule_global_search(20.0, relocalised=True, same=False)
-    assert hand.relocaliser.global_search_due(both, 20.5)
-    hand.relocaliser.schedule_global_search(21.0, relocalised=False, same=True)
-    assert not hand.relocaliser.global_search_due(both, 1000.0)
+    follow(nodes, film)
+    nodes.show(film[0][2], 20)
+    assert nodes.states[-1].condition is Condition.LOST
+    aside = poses("grasp", TIMES)[0]
+    world = aside.world_from_palm.copy()
+    world[:3, 3] += 0.08 * world[:3, 1]
+    nodes.show(scene(HandPose(world, aside.angles))[1], 20)
+    assert nodes.states[-1].condition is Condition.LOST, "it does not take the pose"
+    nodes.show_until_tracked(film[0][1])
+    assert error_mm(nodes.states[-1], aside) < 5.0
 
 
 def test_requested_slices_cross_the_contour_of_the_next_frame(film, run: Run) -> None:
@@ -313,15 +257,13 @@ def leaving(frames: int, out: int) -> tuple[list[CameraModel], list[HandPose], l
 
 
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
-def test_a_hand_outside_one_cameras_image_is_tracked_by_the_other(monkeypatch) -> None:
+def test_a_hand_outside_one_cameras_image_is_tracked_by_the_other() -> None:
     frames, out = 24, 60
     cameras, moved, images, empty = leaving(frames, out)
     joints = [forward(model_and_surface()[0], pose).joints for pose in moved]
     assert all((cameras[1].project(one)[:, 0] > cameras[1].width).all() for one in joints[frames:frames + out])
-    nodes = ShownNodes(bare_rig(cameras), empty)
-    with monkeypatch.context() as patched:
-        patched.setattr(Finder, "found", lambda _: (moved[0], FIRST_NS + nodes.number * PERIOD_NS))
-        nodes.show_until_tracked(images[0], 20)
+    nodes = ShownNodes(bare_rig(cameras, shown=near(moved[0])), empty)
+    nodes.show_until_tracked(images[0], 20)
     outside = []  # squared Mahalanobis distances of the joints while one camera shows them
     for k, one in enumerate(images):
         before = len(nodes.states)
@@ -350,7 +292,7 @@ def show_landmarks_until_tracked(nodes: ShownNodes, film: list[tuple[list, list,
 
 
 def test_landmarks_start_a_track_that_contours_continue_and_start_it_again_after_a_loss(film, monkeypatch) -> None:
-    monkeypatch.setattr(Finder, "search_everywhere", lambda *_: None)  # no search is as quick
+    monkeypatch.setattr(Finder, "look", lambda *_: None)  # it would start at the start pose, too
     nodes = shown_nodes(film, "landmarks_and_contours", "landmarks21")
     show_landmarks_until_tracked(nodes, film, 0)
     for _, images, _ in film:
@@ -364,7 +306,7 @@ def test_landmarks_start_a_track_that_contours_continue_and_start_it_again_after
 @pytest.mark.parametrize("rounded_ns", [-300_000, 300_000])
 def test_landmarks_and_edges_of_one_image_are_one_update(film, monkeypatch, rounded_ns: int) -> None:
     """Their datagrams come apart, and the node's clock is compared anew for each."""
-    for search in ("search_everywhere", "relocalise"):
+    for search in ("look", "relocalise"):
         monkeypatch.setattr(Finder, search, lambda *_, **__: None)
     nodes = shown_nodes(film, "landmarks_and_contours", "landmarks21", rounded_ns=rounded_ns)
     show_landmarks_until_tracked(nodes, film, 0)
@@ -375,10 +317,10 @@ def test_landmarks_and_edges_of_one_image_are_one_update(film, monkeypatch, roun
 
 
 def test_landmarks_correct_a_confused_finger(film, monkeypatch) -> None:
-    pose, nodes = poses("grasp", TIMES)[0], shown_nodes(film, "landmarks_and_contours", "landmarks21")
+    pose = poses("grasp", TIMES)[0]
+    nodes = shown_nodes(film, "landmarks_and_contours", "landmarks21")
     monkeypatch.setattr(Finder, "relocalise", lambda *_, **__: None)  # it would correct the finger, too
     with monkeypatch.context() as patched:
-        patched.setattr(Finder, "search_everywhere", lambda *_: None)
         patched.setattr(Finder, "found", lambda _: (curled(pose), FIRST_NS))
         nodes.show_until_tracked(film[0][1], 20)
     tip = forward(model_and_surface()[0], pose).joints[INDEX_TIP]

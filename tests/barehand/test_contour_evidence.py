@@ -1,4 +1,4 @@
-"""Parts of the live contour tracker: recorded slices, the finder's searches, markers on a hand of another size."""
+"""Parts of the live contour tracker: recorded slices, the finder's search, markers on a hand of another size."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.motion.hand_process import BIAS, MOTION
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
-from rhot_app.tracking.contours.finder import Finder
+from rhot_app.tracking.contours.finder import Finder, Maps
 from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.contours.requests import Requests, matched_contour, requested_contour
 from rhot_app.tracking.contours.sized_markers import SizedMarkerResidual
@@ -95,18 +95,13 @@ def test_updates_by_markers_do_not_change_the_share_of_the_partial_update_of_pha
 def test_a_search_that_ends_after_its_track_gives_no_pose(hand: BareHandTracker,
                                                           monkeypatch: pytest.MonkeyPatch) -> None:
     finder = Finder(hand)
-    pose = poses("grasp", (0.5,))[0]
-    monkeypatch.setattr(hand.relocaliser, "search_globally", lambda *_: pose)
 
-    class Maps:
-        probabilities = ()
+    def taken(*_: object) -> HandPose:
+        finder.reset()
+        return poses("grasp", (0.5,))[0]
 
-        @property
-        def t_ns(self) -> int:
-            finder.reset()
-            return 1
-
-    finder.search_everywhere(Maps())  # type: ignore[arg-type]
+    monkeypatch.setattr(hand, "taken", taken)
+    finder.look(Maps(1, [None, None]))
     finder.wait()
     assert finder.found() is None
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 import pytest
-from bare_scenes import DISTANCE_M, ShownNodes, model_and_surface, poses, rig_of
+from bare_scenes import DISTANCE_M, ShownNodes, model_and_surface, near, poses, rig_of
 from pictures import picture_of, taken, two_cameras, wall
 from shipped_rig import LEFT_HAND
 
@@ -18,7 +18,6 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig, TrackerSettings, load_rig, save_rig, with_tracker
 from rhot_app.state import Condition, HandState
-from rhot_app.tracking.contours.finder import Finder
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.detect.edges import find_edges
 from rhot_node.detect.foreground import learn_background, skin_foreground
@@ -31,9 +30,11 @@ WALLS = [wall(camera, 10 * k + 1, False) for k, camera in enumerate(CAMERAS)]
 EMPTY = [taken(one, 0) for one in WALLS]
 
 
-def two_bare_hands(**settings: str) -> Rig:
-    return msgspec.structs.replace(rig_of(CAMERAS), other_hand=LEFT_HAND,
-                                   tracker=TrackerSettings("estimator", **{"observe": "contours"} | settings))
+def two_bare_hands(shown: dict[str, HandPose] | None = None) -> Rig:
+    """A rig whose hands are shown poses near `shown`, by default HOME."""
+    rig = rig_of(CAMERAS, shown=[near(one, k) for k, one in enumerate((shown or HOME).values())])
+    return msgspec.structs.replace(rig, other_hand=LEFT_HAND, tracker=msgspec.structs.replace(
+        rig.tracker, kind="estimator", observe="contours"))
 
 
 def at(side: str, place: Sequence[float], t_s: float = 0.0) -> HandPose:
@@ -58,13 +59,6 @@ def states_of(state: HandState) -> dict[str, HandState]:
 def error_mm(state: HandState, side: str, pose: HandPose) -> float:
     truth = forward(model_and_surface(side)[0], pose).joints
     return 1e3 * float(np.mean(np.linalg.norm(state.joint_positions - truth, axis=1)))
-
-
-def given(patched: pytest.MonkeyPatch, hands: dict[str, HandPose], t_ns: int = FIRST_NS) -> None:
-    """Have each hand found there, instead of searching."""
-    found = {model_and_surface(side)[0].mirror: pose for side, pose in hands.items()}
-    patched.setattr(Finder, "_search", lambda *_: None)
-    patched.setattr(Finder, "found", lambda one: (found[one._hand.model.mirror], t_ns))
 
 
 HOME = {side: at(side, (sign * ASIDE_M, 0.0, 0.0)) for side, sign in zip(SIDES, (1.0, -1.0), strict=True)}
@@ -102,13 +96,11 @@ def test_both_hands_are_found_and_one_leaves_and_returns(still: list[np.ndarray]
 
 
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
-def test_both_hands_are_tracked_after_one_has_occluded_the_other(monkeypatch) -> None:
-    """The left hand passes 6 cm before the right one, which rests, and covers all of it."""
-    nodes = ShownNodes(two_bare_hands(), EMPTY)
+def test_both_hands_are_tracked_after_one_has_occluded_the_other() -> None:
+    """The left hand passes 6 cm before the right one, which rests in its start pose, and covers all of it."""
     hands = {"right": at("right", (0.0, 0.0, 0.03)), "left": at("left", (-0.13, 0.0, -0.03))}
-    with monkeypatch.context() as patched:
-        given(patched, hands)
-        nodes.show_until_tracked(shown(hands, 0))
+    nodes = ShownNodes(two_bare_hands(hands), EMPTY)
+    nodes.show_until_tracked(shown(hands, 0))
     errors = []
     way = np.linspace(0.0, 1.0, 50)
     for x_m in np.append(-0.13 + 0.26 * (3.0 * way**2 - 2.0 * way**3), np.full(30, 0.13)):
@@ -123,22 +115,6 @@ def test_both_hands_are_tracked_after_one_has_occluded_the_other(monkeypatch) ->
     assert nodes.states[-1].t_master_ns == FIRST_NS + (nodes.number - 1) * PERIOD_NS
 
 
-@pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
-def test_swapped_hands_are_corrected(still: list[np.ndarray], monkeypatch) -> None:
-    """The first search takes each one's back for the other one's palm."""
-    turned = {}
-    for side, other in zip(SIDES, SIDES[::-1], strict=True):
-        world = HOME[other].world_from_palm @ np.diag([1.0, -1.0, -1.0, 1.0])
-        turned[side] = HandPose(world, model_and_surface(side)[0].pose_prior.mean.copy())
-    nodes = ShownNodes(two_bare_hands(), EMPTY)
-    with monkeypatch.context() as patched:
-        given(patched, turned)
-        nodes.show_until_tracked(still)
-    assert all(error_mm(one, side, HOME[side]) > 100.0 for side, one in states_of(nodes.states[-1]).items())
-    nodes.show_until(lambda: all(one.tracked and error_mm(one, side, HOME[side]) <= 20.0
-                                 for side, one in states_of(nodes.states[-1]).items()), still, 40)
-
-
 def test_edges_requested_for_one_hand_alone_are_left_out() -> None:
     """The rig has got a second hand while answers were under way."""
     tracker = make_tracker(two_bare_hands())
@@ -149,13 +125,12 @@ def test_edges_requested_for_one_hand_alone_are_left_out() -> None:
     assert tracker.solve() is None
 
 
-def test_the_slices_of_both_hands_fit_into_a_request(monkeypatch) -> None:
+def test_the_slices_of_both_hands_fit_into_a_request(monkeypatch: pytest.MonkeyPatch) -> None:
     """Hands so near that each alone would ask for more than its half."""
-    near = {side: at(side, (x_m, 0.0, 0.28 - DISTANCE_M)) for side, x_m in zip(SIDES, (0.07, -0.07), strict=True)}
-    nodes = ShownNodes(two_bare_hands(), EMPTY)
+    close = {side: at(side, (x_m, 0.0, 0.28 - DISTANCE_M)) for side, x_m in zip(SIDES, (0.07, -0.07), strict=True)}
+    nodes = ShownNodes(two_bare_hands(close), EMPTY)
     monkeypatch.setattr("rhot_app.tracking.contours.requests.STEP_M", 1e-3)
-    given(monkeypatch, near)
-    nodes.show(shown(near, 0), 6)
+    nodes.show(shown(close, 0), 8)
     assert all(SLICES_MAX // 2 < len(request.slices) <= SLICES_MAX for request in nodes.asked)
 
 

@@ -8,7 +8,7 @@ import time
 import msgspec
 import numpy as np
 import pytest
-from bare_scenes import model_and_surface, poses, rig_of, scene
+from bare_scenes import model_and_surface, near, poses, rig_of, scene
 from bench import START_S, TEST_S, Bench, messages_of, node_status, wait_until
 from shipped_rig import RIGHT_HAND
 
@@ -16,7 +16,6 @@ from rhot_app.engine.client import EngineClient
 from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.engine.status import Preview
 from rhot_app.hand.kinematics import forward
-from rhot_app.project import TrackerSettings
 from rhot_app.recording.raw_log import LogReader, RecordKind
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState, SeenContour
@@ -48,9 +47,9 @@ def record(bench: Bench) -> None:
                        0) as out:
             for number, which in enumerate((-1, *ORDER)):
                 out.append(round(1e9 * number / FPS), packed[1 + which])
-    seen = rig_of(cameras)
+    seen = rig_of(cameras, shown=[near(poses("grasp", TIMES)[0])])
     bench.rig = msgspec.structs.replace(
-        bench.rig, hand=RIGHT_HAND, tracker=TrackerSettings("estimator", observe="contours"),
+        bench.rig, hand=RIGHT_HAND, tracker=msgspec.structs.replace(seen.tracker, kind="estimator", observe="contours"),
         nodes=tuple(msgspec.structs.replace(node, intrinsics=other.intrinsics, pose=other.pose)
                     for node, other in zip(bench.rig.nodes, seen.nodes, strict=True)))
     bench.save()
@@ -90,7 +89,7 @@ def test_a_bare_hand_is_tracked_by_what_its_nodes_find(bench: Bench) -> None:
                     received.append((time.monotonic_ns(), message))
                 elif isinstance(message, Preview):
                     previews.append(message)
-                elif isinstance(message, SeenContour):
+                elif isinstance(message, SeenContour) and not message.shown:
                     contours.add((message.camera, message.t_node_ns))
         client.command("record_stop", timeout_s=COMMAND_S)
     model = model_and_surface()[0]

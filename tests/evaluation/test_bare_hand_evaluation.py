@@ -66,14 +66,14 @@ def test_one_that_is_twenty_millimetres_off_has_lost_the_hand() -> None:
 def test_live_a_state_may_be_two_pictures_old(age_s: float, lost: float) -> None:
     """It is judged by the truth at its own time."""
     case = next(case for case in CASES if case.live)
-    assert case.start == "nothing"
+    assert case.start == "shown"
     assert figures_of([run(case, finds_after=20, age_s=age_s)[0]])["lost_part"] == lost
 
 
-def test_start_from_nothing_is_timed_from_the_whole_hand_in_view() -> None:
-    case = next(case for case in CASES if case.start == "nothing")
+def test_a_shown_start_is_timed_from_the_whole_hand_in_view() -> None:
+    case = next(case for case in CASES if case.start == "shown")
     result, tracker = run(case, finds_after=60)
-    assert tracker.given is None, "nothing is given"
+    assert tracker.given is None, "the rig says what is shown"
     first = np.argmax([sequence(case).truth_at(t[0]).in_view for t in sequence(case).times_ns])
     assert 0 < first < 60, "the hand is not there at first"
     assert result.start_s == pytest.approx((60 - first) / 30.0, abs=0.07)

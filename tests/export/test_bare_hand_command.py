@@ -96,7 +96,7 @@ def test_a_hand_in_two_videos_is_a_table_and_a_film(recorded: Recorded, tmp_path
         tracker.start(recorded.frames[round(1e-9 * t_ns * FPS)].truth.pose, t_ns)
         return True
 
-    monkeypatch.setattr(BareHandTracker, "find", find)  # small pictures are enough to follow a hand, not to find it
+    monkeypatch.setattr(BareHandTracker, "begin", find)  # small pictures are enough to follow a hand, not to begin
     out, film = tmp_path / "hand.csv", tmp_path / "hand.avi"
     code = main(recorded.arguments("--background-seconds", str((EMPTY - 0.5) / FPS), "--out", str(out), "--overlay",
                                    str(film), "--json"))
@@ -132,10 +132,10 @@ def test_a_hand_that_is_found_again_has_its_own_key_frames(recorded: Recorded,
     followed = HandFollower(load_rig(recorded.rig), [learn_background(skin_foreground(), one) for one in empty],
                             known_size=True)
     followed.start(there[0].truth.pose, 0)
-    shown = [*there[:4], *away, *[there[0]] * 2]
+    shown = [*there[:4], *away, *[there[0]] * 8]
     for number, frame in enumerate(shown):
-        if number == len(shown) - 2:
-            monkeypatch.setattr(BareHandTracker, "find", find)
+        if number == len(shown) - 8:
+            monkeypatch.setattr(BareHandTracker, "begin", find)
         state = followed.step(frame.images, [round(1e9 * number / FPS)] * 2)
         if number == 3:
             assert state.tracked and followed.key_frames.kept

@@ -85,3 +85,19 @@ def test_a_contour_of_another_moment_is_not_shown(panel, hand):
     live.previews[late.camera] = previews[0]
     panel.refresh(live)
     assert greens(panel.grab().toImage()) > 250
+
+
+def test_the_pose_that_a_hand_is_to_take_is_shown_in_every_picture_until_it_is_followed(panel, hand):
+    _, previews, contours = hand
+    live = Live()
+    later = replace(previews[0], t_master_ns=T_NS + 8_000_000, t_node_ns=T_NODE_NS + 8_000_000)
+    live.previews[later.camera] = later
+    before = panel.grab().toImage()
+    live.contours.append(replace(contours[0], shown=True, slices=contours[0].slices[:0]))
+    panel.refresh(live)
+    assert panel.views[later.camera].contours and greens(panel.grab().toImage()) == 0
+    assert panel.grab().toImage() != before
+    live.contours.append(contours[0])
+    live.previews[later.camera] = replace(later, t_node_ns=T_NODE_NS + 16_000_000)
+    panel.refresh(live)
+    assert not panel.views[later.camera].contours, "it is followed now"

@@ -60,6 +60,14 @@ class PalmOnPlane:
         part = (self.distance_m - self.normal @ centre) / along if abs(along) > 1e-9 else -1.0
         return centre + part * way if part > 0.0 else None
 
+    def facing(self, fingers: Array) -> Array:
+        """(3, 3) rotation world_from_palm of a palm that lies on the plane, its fingers along `fingers` (3,) as
+        far as they can."""
+        along = fingers - (self.normal @ fingers) * self.normal
+        length = float(np.linalg.norm(along))
+        along = self._within[0] if length < 1e-6 else along / length
+        return np.column_stack([along, np.cross(self.normal, along), self.normal])
+
     def turns(self, count: int) -> Array:
         """(count, 3, 3) rotations world_from_palm of palms that lie on the plane, turned evenly all around."""
         first = np.column_stack([self._within[0], np.cross(self.normal, self._within[0]), self.normal])

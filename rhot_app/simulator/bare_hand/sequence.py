@@ -47,6 +47,9 @@ Picture = NDArray[np.uint8]
 ENTRY_S: Final = 0.6
 """How long a hand takes to come into the picture from below."""
 
+SPEED_UP_S: Final = 0.4
+"""How long a hand that was held still takes to its motion's speed."""
+
 _EXPOSURE_STEP_S: Final = 0.7  # from one step of an automatic exposure to the next
 _EXPOSURE_STEP: Final = 0.3  # largest step, part of the light
 _COMMON: Final = 0.6
@@ -60,7 +63,8 @@ class BareHandOptions:
     `length_sd`, `radius_sd`: standard deviations of bone lengths and of radii, parts of 1. `tone`: of the skin, 1..10
     on the Monk scale, None: drawn from 2 to 9. `sleeve`: the forearm wears one. `facing`: the side of the hand towards
     the cameras. `turn_deg`: largest turn of the whole motion, about any axis. `enters_after_s`: the background alone
-    is seen so long, then the hand comes in from below; None: it is there. `exposure_steps`: an automatic exposure
+    is seen so long, then the hand comes in from below; None: it is there. `holds_s`: so long it then holds the motion's
+    first pose. `exposure_steps`: an automatic exposure
     changes by up to 30 %. `row_time_us`: of the rolling shutter. `camera_delay`: part of a frame by which the second
     camera lags. `calibration_deg`, `calibration_mm`: how wrong the tracker's rig is. `lost`: (camera, from s, to s) in
     which a camera delivers no picture. `mesh_m`: length of the surface's edges.
@@ -76,6 +80,7 @@ class BareHandOptions:
     facing: Literal["palm", "back"] = "palm"
     turn_deg: float = 0.0
     enters_after_s: float | None = None
+    holds_s: float = 0.0
     exposure_ms: float = 4.0
     exposure_steps: bool = False
     row_time_us: float = 0.0
@@ -123,7 +128,7 @@ class BareHandSequence:
     tracker_rig: Rig
     model: HandModel
     motion: str
-    source: PoseSource
+    source: MovedSource
     options: BareHandOptions
     seconds: float
     rate_hz: float
@@ -285,7 +290,8 @@ def miscalibrated(rig: Rig, turn_rad: float, shift_m: float, seed: int) -> Rig:
 @dataclass(frozen=True)
 class MovedSource:
     """A `PoseSource` that begins another one at `start_s`, turned by `turn` (3, 3) about `centre` (3,) m and shifted by
-    `shift` (3,) m; until `enters_s` the hand stands `below_m` lower, out of the picture, and then rises."""
+    `shift` (3,) m; until `enters_s` the hand stands `below_m` lower, out of the picture, and then rises. `holds_s`:
+    until so long after it has risen, it holds its first pose."""
 
     base: PoseSource
     start_s: float = 0.0
@@ -294,10 +300,20 @@ class MovedSource:
     shift: Array = field(default_factory=lambda: np.zeros(3))
     enters_s: float | None = None
     below_m: float = 0.5
+    holds_s: float = 0.0
+
+    @property
+    def moves_s(self) -> float:
+        """When a hand that is held begins to move."""
+        return (0.0 if self.enters_s is None else self.enters_s + ENTRY_S) + self.holds_s
 
     def sample(self, times_s: Array) -> tuple[Array, Array]:
         """(T, 4, 4) world_from_palm and (T, 21) rad at times (T,) s."""
-        transforms, angles = self.base.sample(times_s + self.start_s)
+        moved_s = times_s
+        if self.holds_s:
+            late = np.maximum(times_s - self.moves_s, 0.0)
+            moved_s = np.where(late < SPEED_UP_S, 0.5 * late**2 / SPEED_UP_S, late - 0.5 * SPEED_UP_S)
+        transforms, angles = self.base.sample(moved_s + self.start_s)
         out = transforms.copy()
         out[:, :3, :3] = self.turn @ transforms[:, :3, :3]
         out[:, :3, 3] = (transforms[:, :3, 3] - self.centre) @ self.turn.T + self.centre + self.shift
@@ -317,7 +333,8 @@ def _pose_source(rig: Rig, motion: str, seed: int, options: BareHandOptions) -> 
     turn = exp_so3(math.radians(options.turn_deg) * rng.uniform() * axis / np.linalg.norm(axis))
     shift = (options.turn_deg > 0.0) * rng.uniform(-0.04, 0.04, 3)
     start_s = float(rng.uniform(0.0, base.period_s))
-    return MovedSource(base, start_s, turn, centre, shift, options.enters_after_s, 0.8 * options.distance_m)
+    return MovedSource(base, start_s, turn, centre, shift, options.enters_after_s, 0.8 * options.distance_m,
+                       options.holds_s)
 
 
 @functools.cache

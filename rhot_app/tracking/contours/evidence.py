@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import SILHOUETTE
-from rhot_app.barehand.follower import MAJORITY
 from rhot_app.barehand.joints import place_joints
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
-from rhot_app.barehand.relocalisation import SAME_HAND_M, SAME_POSE_M
+from rhot_app.barehand.relocalisation import SAME_POSE_M
+from rhot_app.barehand.start import MAJORITY, joints_on_foreground
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
@@ -23,6 +23,9 @@ from rhot_app.tracking.contours.requests import NEVER, CameraFrames
 from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
 
 Array = NDArray[np.float64]
+
+SAME_HAND_M = 0.1
+"""m: palms of one hand are nearer to each other: a hand's breadth."""
 
 NEAR_SD = 3.0
 """Standard deviations from the contour within which an edge is displayed as the hand's."""
@@ -53,9 +56,9 @@ class _CameraEvidence:
 
 
 class Evidence:
-    """The observations of one tracked hand. `confirmed`: two searches agree on it. `observed_ns`: newest master time at
-    which all cameras that should observe it did: all of them until it is confirmed, then those in whose images most of
-    it lies."""
+    """The observations of one tracked hand. `confirmed`: it has held its start pose, or markers show it. `observed_ns`:
+    newest master time at which all cameras that should observe it did: all of them until it is confirmed, then those in
+    whose images most of it lies."""
 
     def __init__(self, hand: BareHandTracker, cameras: Sequence[CameraFrames]) -> None:
         self._hand, self._cameras = hand, cameras
@@ -109,15 +112,7 @@ class Evidence:
 def on_foreground(hand: BareHandTracker, frame: ForegroundFrame, state: Array) -> tuple[float, float]:
     """Part of the 21 joints of a hand in `state` that project into a camera's image where the foreground is known, and
     the part of these that lie on foreground."""
-    camera = hand.cameras[frame.camera]
-    places = camera.project(joints_of(hand, state))
-    with np.errstate(invalid="ignore"):
-        inside = np.all((places > -0.5) & (places < [camera.width - 0.5, camera.height - 0.5]), axis=1)
-    rows, columns = frame.probability.shape
-    x, y = (places[inside] // frame.step).astype(int).T
-    shown = frame.probability[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)]
-    shown = shown[~np.isnan(shown)]
-    return len(shown) / len(places), float(np.mean(shown > 0.5)) if len(shown) else 0.0
+    return joints_on_foreground(hand.cameras[frame.camera], joints_of(hand, state), frame.probability, frame.step)
 
 
 def same_hand(hand: BareHandTracker, state: Array, pose: HandPose) -> bool:
@@ -136,9 +131,10 @@ def joints_of(hand: BareHandTracker, state: Array) -> Array:
     return points[:21]
 
 
-def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array, t_node_ns: int = 0) -> SeenContour:
+def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array, t_node_ns: int = 0,
+                 shown: bool = False) -> SeenContour:
     """The contour of a hand in `state` in the image of `t_ns`, `t_node_ns` by its node's clock, with slices and edges,
-    for display."""
+    for display. `shown`: see `SeenContour`."""
     offset, _, good = frame.predict(state)
     centre, normal, half = frame.slices[:, :2], frame.slices[:, 2:4], frame.slices[:, 4:]
     ends = np.hstack([centre - half * normal, centre + half * normal])
@@ -150,4 +146,5 @@ def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array, t_no
         places = centre[row] + along[:, None] * normal[row]
         near = np.abs(along - offset[row]) < NEAR_SD * np.hypot(frame.expected_sd[row], edges.sd[row, column])
     return SeenContour(camera, t_ns, (centre + offset[:, None] * normal)[good],
-                       frame.points.behind[good] == SILHOUETTE, ends[good], places, near, t_node_ns)
+                       frame.points.behind[good] == SILHOUETTE, ends[good] if not shown else np.empty((0, 4)), places,
+                       near, t_node_ns, shown=shown)

@@ -2,7 +2,7 @@
 
 The hand is predicted to each camera's next frame, and its node is requested to search across the contours there. The
 returned edges are residuals of one state, as markers are. A node sends a small foreground map with them, by which a
-track is started and verified.
+track is started, where the hand has taken the pose that is shown, and verified.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
-from rhot_app.barehand.relocalisation import RELOCALISATION_LOG_ODDS, SAME_POSE_M
-from rhot_app.barehand.tracker import START_SD, BareHandTracker
+from rhot_app.barehand.start import HELD_NS
+from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
-from rhot_app.tracking.contours.evidence import Evidence, joints_of, same_hand, seen_contour
+from rhot_app.tracking.contours.evidence import Evidence, same_hand, seen_contour
 from rhot_app.tracking.contours.finder import SAME_MAPS_NS, Finder, Maps, NewestMaps
 from rhot_app.tracking.contours.markers import MarkersOfHand, update_hand
 from rhot_app.tracking.contours.occlusion import Capsules
@@ -41,18 +41,19 @@ Estimate = tuple[Array, Array]
 class ContourEstimator:
     """Implements `Tracker` and `ImageTracking`: a state after the edges of each frame."""
 
-    def __init__(self, rig: Rig, hands: int = 1) -> None:
-        """`hands`: number of hands that share the nodes' requests. Raises RigError when markers are observed and one
-        has no position on the hand."""
+    def __init__(self, rig: Rig, hands: int = 1, aside: float = 0.0) -> None:
+        """`hands`: number of hands that share the nodes' requests. `aside`: see `barehand.start.shown_pose`. Raises
+        RigError when markers are observed and one has no position on the hand."""
         self.diagnostics = Diagnostics()
         self._rig, self._max_slices = rig, SLICES_MAX // hands
         self.occluder: Callable[[int], Capsules | None] = lambda _: None
-        self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale)
+        self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale, aside=aside)
         self._markers = MarkersOfHand(rig, self._hand) if _marked(rig) else None
-        self._finder = Finder(self._hand, alone=hands == 1)
+        self._finder = Finder(self._hand)
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._names = tuple(node.name for node in rig.nodes)
         self.key_frames = KeyFrames(self._hand.model)
+        self._shown_contours: list[SeenContour] = []
         self._sequence = 0
         self.reset()
 
@@ -95,12 +96,21 @@ class ContourEstimator:
         return tuple(camera.newest for camera in self._cameras)
 
     def seen(self) -> list[SeenContour]:
-        """See `ShowsContours`."""
+        """See `ShowsContours`. Without a hand, the pose that it is to take."""
         if not self.confirmed:
-            return []
+            return self._shown()
         state = self._hand.filter.newest.state
         return [seen_contour(self._names[number], image.t_row0_master_ns, contour, state, image.t_row0_node_ns)
                 for number, (image, contour) in self._used.items()]
+
+    def _shown(self) -> list[SeenContour]:
+        hand, pose = self._hand, self._hand.start_pose
+        if not self._shown_contours:
+            state, covariance = hand.process.start(pose.world_from_palm, pose.angles, (1e-6, 1e-6))
+            self._shown_contours = [seen_contour(name, 0, hand.expected_contour(number, state, covariance), state,
+                                                 shown=True) for number, name in enumerate(self._names)]
+        return [replace(contour, t_master_ns=frame.t_row0_master_ns, t_node_ns=frame.t_row0_node_ns)
+                for contour, frame in zip(self._shown_contours, self.newest_frames(), strict=True) if frame is not None]
 
     def requests(self) -> list[SliceRequest]:
         """The newest requests to the nodes."""
@@ -122,7 +132,7 @@ class ContourEstimator:
         hand.process.difference(state, state)  # compiled here, for `MarkersOfHand.choose_prediction`
         self._finder.relocalise(maps, hand.filter.newest.state, hand.filter.newest.covariance, 0.03)
         self._finder.wait()
-        self._finder.search_everywhere(maps)
+        self._finder.look(maps)
         self._finder.wait()
         hand.state()
         self.reset()
@@ -145,7 +155,7 @@ class ContourEstimator:
 
     @property
     def confirmed(self) -> bool:
-        """Whether there is a confirmed track: two searches, or markers and contours, agree on the hand."""
+        """Whether there is a confirmed track: the hand has held its start pose, or markers and contours agree on it."""
         return self._tracking and self._evidence.confirmed
 
     def state_at(self, t_ns: int) -> Array:
@@ -157,10 +167,9 @@ class ContourEstimator:
         """Longest time between simultaneous maps, ns."""
         return self._maps.simultaneous_ns
 
-    def start(self, pose: HandPose, t_ns: int, *, verified: bool = False) -> None:
-        """Start a track, not yet confirmed, at a pose of master time `t_ns`; `verified`: see `BareHandTracker.start`.
-        """
-        self._hand.start(pose, t_ns, verified=verified)
+    def start(self, pose: HandPose, t_ns: int) -> None:
+        """Start a track, not yet confirmed, at a pose of master time `t_ns`."""
+        self._hand.start(pose, t_ns)
         self._hand.relocaliser.average_odds = 0.0
         self._finder.reset()
         self.key_frames.clear()
@@ -173,7 +182,7 @@ class ContourEstimator:
         self._requests.start(t_ns)
 
     def drop_track(self) -> None:
-        """End the track, and search for a hand again. The result of a search that runs is used."""
+        """End the track, and wait for a hand that takes its start pose."""
         self._tracking = False
         self._hand.tracking = False
         self._hand.frames = [None] * len(self._names)
@@ -274,7 +283,7 @@ class ContourEstimator:
         self._unverified = maps or self._unverified
 
     def _verify(self) -> None:
-        """Confirm or relocalise the track by the newest maps of all cameras, once all edges are used."""
+        """Relocalise or confirm the track by the newest maps of all cameras, once all edges are used."""
         maps = self._unverified
         if maps is None or self._waiting or not self._tracking:
             return
@@ -282,53 +291,31 @@ class ContourEstimator:
         if maps.t_ns == self._maps_ns:
             return
         self._maps_ns = maps.t_ns
-        # Overlapping hands are not verified: whose foreground it is, is ambiguous. A new track is first relocalised
-        # near its start, which is quick, so that its evidence lasts until a second search of the whole image ends.
+        # Overlapping hands are not verified: whose foreground it is, is ambiguous.
         if not any(self.overlaps) and self._finder.verify(
                 maps, self._seconds(maps.t_ns), 1e-9 * min(one.period_ns for one in self._cameras)):
             self._requests.restart()
         oldest_ns = max(self._epoch_ns, maps.t_ns - max(SAME_MAPS_NS, self._maps.simultaneous_ns))
-        if not self._evidence.confirmed:
-            self._confirm(maps, observed=self._evidence.observed_ns > oldest_ns)
-
-    def _confirm(self, maps: Maps, *, observed: bool) -> None:
-        """Confirm the track if a second search finds the same hand, or if its markers show it. Start anew at the pose
-        of the search where that is more probable; else search again.
-
-        `observed`: the hand's edges or markers were seen since these maps; otherwise nothing is confirmed. Searches are
-        random: two agree on a wrong pose less probably than one is wrong.
-        """
-        if observed and maps.t_ns - self._agreed_ns < SAME_MAPS_NS:
-            self._evidence.confirmed = self._was_confirmed = True
+        observed_ns = self._evidence.observed_ns
+        if self._evidence.confirmed or observed_ns <= oldest_ns:
             return
-        found = self._finder.found()
-        if found is None:
-            self._finder.search_everywhere(maps)
-            return
-        pose, t_ns = found
-        state, _ = self._predict(t_ns)
-        other, _ = self._hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
-        relocaliser = self._hand.relocaliser
-        odds = relocaliser.odds_of(maps.probabilities)
-        gain = relocaliser.log_odds(odds, other) - relocaliser.log_odds(odds, state)
-        apart_m = float(np.linalg.norm(joints_of(self._hand, other) - joints_of(self._hand, state), axis=1).mean())
-        same = same_hand(self._hand, state, pose)
-        if gain > (RELOCALISATION_LOG_ODDS if same else 0.0) and apart_m > SAME_POSE_M:
-            self.start(pose, t_ns)  # the hand has entered the image since, or is another one
-        elif same and observed:
+        if maps.t_ns - self._agreed_ns < SAME_MAPS_NS:
             self._evidence.confirmed = self._was_confirmed = True
-        else:
-            self._finder.search_everywhere(maps)
+        elif observed_ns - self._epoch_ns >= HELD_NS:
+            if self._hand.holds(maps.probabilities, self._predict(maps.t_ns)[0]):
+                self._evidence.confirmed = self._was_confirmed = True
+            else:
+                self.drop_track()
 
     # -- the track -----------------------------------------------------------------------------------------------------
 
     def _acquire(self, maps: Maps | None) -> None:
-        """Start a track where the finder has found a hand, or have it search the newest maps."""
+        """Start a track where a hand has taken its start pose, or look for one in the newest maps."""
         found = self._finder.found()
         if found is not None:
             self.start(*found)
         elif maps is not None:
-            self._finder.search_everywhere(maps)
+            self._finder.look(maps)
 
     def _take_markers(self, frame: CameraObservations, markers: MarkersOfHand) -> bool:
         """Start a track by the markers of one frame, or update by them. Returns whether any markers were used."""
@@ -343,16 +330,15 @@ class ContourEstimator:
             return False
 
     def _locate(self, frame: CameraObservations, markers: MarkersOfHand) -> None:
-        """Start a track where the markers show a hand, unless they show the tracked one, which then is as good as found
-        twice."""
+        """Start a track where the markers show a hand, unless they show the tracked one, which then is confirmed."""
         found = markers.locate(frame)
         if found is None:
             return
         pose, t_ns = found
         if self._tracking and same_hand(self._hand, self._hand.filter.newest.state, pose):
-            self._agreed_ns, self._hand.verified = t_ns, True
+            self._agreed_ns = t_ns
         else:
-            self.start(pose, t_ns, verified=True)
+            self.start(pose, t_ns)
 
     # -- times and states ----------------------------------------------------------------------------------------------
 

@@ -1,8 +1,8 @@
 """Two bare hands at once: a `ContourEstimator` for each. The nodes search the contours of both.
 
-The part of an image that one hand occludes has no information on the other one. So each hand is searched for in the
-rest of the foreground, and its contour where the other one does not occlude it. Two estimates in one place are one
-hand: the foreground decides which.
+The part of an image that one hand occludes has no information on the other one. So the foreground of each is the rest,
+and its contour is searched where the other one does not occlude it. Two estimates in one place are one hand: the
+foreground decides which.
 """
 
 from __future__ import annotations
@@ -16,20 +16,19 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest
-from rhot_app.barehand.relocalisation import LOCAL_SEARCH_S, RELOCALISATION_LOG_ODDS, SAME_HAND_M
+from rhot_app.barehand.relocalisation import RELOCALISATION_LOG_ODDS
 from rhot_app.barehand.silhouette import CORRELATED, score
-from rhot_app.barehand.start import STEP
+from rhot_app.barehand.start import ASIDE_M, START_SD, STEP
 from rhot_app.barehand.surface import SHAPE
-from rhot_app.barehand.tracker import START_SD, BareHandTracker
+from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
-from rhot_app.hand.kinematics import forward
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import Rig
 from rhot_app.state import HandState, SeenContour
 from rhot_app.tracking.contours.evidence import joints_of
-from rhot_app.tracking.contours.finder import Finder, Maps
+from rhot_app.tracking.contours.finder import Maps
 from rhot_app.tracking.contours.occlusion import Capsules, capsules_in, occluded_pixels, visible
 from rhot_app.tracking.contours.requests import JUMP_NS, NEVER
 from rhot_app.tracking.contours.tracker import ContourEstimator
@@ -55,13 +54,13 @@ class TwoBareHands(TwoHands):
 
     def __init__(self, rig: Rig) -> None:
         """Raises RigError as `ContourEstimator`."""
-        super().__init__(rig, lambda own: ContourEstimator(own, hands=2))
+        super().__init__(rig, lambda own: ContourEstimator(  # a right palm that faces a camera is to its left
+            own, hands=2, aside=-ASIDE_M if own.hand.side == "right" else ASIDE_M))
         assert isinstance(self._hand, ContourEstimator) and isinstance(self._other, ContourEstimator)
         self._both = self._hand, self._other
         for hand in self._both:
             hand.occluder = partial(self._occluder, hand)
         self._cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
-        self._alternatives = Finder(self._other.hand), Finder(self._hand.hand)
         self._thick_m = 1e-3 * rig.hand.palm_thickness_mm
         self._clear()
 
@@ -75,11 +74,12 @@ class TwoBareHands(TwoHands):
         self._maps: list[ForegroundFrame | None] = [None] * len(self._newest)
         self._states: list[HandState | None] = [None, None]
         self._published_ns = NEVER
-        self._occluder_ns, self._searched_ns = [NEVER, NEVER], [NEVER, NEVER]
-        # log odds by which the other hand explains a hand's foreground better
-        self._gains: list[float | None] = [None, None]
-        for finder in self._alternatives:
-            finder.reset()
+        self._occluder_ns = [NEVER, NEVER]
+
+    @property
+    def hands(self) -> tuple[ContourEstimator, ContourEstimator]:
+        """The estimators of the rig's hand and of its other hand."""
+        return self._both
 
     # -- images --------------------------------------------------------------------------------------------------------
 
@@ -91,11 +91,9 @@ class TwoBareHands(TwoHands):
         self._maps[frame.camera] = frame
         t_ns = frame.t_row0_master_ns
         apart_ns = [abs(t_ns - one.t_row0_master_ns) for one in self._maps if one is not None]
-        if not any(self._both[0].simultaneous_ns < apart < JUMP_NS for apart in apart_ns):  # all maps are simultaneous
-            if self._both[0].tracking and self._both[1].tracking:
-                self._resolve_duplicate(t_ns)
-            for number in range(2):
-                self._check_swap(number, t_ns)
+        simultaneous = not any(self._both[0].simultaneous_ns < apart < JUMP_NS for apart in apart_ns)
+        if simultaneous and self._both[0].tracking and self._both[1].tracking:
+            self._resolve_duplicate(t_ns)
         masked = [self._masked_for(number, frame) for number in range(2)]
         for hand, one in zip(self._both, masked, strict=True):
             hand.ingest_image(one)
@@ -170,36 +168,6 @@ class TwoBareHands(TwoHands):
         if _own_log_odds(one.hand, states[worse], rest) < CORRELATED * RELOCALISATION_LOG_ODDS:
             one.drop_track()
 
-    def _check_swap(self, number: int, t_ns: int) -> None:
-        """Once a hand is confirmed, test whether the other hand explains its foreground better: a left hand's back
-        looks like a right hand's palm. If so, the other hand is started there. Two confirmed hands can only be
-        swapped."""
-        hand, other, finder = self._both[number], self._both[1 - number], self._alternatives[number]
-        if not hand.confirmed:
-            self._gains[number] = None
-            finder.reset()
-        if not hand.confirmed or self._gains[number] is not None:
-            return
-        found = finder.found()
-        if found is None:
-            if not 0 <= t_ns - self._searched_ns[number] < 1e9 * LOCAL_SEARCH_S:  # a search occupies a core
-                self._searched_ns[number] = t_ns
-                finder.search_everywhere(self._newest_maps(t_ns, self._occluder(hand, t_ns)))
-            return
-        pose, found_ns = found
-        state = hand.state_at(found_ns)
-        if _palm_distance_m(joints_of(hand.hand, state), forward(other.hand.model, pose).joints) > SAME_HAND_M:
-            return
-        maps = self._newest_maps(t_ns)
-        instead, _ = other.hand.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
-        odds = hand.hand.relocaliser.odds_of(maps.probabilities)
-        gain = other.hand.relocaliser.log_odds(odds, instead) - hand.hand.relocaliser.log_odds(odds, state)
-        self._gains[number] = gain
-        others = self._gains[1 - number] if other.confirmed else 0.0
-        if others is not None and gain + others > RELOCALISATION_LOG_ODDS:
-            hand.drop_track()
-            other.start(pose, found_ns)
-
     def _newest_maps(self, t_ns: int, without: Capsules | None = None) -> Maps:
         """The foreground maps of about `t_ns`, NaN where the hand `without` is."""
         maps = [one if one is not None and abs(t_ns - one.t_row0_master_ns) <= self._both[0].simultaneous_ns else None
@@ -235,7 +203,7 @@ class TwoBareHands(TwoHands):
 
     def wait(self) -> None:
         """Wait for all running searches."""
-        for one in (*self._both, *self._alternatives):
+        for one in self._both:
             one.wait()
 
     # -- states --------------------------------------------------------------------------------------------------------

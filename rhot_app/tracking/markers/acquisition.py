@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -25,6 +24,7 @@ from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY, HandProces
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
 from rhot_app.hand.solvers.finger_ik import solve_fingers
+from rhot_app.hand.solvers.palm_before_camera import palms_before_camera
 from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
 from rhot_app.tracking import pairing
 from rhot_app.tracking.locate import choose_views, locate_all
@@ -202,17 +202,7 @@ def pose_before_camera(frame: MarkerFrame, process: HandProcess) -> HandPose | N
         return None
     own = np.array([m.places[k].point for k in palm])
     rays = undistort_points(frame.pixels[palm], m.intrinsics[frame.camera])
-    _, turns, shifts, _ = cv2.solvePnPGeneric(own, rays, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP)
-    rotation, shift = m.poses[frame.camera][:, :3], m.poses[frame.camera][:, 3]
-    places = []
-    for vector, away in zip(turns, shifts, strict=True):
-        turn, away = cv2.Rodrigues(vector)[0], away.ravel()
-        middle = turn @ own.mean(axis=0) + away
-        line = middle / np.linalg.norm(middle)
-        mirrored = (np.eye(3) - 2.0 * np.outer(line, line)) @ turn @ np.diag([1.0, 1.0, -1.0])
-        for one in (turn, mirrored):
-            places.append(rigid(rotation.T @ one, rotation.T @ (middle - one @ own.mean(axis=0) - shift)))
-    return _best_of([place for place in places if np.isfinite(place).all()], frame, process)
+    return _best_of(palms_before_camera(own, rays, m.poses[frame.camera]), frame, process)
 
 
 def _best_of(places: Sequence[Array], frame: MarkerFrame, process: HandProcess,

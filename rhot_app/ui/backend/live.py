@@ -120,6 +120,8 @@ class Live:
             self.latency.append(now_ns, np.full(len(LATENCY_COLUMNS), np.nan))
 
     def contours_in(self, preview: Preview) -> list[SeenContour]:
-        """What was seen of bare hands in the very image of a preview."""
-        return [one for one in self.contours
-                if one.camera == preview.camera and one.t_node_ns == preview.t_node_ns != 0]
+        """What was seen of bare hands in the very image of a preview, or the pose that a hand is to take now."""
+        newest = {one.hand: one for one in self.contours if one.camera == preview.camera}
+        return [*(one for one in newest.values() if one.shown),
+                *(one for one in self.contours if one.camera == preview.camera and not one.shown
+                  and one.t_node_ns == preview.t_node_ns != 0)]

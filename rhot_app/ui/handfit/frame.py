@@ -52,8 +52,8 @@ class FitFrame:
                                    "Hold the hand still.")
         self.open_button = _button("Open pictures …", "Picture or video files of one instant, one for each camera. "
                                    "They are told apart by the cameras' names in theirs, or sorted (Ctrl+O).")
-        self.find_button = _button("Find the hand", "Look for the hand by the colour of skin, from nothing; up to half "
-                                   "a minute. An open hand, fingers spread, is found best.")
+        self.find_button = _button("Find the hand", "Look for the hand by the landmark networks (rhot landmarks "
+                                   "install), and put all its joints there.")
         self.instant_box = QComboBox()
         self.instant_box.setToolTip("Which pictures are shown. All instants share the lengths; each has its own pose.")
         self.instant_box.setAccessibleName("Instant")

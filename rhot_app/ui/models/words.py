@@ -38,8 +38,8 @@ CONDITIONS: dict[str, Look] = {
                                     "The nodes stream, but the hand has not been found yet."),
     Condition.TRACKING.value: Look("TRACKING", "disc", "good", "The hand is tracked and every marker is seen."),
     Condition.PARTIAL.value: Look("PARTIAL", "half", "caution",
-                                  "The hand is tracked, but some markers are not seen by enough cameras, or only its "
-                                  "contours have shown it."),
+                                  "The hand is tracked, but some markers, or contours of some fingers, are not "
+                                  "seen by enough cameras."),
     Condition.LOST.value: Look("LOST", "cross", "bad", "The hand was tracked and is out of sight now."),
     Condition.FAULT.value: Look("FAULT", "octagon", "fault", "Something is broken; the sentence below says what."),
 }
@@ -227,7 +227,7 @@ OBSERVED: Final = {
     "landmarks": ("Landmarks", "The joints that a detector finds on a bare hand, in the nodes or in another program. "
                   "The rig's marker set is landmarks21 or another one with landmarks."),
     "contours": ("Contours", "No markers: the nodes search their pictures for the bare hand's edges. Calibrate, "
-                 "Background and skin comes first; then hold the hand still, fingers spread, until it is found."),
+                 "Background and skin comes first; then take the pose that the pictures show, and hold it."),
     "both": ("Paint and contours", "The hand's edges beside its painted markers, such as two fingertips. Calibrate, "
              "Background and skin comes first here, too."),
     "landmarks_and_contours": ("Landmarks and contours", "The bare hand's edges beside a detector's landmarks, which "

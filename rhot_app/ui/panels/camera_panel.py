@@ -25,9 +25,11 @@ from rhot_node.wire.messages import MarkerFlag
 Array = NDArray[np.float64]
 
 OUTLINE_COLOUR, INNER_COLOUR, SLICE_COLOUR = "#28e650", "#3c8cff", "#60808080"
-HAND_COLOUR, OTHER_COLOUR = "#ff2828", "#ffdc00"
+HAND_COLOUR, OTHER_COLOUR, SHOWN_COLOUR = "#ff2828", "#ffdc00", "#ffffff"
 """As in `barehand.overlay`: the contour before the background and within the hand, slices; edges, the hand's and
-others."""
+others; and a pose that the hand is to take."""
+
+TAKE_POSE = "Take this pose with {hands}, and hold it"
 
 _RING_PX = (4.0, 7.0)  # radius in small and in large pictures
 _ROOM_FOR_NAMES_PX = 320.0
@@ -54,6 +56,7 @@ class CameraView(QWidget):
         self._frame = (4, 3)
         self.marks: list[Mark] = []
         self.contours: list[SeenContour] = []
+        self.hands = "the hand"
         self._pointed_at = False
         self.setMinimumSize(120, 90)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -62,7 +65,7 @@ class CameraView(QWidget):
                         "A full ring is a marker seen whole, a broken ring one that is half hidden or doubtful.\n"
                         "Names stand in large pictures, and in small ones while the mouse is over them.\n"
                         "Of a bare hand: green its outline, blue contours within it, red the edges that are its, "
-                        "yellow others.")
+                        "yellow others; white a pose that the hand is to take before it is followed.")
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Four by three."""
@@ -130,6 +133,8 @@ class CameraView(QWidget):
         places = [(mark.place + QPointF(0.5, 0.5)) * scale for mark in self.marks]
         for contour in self.contours:
             paint_contour(painter, contour, scale)
+        if any(contour.shown for contour in self.contours):
+            paint_tag(painter, QPointF(6, target.height() - 26), TAKE_POSE.format(hands=self.hands))
         self._paint_rings(painter, places, target.width())
         if self.named:
             self._paint_names(painter, places, target.size())
@@ -173,8 +178,8 @@ def paint_contour(painter: QPainter, seen: SeenContour, scale: float) -> None:
 
     painter.setPen(QPen(QColor(SLICE_COLOUR), 1.0))
     painter.drawLines([QLineF(*(float(value) for value in row)) for row in (seen.slices + 0.5) * scale])
-    dots(seen.contour[seen.outline], OUTLINE_COLOUR, 5.0)
-    dots(seen.contour[~seen.outline], INNER_COLOUR, 5.0)
+    dots(seen.contour[seen.outline], SHOWN_COLOUR if seen.shown else OUTLINE_COLOUR, 5.0)
+    dots(seen.contour[~seen.outline], SHOWN_COLOUR if seen.shown else INNER_COLOUR, 3.0 if seen.shown else 5.0)
     dots(seen.edges[~seen.of_hand], OTHER_COLOUR, 2.0)
     dots(seen.edges[seen.of_hand], HAND_COLOUR, 2.0)
 
@@ -211,6 +216,8 @@ class CameraPanel(QWidget):
         self.views = {node.name: CameraView(node.name, self._scheme) for node in (rig.nodes if rig else ())}
         self._shown = {}
         for view in self.views.values():
+            if rig is not None:
+                view.hands = f"the {rig.hand.side} hand" if rig.other_hand is None else "each hand"
             self._layout.addWidget(view, 1)
         self.empty.setVisible(rig is None)
 
