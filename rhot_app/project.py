@@ -192,6 +192,19 @@ class StartPose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         _require_angles(self.angles_deg, "to start with")
 
 
+class _PoseFile(StartPose, frozen=True, forbid_unknown_fields=True):
+    """A start pose as a file of its own."""
+
+    format: Literal["rhot-pose"] = "rhot-pose"
+    version: Literal[1] = 1
+
+
+def load_start_pose(path: Path) -> StartPose:
+    """Read and validate a start pose; raises RigError naming file and field."""
+    read = read_document(path, _PoseFile, format_name="rhot-pose", version=1, error=RigError)
+    return StartPose(read.rotation_wxyz, read.translation_m, read.angles_deg)
+
+
 class TrackerSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which tracker makes a hand of the markers, and what it may assume.
 

@@ -65,6 +65,7 @@ ASIDE_M = 0.1
 """m: of a shown hand from the middle, where there are two."""
 
 _CURLS_DEG = ((5.0, 10.0, 5.0), (20.0, 30.0, 20.0), (65.0, 80.0, 45.0))  # MCP, PIP, DIP: open, relaxed, closed
+_PARALLEL = 1e-3  # 3 degrees between the axes of two cameras
 _MIDDLE_TIP = JOINTS.index("middle_tip")
 _THUMB_STEP = 0.5  # rad to either side of a relaxed thumb: a third of its range
 
@@ -107,10 +108,13 @@ def _middle(rig: Rig, cameras: Sequence[CameraModel], model: HandModel) -> Array
     axes = np.array([camera.world_from_camera[:3, 2] for camera in cameras])
     centres = np.array([camera.centre for camera in cameras])
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    met, *_ = np.linalg.lstsq(across.sum(axis=0), np.einsum("cij,cj->i", across, centres), rcond=1e-3)
-    depths = np.sum((met - centres) * axes, axis=1)
-    if len(cameras) > 1 and (depths > NEAR_M).all() and (depths < FAR_M).all():
-        return np.asarray(met)
+    if np.linalg.eigvalsh(across.sum(axis=0))[0] > _PARALLEL:
+        met = np.linalg.solve(across.sum(axis=0), np.einsum("cij,cj->i", across, centres))
+        depths = np.sum((met - centres) * axes, axis=1)
+        if (depths > NEAR_M).all() and (depths < FAR_M).all():
+            return np.asarray(met)
+    elif (axes @ axes[0]).min() < 0.0:  # they face each other
+        return np.asarray(centres.mean(axis=0))
     distance = cameras[0].intrinsics[1] * _length(model) / (HEIGHT_PART * cameras[0].height)
     if rig.calibration is not None:
         distance = rig.calibration.distance_m

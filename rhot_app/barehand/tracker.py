@@ -215,8 +215,8 @@ class BareHandTracker:
         found, expected = self.fit.slice_counts.sum(axis=(0, 1))
         state = self.filter.newest.state if state is None else state
         known = any(one is not None for one in maps)
-        return bool(found > FOUND * expected > 0.0 and known and AGREEMENT < agreement(
-            pose_of(state), state[BIAS:BIAS + SHAPE].copy(), maps, self.cameras, self.surface))
+        return bool(found > FOUND * expected > 0.0 and known and agreement(
+            pose_of(state), state[BIAS:BIAS + SHAPE].copy(), maps, self.cameras, self.surface) > AGREEMENT)
 
     def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
         """The hand after one image (H, W, 3) RGB of each camera, None without one, at master times `t_ns`. Raises

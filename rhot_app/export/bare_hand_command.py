@@ -27,7 +27,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                             help="for contours: a video of the same scene without a hand; once for each camera")
     background.add_argument("--background-seconds", default=None, metavar="S",
                             help="for contours: the videos show no hand for so long at their beginning (default: the "
-                                 "background is not known, the hand is found by the colour of skin)")
+                                 "background is not known, the hand is told by the colour of skin)")
+    parser.add_argument("--start", default=None, metavar="FRAME|POSE.json",
+                        help="for contours: the frame, from 0, in which the hand is in the rig's start pose; or a file "
+                             "with the pose that it takes (default: followed from where it takes the rig's)")
     parser.add_argument("--fps", type=positive_number, default=None, metavar="N",
                         help="frames per second of ordinary videos, instead of what the files say, and of pictures")
     parser.add_argument("--offset-s", action="append", default=[], metavar="NAME=S",
@@ -51,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig
 
-    rig = load_rig(args.rig)
+    rig, start_frame = with_start(load_rig(args.rig), args.start)
     given, empty_given = named(args.video, "--video", rig), named(args.background, "--background", rig)
     for path in (*given.values(), *empty_given.values()):
         input_file(path)  # refused before numba is loaded
@@ -80,13 +83,26 @@ def run(args: argparse.Namespace) -> int:
         _check_empty(videos, empty_s)
         foreground = learn_backgrounds(videos, empty_s)
     line = ProgressLine("tracking")
-    summary = track_videos(rig, videos, foreground, known_size=not args.unknown_size, empty_s=empty_s, out=args.out,
-                           pictures=args.overlay, again=args.force, hand_file=args.adapt, progress=line.report)
+    summary = track_videos(rig, videos, foreground, known_size=not args.unknown_size, empty_s=empty_s,
+                           start_frame=start_frame, out=args.out, pictures=args.overlay, again=args.force,
+                           hand_file=args.adapt, progress=line.report)
     line.finish()
     document = summary.document() | {"out": args.out and str(args.out), "overlay": args.overlay and str(args.overlay),
                                      "hand_file": str(args.adapt) if args.adapt and summary.adapted else None}
     print(json.dumps(document) if args.json else "\n".join(sentences(document)))
     return 0
+
+
+def with_start(rig: Rig, start: str | None) -> tuple[Rig, int | None]:
+    """The rig with the start pose of a file, or the number of the frame with the rig's start pose. Raises RigError."""
+    import msgspec
+
+    from rhot_app.project import load_start_pose
+
+    if start is None or start.isdecimal():
+        return rig, None if start is None else int(start)
+    poses = load_start_pose(input_file(start)), *rig.tracker.start_poses[1:]
+    return msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, start_poses=poses)), None
 
 
 def _check_empty(videos: Sequence[CameraVideo], seconds: float) -> None:
@@ -137,7 +153,8 @@ def sentences(document: dict[str, Any]) -> list[str]:
     count, tracked = document["frame_sets"], document["tracked"]
     out = [f"{count} frame sets, {document['frames_left_out']} frames outside the time that all videos show."]
     if not tracked:
-        out.append("No hand was found. Is the rig's hand of the right side, and the background known?")
+        out.append("No hand took the start pose and held it. Is it the rig's (or --start's), by a hand of the rig's "
+                   "side, and the background known?")
     else:
         times = document["starts"]
         out.append(f"A hand in {100 * tracked:.0f} % of them; found {times} time{'' if times == 1 else 's'}.")

@@ -73,6 +73,8 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
         raise RecordingError("--adapt writes the bones that are measured; leave --bones rig out.")
     if args.background or args.background_seconds is not None:
         said.append("Landmarks need no background: what was given of it is not used.")
+    if args.start is not None:
+        said.append("Landmarks need no start: --start is not used.")
     if rig is None:
         rig = assumed_rig([*args.videos, *(args.video or [])])
         lens = rig.nodes[0].intrinsics

@@ -17,11 +17,12 @@ from recorded_landmarks import FOLDER, needs_recording, recorded_nodes
 
 from rhot_app.__main__ import main
 from rhot_app.barehand.follower import HandFollower
+from rhot_app.barehand.start import start_pose_file
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import RecordingError
 from rhot_app.export.bare_hand import lost_intervals
 from rhot_app.hand.skeleton import JOINTS
-from rhot_app.project import Rig, load_rig, save_rig
+from rhot_app.project import Rig, TrackerSettings, load_rig, save_rig
 from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
 from rhot_app.simulator.bare_hand.sequence import BareHandFrame, BareHandOptions, bare_hand_frames, bare_hand_rig
 from rhot_app.sources.frame_sets import frame_sets, frames_left_out, on_one_clock, open_video
@@ -83,23 +84,27 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     there = list(bare_hand_frames(rig, "rest", 6 / FPS, FPS, 1, options))
     away = list(bare_hand_frames(rig, "rest", EMPTY / FPS, FPS, 1, BareHandOptions(forearm=False, enters_after_s=9.0)))
     frames = away + there
-    save_rig(folder / "rig.json", rig)
+    poses = (start_pose_file(there[0].truth.pose),)
+    save_rig(folder / "rig.json", msgspec.structs.replace(rig, tracker=TrackerSettings(start_poses=poses)))
     videos = {node.name: write_video(folder / f"{node.name}.avi", [frame.images[c] for frame in frames])
               for c, node in enumerate(rig.nodes)}
     return Recorded(folder / "rig.json", videos, frames)
 
 
-def test_a_hand_in_two_videos_is_a_table_and_a_film(recorded: Recorded, tmp_path: Path,
+@pytest.mark.parametrize("start", ["frame", "pose"])
+def test_a_hand_in_two_videos_is_a_table_and_a_film(recorded: Recorded, tmp_path: Path, start: str,
                                                      monkeypatch: pytest.MonkeyPatch,
                                                      capsys: pytest.CaptureFixture[str]) -> None:
-    def find(tracker: BareHandTracker, _: object, t_ns: int) -> bool:
-        tracker.start(recorded.frames[round(1e-9 * t_ns * FPS)].truth.pose, t_ns)
-        return True
-
-    monkeypatch.setattr(BareHandTracker, "begin", find)  # small pictures are enough to follow a hand, not to begin
+    given = str(EMPTY)
+    if start == "pose":
+        monkeypatch.setattr("rhot_app.barehand.follower.HELD_NS", 0)  # the film is short
+        monkeypatch.setattr("rhot_app.barehand.tracker.FOUND", 0.5)  # pictures 320 px wide
+        document = msgspec.to_builtins(load_rig(recorded.rig).tracker.start_poses[0])
+        (tmp_path / "start.json").write_text(json.dumps({"format": "rhot-pose", "version": 1} | document))
+        given = str(tmp_path / "start.json")
     out, film = tmp_path / "hand.csv", tmp_path / "hand.avi"
     code = main(recorded.arguments("--background-seconds", str((EMPTY - 0.5) / FPS), "--out", str(out), "--overlay",
-                                   str(film), "--json"))
+                                   str(film), "--json", "--start", given))
     said = json.loads(capsys.readouterr().out)
     assert code == 0
     with out.open(encoding="utf-8") as file:
@@ -118,7 +123,7 @@ def test_a_hand_in_two_videos_is_a_table_and_a_film(recorded: Recorded, tmp_path
     capture = cv2.VideoCapture(str(film))
     read, picture = capture.read()
     assert read and picture.shape == (240, 640, 3)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["hand.avi", "hand.csv"], "nothing else is left"
+    assert {path.name for path in tmp_path.iterdir()} - {"start.json"} == {"hand.avi", "hand.csv"}
 
 
 def test_a_hand_that_is_found_again_has_its_own_key_frames(recorded: Recorded,
@@ -133,12 +138,15 @@ def test_a_hand_that_is_found_again_has_its_own_key_frames(recorded: Recorded,
                             known_size=True)
     followed.start(there[0].truth.pose, 0)
     shown = [*there[:4], *away, *[there[0]] * 8]
+    monkeypatch.setattr("rhot_app.barehand.tracker.FOUND", 0.5)
     for number, frame in enumerate(shown):
         if number == len(shown) - 8:
             monkeypatch.setattr(BareHandTracker, "begin", find)
         state = followed.step(frame.images, [round(1e9 * number / FPS)] * 2)
         if number == 3:
             assert state.tracked and followed.key_frames.kept
+        if followed.starts == 2:
+            break
     assert state.tracked and followed.starts == 2 and not followed.key_frames.kept
 
 
@@ -149,7 +157,7 @@ def test_videos_without_a_hand_say_so(recorded: Recorded, tmp_path: Path, capsys
                  "--background", f"{name}={path}"]
     assert main(arguments) == 0
     said = capsys.readouterr().out
-    assert "No hand was found" in said and "frame sets a second overall" in said
+    assert "No hand took the start pose" in said and "frame sets a second overall" in said
     out, mine = tmp_path / "hand.csv", tmp_path / "mine.json"
     assert main([*arguments, "--out", str(out), "--adapt", str(mine)]) == 3, "of what was asked for, a part is there"
     said = capsys.readouterr()
@@ -160,7 +168,9 @@ def test_videos_without_a_hand_say_so(recorded: Recorded, tmp_path: Path, capsys
 @pytest.mark.parametrize(("more", "says"), [
     (("--video", "top=x.avi"), "no camera 'top'"), (("--video", "left"), "give a camera and its value"),
     (("--fps", "2000"), "from 1 to 1000"), (("--offset-s", "left=soon"), "no number of seconds"),
-    (("--offset-s", "right=100"), "no common time"), (("--out", "hand.bvh"), ".csv, .parquet or .npz"),
+    (("--offset-s", "right=100"), "no common time"), (("--start", "99"), "frames together, 0 to 11"),
+    (("--start", "-1"), "no such file"), (("--start", "nowhere.json"), "no such file"),
+    (("--out", "hand.bvh"), ".csv, .parquet or .npz"),
     (("--background-seconds", "0.01"), "two pictures without a hand"),
     (("--overlay", "nowhere/pictures"), "does not exist"),
     (("--background-seconds", "2"), "only 0.80 s together"), (("--background-seconds", "0"), "a number above 0"),

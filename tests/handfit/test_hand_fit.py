@@ -21,6 +21,7 @@ from rhot_app.handfit.state import OWN, Anchor, FitState
 from rhot_app.project import CameraCalibration
 from rhot_app.simulator.scene.motion import load_motion
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+from rhot_node.landmarks.networks import DetectedHand
 
 WRIST, INDEX_MCP, INDEX_TIP, LITTLE_MCP = (JOINTS.index(name) for name in ("wrist", "index_mcp", "index_tip",
                                                                           "little_mcp"))
@@ -365,11 +366,40 @@ def test_contours_bring_a_hand_to_its_place():
     assert fit.instant.contour is None, "a hand moved by hand is not where the contours were"
 
 
-def test_a_hand_is_found_from_nothing():
+class ShownHands:
+    """Networks that find a right or left hand in the first pictures that they are given, where its joints are."""
+
+    def __init__(self, places, right=1.0):
+        self.places, self.right = list(places), right
+
+    def find(self, picture):
+        if not self.places:
+            return ()
+        return (DetectedHand(self.places.pop(0), np.zeros((21, 3)), 0.9, self.right, None),)
+
+
+@pytest.mark.parametrize("cameras", [2, 1])
+def test_a_hand_is_found_by_its_landmarks(monkeypatch, cameras):
     rig, pose, _ = drawn()
     fit = begun()
+    joints = forward(build_model(rig.hand), pose).joints
+    networks = ShownHands(camera.project(joints) for camera in fit.cameras[:cameras])
+    monkeypatch.setattr("rhot_app.handfit.landmark_anchors.open_hand_networks", lambda: networks)
     fit.take(fit.with_found_hand(lambda text, part: None), "finding the hand")
-    assert np.median(errors_m(fit, rig.hand, pose)) < 5e-3
+    assert np.median(errors_m(fit, rig.hand, pose)) < (3e-3 if cameras == 2 else 2e-2)
+    assert len(fit.instant.anchors) == 21 * cameras
+    fit.undo()
+    assert not fit.instant.anchors
+
+
+def test_no_hand_of_the_rigs_side_is_said_and_changes_nothing(monkeypatch):
+    fit = begun()
+    before = fit.state
+    joints = [camera.project(fit.solver.places(before.shape, fit.instant)[0]) for camera in fit.cameras]
+    monkeypatch.setattr("rhot_app.handfit.landmark_anchors.open_hand_networks", lambda: ShownHands(joints, 0.1))
+    with pytest.raises(CalibrationError, match="No right hand"):
+        fit.with_found_hand(lambda text, part: None)
+    assert fit.state is before
 
 
 # -- derivatives and the hand file -------------------------------------------------------------------------------------
