@@ -7,15 +7,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rhot_app.barehand.start import start_pose_file
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
+from rhot_app.hand.skeleton import HandPose
 from rhot_app.objects.object_file import ObjectModel, save_object
-from rhot_app.project import RigObject
+from rhot_app.project import Rig, RigObject
 from rhot_app.simulator.bare_hand.painter import BareHand, BareHandPainter
 from rhot_app.simulator.bare_hand.sequence import BareHandOptions, drawn_hand
 from rhot_app.simulator.render.body import Appearance, HandBody, build_body
@@ -94,6 +97,15 @@ def _moved_hand(motion: str, scene: Scene) -> tuple[HandModel, Motion]:
     model = build_model(scene.hand)
     moved = load_motion(motion, model, scene.centre, scene.seed)
     return model, replace(moved, facing=BACK_FACING) if scene.settings.facing == "back" else moved
+
+
+def with_start_pose(rig: Rig, scene_object: SceneObject) -> Rig:
+    """The rig with the pose in which a bare hand begins, as the person is told who moves it."""
+    if not isinstance(scene_object.thing, BareHand):
+        return rig
+    worlds, angles = scene_object.source.sample(np.zeros(1))
+    poses = (start_pose_file(HandPose(worlds[0], angles[0])),)
+    return msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, start_poses=poses))
 
 
 def write_held(scene_object: SceneObject, folder: Path) -> tuple[RigObject, ...]:

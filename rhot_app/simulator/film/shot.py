@@ -10,7 +10,7 @@ import msgspec
 
 from rhot_app.errors import SimulatorError
 from rhot_app.project import save_rig
-from rhot_app.simulator.film.scene_objects import SceneObject, make_object, write_held
+from rhot_app.simulator.film.scene_objects import SceneObject, make_object, with_start_pose, write_held
 from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.painter import Image, Painter
 from rhot_app.simulator.render.render import Exposure, FrameRenderer, Optics
@@ -98,6 +98,7 @@ def save_shot(shot: Shot, folder: Path) -> None:
     ports = tuple(NodePorts(first, first + 1, first + 2, first + 3) for first in firsts)
     for index, name in enumerate(scene.names):
         save_settings(folder / f"{name}.json", node_settings(scene, index, ports=ports[index], trust="open"))
-    save_rig(folder / RIG_NAME, build_rig(scene, ports, write_held(shot.scene_object, folder)))
+    rig = build_rig(scene, ports, write_held(shot.scene_object, folder))
+    save_rig(folder / RIG_NAME, with_start_pose(rig, shot.scene_object))
     write_document(folder / SHOT_NAME, ShotFile(shot.scene_object.name, shot.seconds, scene.seed, sorted(shot.hidden),
                                                 scene.settings, shot.show))

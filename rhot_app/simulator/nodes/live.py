@@ -25,7 +25,7 @@ import zmq
 
 from rhot_app.errors import RhotError, SimulatorError
 from rhot_app.project import save_rig
-from rhot_app.simulator.film.scene_objects import write_held
+from rhot_app.simulator.film.scene_objects import with_start_pose, write_held
 from rhot_app.simulator.nodes.live_cameras import FrameSocket, LiveCameras, Pace
 from rhot_app.simulator.nodes.live_scene import LiveScene
 from rhot_app.simulator.nodes.nodes import READY_TIMEOUT_S, TwinNode, settings_path
@@ -205,7 +205,8 @@ def run(scene: Scene, show: Show, directory: Path, rig_path: Path, over: Callabl
         deadline = time.monotonic() + READY_TIMEOUT_S
         while (ports := supervisor.ports(deadline)) is None:
             cameras.step()
-        save_rig(rig_path, build_rig(scene, tuple(ports), write_held(stage.setting.scene_object, rig_path.parent)))
+        rig = build_rig(scene, tuple(ports), write_held(stage.setting.scene_object, rig_path.parent))
+        save_rig(rig_path, with_start_pose(rig, stage.setting.scene_object))
         door.start()
         print(json.dumps({"event": "ready", "rig": str(rig_path), "pid": os.getpid()}), flush=True)
         pace = Pace(scene.preset.fps)
