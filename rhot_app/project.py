@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from rhot_app.errors import ObjectError, RigError
-from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.skeleton import ANGLES
 from rhot_app.objects.object_file import Name, ObjectModel, load_object, require_distinct
 from rhot_node.files import decode_document, read_document, read_json, resource_path, write_document
@@ -330,13 +330,31 @@ class RigObject(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
         return Path(self.file).parent if Path(self.file).is_absolute() else None
 
 
+def landmark_markers(both: bool = False) -> MarkerSet:
+    """The landmarks of a hand as markers, or those of `both` hands of a rig."""
+    one = load_markers(resource_path("markers", "landmarks21.json"))
+    return _of_both_hands(one) if both else one
+
+
+def _of_both_hands(one: MarkerSet) -> MarkerSet:
+    """The markers of a hand, and the same ones of the other hand."""
+    others = tuple(msgspec.structs.replace(marker, id=f"{OTHER_HAND}{marker.id}", role=f"{OTHER_HAND}{marker.role}")
+                   for marker in one.markers)
+    return msgspec.structs.replace(one, markers=one.markers + others)
+
+
+def usual_hand() -> HandAnatomy:
+    """A right hand of usual size."""
+    return load_hand(resource_path("hands", "right.json"))
+
+
 class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole rig."""
+    """The whole rig. Without `markers` its hands are bare, and tracked by landmarks."""
 
     name: Name
     nodes: Annotated[tuple[RigNode, ...], Meta(min_length=1, max_length=16)]
-    markers: MarkerSet
-    hand: HandAnatomy
+    markers: MarkerSet = msgspec.field(default_factory=landmark_markers)
+    hand: HandAnatomy = msgspec.field(default_factory=usual_hand)
     filters: FilterSettings = FilterSettings()
     depth: DepthSettings = DepthSettings()
     tracker: TrackerSettings = TrackerSettings()
@@ -353,6 +371,9 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.tracker.kind == "classic" and not self.painted:
             msgspec.structs.force_setattr(self, "tracker", msgspec.structs.replace(
                 self.tracker, kind="estimator", observe="landmarks"))
+        if self.other_hand is not None and self.tracker.landmarks and not self.painted and not any(
+                (marker.role or "").startswith(OTHER_HAND) for marker in self.markers.markers):
+            msgspec.structs.force_setattr(self, "markers", _of_both_hands(self.markers))
         fields: tuple[tuple[str, list[int | str]], ...] = (
             ("node_id", [node.node_id for node in self.nodes]), ("name", [node.name for node in self.nodes]),
             ("data_port", [node.data_port for node in self.nodes if node.data_port]),
@@ -439,16 +460,6 @@ def estimator_obstacle(rig: Rig) -> Obstacle | None:
                         "carry none.", "Run rhot-node there and take text_datagrams out of the rig file, or use the "
                         "classic tracker (tracker.kind).")
     return None
-
-
-def landmark_markers(both: bool = False) -> MarkerSet:
-    """The landmarks of a hand as markers, or those of `both` hands of a rig."""
-    one = load_markers(resource_path("markers", "landmarks21.json"))
-    if not both:
-        return one
-    others = tuple(msgspec.structs.replace(marker, id=f"{OTHER_HAND}{marker.id}", role=f"{OTHER_HAND}{marker.role}")
-                   for marker in one.markers)
-    return msgspec.structs.replace(one, markers=one.markers + others, name="landmarks of both hands")
 
 
 def observation_obstacle(rig: Rig) -> Obstacle | None:

@@ -115,9 +115,7 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
 
 def assumed_rig(videos: list[str]) -> Rig:
     """A rig of one camera whose lens is assumed, for one video. Raises RecordingError."""
-    from rhot_app.hand.anatomy import load_hand
-    from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, landmark_markers
-    from rhot_node.files import resource_path
+    from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
 
     if len(videos) != 1:
         raise RecordingError(f"{len(videos)} videos need a calibrated rig with a camera for each; give it with --rig. "
@@ -127,7 +125,7 @@ def assumed_rig(videos: list[str]) -> Rig:
     focal = 0.5 * width / math.tan(0.5 * math.radians(ASSUMED_DEG))
     lens = Intrinsics(width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1), (0.0, 0.0, 0.0, 0.0, 0.0))
     node = RigNode(1, "camera", lens, CameraPose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    return Rig("one assumed camera", (node,), landmark_markers(), load_hand(resource_path("hands", "right.json")))
+    return Rig("one assumed camera", (node,))
 
 
 def picture_size(path: Path) -> tuple[int, int]:

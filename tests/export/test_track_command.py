@@ -189,6 +189,18 @@ def test_a_rig_without_paint_is_tracked_by_landmarks_whatever_else_it_says():
         assert one.painted and one.tracker == painted.tracker
 
 
+def test_a_rig_file_without_markers_has_bare_hands(tmp_path):
+    """Cameras are enough; with another hand both have landmarks."""
+    bare = {key: value for key, value in json.loads((resource_path("rigs", "two_pis.json")).read_text()).items()
+            if key in ("format", "version", "name", "nodes")}
+    (tmp_path / "rig.json").write_text(json.dumps(bare))
+    rig = load_rig(tmp_path / "rig.json")
+    assert rig.tracker.observe == "landmarks" and rig.markers == RIG.markers and rig.hand == RIG.hand
+    (tmp_path / "rig.json").write_text(json.dumps(bare | {"other_hand": msgspec.to_builtins(LEFT)}))
+    both = load_rig(tmp_path / "rig.json")
+    assert both.markers == landmark_markers(both=True) and both.other_hand == LEFT
+
+
 # -- pictures ----------------------------------------------------------------------------------------------------------
 
 def test_one_picture_of_each_camera_is_a_second_in_which_nothing_moves(drawn, monkeypatch, capsys):
