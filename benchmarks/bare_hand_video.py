@@ -94,7 +94,7 @@ def main() -> None:
     films = [film(arguments.folder / f"cam{c}_first120.mp4") for c in (0, 1)]
     first = [frames[arguments.first] for frames in films]
     rig = rig_of(cameras)
-    tracker = BareHandTracker(rig, foreground=[learn_skin(image) for image in first])
+    tracker = BareHandTracker(rig, known_size=False, foreground=[learn_skin(image) for image in first])
     t_ns = round(1e9 * arguments.first / 30.0)
     begin = pose_of(rig, first, [one[arguments.first] for one in points])
     joints = forward(tracker.model, begin).joints
@@ -123,7 +123,7 @@ def pose_of(rig: Rig, images: list[np.ndarray], points: list[np.ndarray]) -> Han
 def follow(tracker: BareHandTracker, cameras: list[CameraModel], films: list[list[np.ndarray]],
            points: list[dict[int, np.ndarray]], arguments: argparse.Namespace, way: str) -> None:
     layered = None
-    worst, median, pixels = [], [], []
+    worst, median, pixels, away_mm = [], [], [], []
     for k in range(arguments.first, arguments.last):
         images, t_ns = [frames[k] for frames in films], round(1e9 * k / 30.0)
         tracker.step(images, [t_ns] * 2)
@@ -144,10 +144,15 @@ def follow(tracker: BareHandTracker, cameras: list[CameraModel], films: list[lis
             size = np.linalg.norm(points[c][k][:, None] - points[c][k], axis=2).max()
             pixels.append(np.linalg.norm(cameras[c].project(state.joint_positions) - points[c][k], axis=1))
             errors.append(pixels[-1] / size)
+        rays = [camera.undistort(one[k]) for camera, one in zip(cameras, points, strict=True)]
+        places = cv2.triangulatePoints(*(camera.camera_from_world[:3] for camera in cameras), *(one.T for one in rays))
+        away_mm.append(1e3 * np.median(np.linalg.norm(state.joint_positions - (places[:3] / places[3]).T, axis=1)))
         worst.append(np.max(errors))
         median.append(np.median(errors))
     print(f"{way}: to the landmarks, px: median {np.median(pixels):.1f}, p95 {np.percentile(pixels, 95):.1f}, worst "
           f"{np.max(pixels):.1f}" + ("" if layered is None else f"; templates {len(layered.templates.templates)}"))
+    print(f"to the triangulated landmarks, median joint, mm: median {np.median(away_mm):.1f}, p95 "
+          f"{np.percentile(away_mm, 95):.1f}, worst {np.max(away_mm):.1f}")
     print(f"frames {len(worst)}, tracked {np.mean(np.array(worst) < 0.1):.0%}, worst joint {np.median(worst):.2f}, "
           f"median joint {np.median(median):.3f}, contour found {np.nanmean(tracker.fit.support):.2f}")
     if arguments.overlay is not None:
