@@ -69,6 +69,8 @@ def with_names(args: argparse.Namespace, rig: Rig) -> list[str]:
 
 def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
     said = []
+    if args.start is not None:
+        raise RecordingError("--start is of contours: add --observe contours, or leave it out; landmarks need none.")
     if args.adapt is not None and args.bones == "rig":
         raise RecordingError("--adapt writes the bones that are measured; leave --bones rig out.")
     if args.background or args.background_seconds is not None:

@@ -323,7 +323,7 @@ def test_a_painted_rig_with_filters_of_its_own_tracks_a_bare_hand() -> None:
 
 
 @pytest.mark.parametrize(("words", "says"), [
-    (["--bones", "rig", "--adapt", "mine.json"], "--bones rig"),
+    (["--bones", "rig", "--adapt", "mine.json"], "--bones rig"), (["--start", "3"], "--observe contours"),
     (["--smooth", "--observe", "contours"], "only landmarks are smoothed"),
     (["--fps", "2000"], "--fps 2000"), (["--out", "hand.bvh"], "hand.bvh")])
 def test_mistakes_are_sentences(drawn, words, says, capsys):
