@@ -52,7 +52,7 @@ _Key = tuple[int, int]  # camera, time of row 0
 @dataclass(slots=True, eq=False)
 class Instant:
     """What is kept of one frame. `none`: the state without a hand. `filtered`: the knot. `recent`, `scale` and
-    `process` are as they were after it. `estimate`: smoothed."""
+    `process` are as they were after it. `by_one`: one camera alone had begun the hand. `estimate`: smoothed."""
 
     number: int
     observations: CameraObservations
@@ -63,6 +63,7 @@ class Instant:
     process: HandProcess | None = None
     filtered: Knot | None = None
     estimate: FilteredState | None = None
+    by_one: bool = False
 
 
 class RecordingEstimator(Estimator):
@@ -150,7 +151,8 @@ class RecordingEstimator(Estimator):
         # The cameras' last observations are carried on by the estimate that they were compared with.
         own = states.describe(instant.t_ns, knot.state, knot.covariance, 0, instant.observations, begun)
         out = states.describe(instant.t_ns + later_ns, state, covariance, 0, instant.observations, begun)
-        return replace(out, marker_raw_positions=own.marker_raw_positions, epipolar_error_px=own.epipolar_error_px)
+        return replace(out, marker_raw_positions=own.marker_raw_positions, epipolar_error_px=own.epipolar_error_px,
+                       condition=Condition.PARTIAL if instant.by_one else out.condition)
 
     # -- observing the estimator ---------------------------------------------------------------------------------------
 
@@ -171,7 +173,7 @@ class RecordingEstimator(Estimator):
     def _weighed(self, frame: MarkerFrame) -> None:
         instant = self._instants.get(_key(frame.observations))
         if instant is not None:
-            instant.none, instant.scale = None, self._scale
+            instant.none, instant.scale, instant.by_one = None, self._scale, self._by_one
             instant.recent, instant.process = _copied(self._observations), _copied(self._process)
         before, knots = self._buffered, list(self._filter.knots)
         if before and not knots[0].residuals and knots[0] is not before[0]:  # begun anew from the newest one

@@ -14,8 +14,12 @@ Array = NDArray[np.float64]
 def palms_before_camera(points: Array, rays: Array, camera_from_world: Array) -> list[Array]:
     """world_from_palm (4, 4) of a palm whose `points` (P, 3) m, palm's frame, at least three, a camera of pose
     `camera_from_world` (3, 4) sees along `rays` (P, 2), undistorted, at depth 1. A palm is nearly flat, so each is
-    followed by its mirror image along the line of sight, which looks alike (Terzakis and Lourakis 2020: SQPnP)."""
-    _, turns, shifts, _ = cv2.solvePnPGeneric(points, rays, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP)
+    followed by its mirror image along the line of sight, which looks alike (Terzakis and Lourakis 2020: SQPnP).
+    None when all rays are one."""
+    try:
+        _, turns, shifts, _ = cv2.solvePnPGeneric(points, rays, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP)
+    except cv2.error:  # all rays are one
+        return []
     rotation, shift = camera_from_world[:, :3], camera_from_world[:, 3]
     places = []
     for vector, away in zip(turns, shifts, strict=True):

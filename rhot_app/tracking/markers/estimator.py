@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,9 +51,6 @@ LOST_AFTER_NS, LOST_AFTER_PERIODS = 500_000_000, 5.0
 WRONG_AFTER_NS, WRONG_AFTER_PERIODS = 100_000_000, 3.0
 """Most observations rejected for this long, or for so many frame periods: the estimate is wrong."""
 
-ALONE_FRAMES = 5
-"""Frames in a row in which one camera alone sees landmarks, before the hand is begun without its distance."""
-
 _JUMP_NS = 1_000_000_000  # frames farther apart are of different sessions
 _PENDING = 16
 
@@ -89,7 +87,7 @@ class Estimator:
             self._size.reset()
             self._resize(*self._size.known)
         self._tracking = self._ever = False
-        self._alone = 0
+        self._by_one = False
         self._epoch_ns = self._accepted_ns = self._plausible_ns = 0
         self._rejections = Rejections(len(self._rig.cameras), self._markers)
 
@@ -116,8 +114,9 @@ class Estimator:
             return self._states.none(self._sequence - 1, Condition.LOST if self._ever else Condition.SEARCHING,
                                      taken[-1], begun)
         knot = self._filter.newest
-        return self._states.describe(self._time_ns(knot.t_s), knot.state, knot.covariance, self._sequence - 1,
-                                     taken[-1], begun)
+        state = self._states.describe(self._time_ns(knot.t_s), knot.state, knot.covariance, self._sequence - 1,
+                                      taken[-1], begun)
+        return replace(state, condition=Condition.PARTIAL) if self._by_one else state
 
     def _seconds(self, t_ns: int) -> float:
         return 1e-9 * (t_ns - self._epoch_ns)
@@ -135,19 +134,23 @@ class Estimator:
         if too_late or not self._observations.enter(frame):
             return False
         self._starter.ingest(self._association.select(observations))
-        if not self._tracking:
+        if not self._tracking or self._by_one:
             located = self._starter.locate()
             scale = 1.0 if self._size is None else self._size.scale
             pose = None if located is None else self._starter.pose_of(located.positions, scale)
             if located is not None and pose is not None:
+                self._by_one = False
                 self._start(located.t_ns, pose, located)
-            elif self._plane is not None:
+                return True
+        if not self._tracking:
+            if self._plane is not None:
                 pose = pose_on_plane(self._plane, frame, self._process)
                 if pose is not None:
                     self._start(frame.t_ns, pose)
             elif self._alone_with(frame):
                 pose = pose_before_camera(frame, self._process)
                 if pose is not None:
+                    self._by_one = True
                     self._start(frame.t_ns, pose)
             return True
         self._update(frame)
@@ -162,15 +165,11 @@ class Estimator:
         return True
 
     def _alone_with(self, frame: MarkerFrame) -> bool:
-        """Whether this camera alone has seen landmarks for ALONE_FRAMES: another one would show how far they are."""
+        """Whether this camera alone sees landmarks: another one would show how far they are."""
         others = [one for camera, one in enumerate(self._observations.newest) if one is not None
                   and camera != frame.camera and abs(one.t_row0_master_ns - frame.t_ns) < LOST_AFTER_NS]
         lost = int(MarkerFlag.LOST)
-        if not (frame.seen & self._markers.landmark).any() or not all((one.flags & lost).all() for one in others):
-            self._alone = 0
-            return False
-        self._alone += 1
-        return self._alone >= ALONE_FRAMES
+        return bool((frame.seen & self._markers.landmark).any()) and all((one.flags & lost).all() for one in others)
 
     def _start(self, t_ns: int, pose: HandPose, located: Located | None = None) -> None:
         """Start at a pose and weigh again what was seen since."""
