@@ -38,7 +38,7 @@ from rhot_app.handfit.solve import (
     free_numbers,
 )
 from rhot_app.handfit.state import Anchor, FitState, Image, Instant
-from rhot_app.progress import Progress, silent
+from rhot_app.progress import Progress
 from rhot_app.project import CameraCalibration, Rig
 
 Array = NDArray[np.float64]
@@ -383,7 +383,7 @@ class HandFit:
 
 def warm_up(rig: Rig, *, contours: bool = False) -> None:
     """Compile what a drag calls, so that the first one is as quick as the others; with `contours` also what searches
-    them and the hand."""
+    them."""
     exact = CameraCalibration("exact")
     fit = HandFit(msgspec.structs.replace(rig, calibration=exact, depth=type(rig.depth)()))
     lens = rig.nodes[0].intrinsics
@@ -394,5 +394,3 @@ def warm_up(rig: Rig, *, contours: bool = False) -> None:
     if contours:
         with suppress(CalibrationError):  # there is nothing to find
             fit.fitted_to_contours()
-        with suppress(CalibrationError):
-            fit.with_found_hand(silent)

@@ -16,11 +16,12 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.handfit.hand_shape import ROOTS, SHAPE_LIMIT, SHAPE_SD, SIZE, Shapes, anatomy_of
-from rhot_app.handfit.session import HandFit
+from rhot_app.handfit.session import HandFit, warm_up
 from rhot_app.handfit.state import OWN, Anchor, FitState
 from rhot_app.project import CameraCalibration
 from rhot_app.simulator.scene.motion import load_motion
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+from rhot_node.errors import KeypointError
 from rhot_node.landmarks.networks import DetectedHand
 
 WRIST, INDEX_MCP, INDEX_TIP, LITTLE_MCP = (JOINTS.index(name) for name in ("wrist", "index_mcp", "index_tip",
@@ -390,6 +391,17 @@ def test_a_hand_is_found_by_its_landmarks(monkeypatch, cameras):
     assert len(fit.instant.anchors) == 21 * cameras
     fit.undo()
     assert not fit.instant.anchors
+
+
+def test_only_finding_the_hand_needs_networks(monkeypatch):
+    def missing():
+        raise KeypointError("the hand networks are not installed.")
+
+    monkeypatch.setattr("rhot_app.handfit.landmark_anchors.open_hand_networks", missing)
+    rig, _, _ = drawn()
+    warm_up(rig, contours=True)
+    with pytest.raises(KeypointError, match="not installed"):
+        begun().with_found_hand(lambda text, part: None)
 
 
 def test_no_hand_of_the_rigs_side_is_said_and_changes_nothing(monkeypatch):
