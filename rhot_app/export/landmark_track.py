@@ -183,11 +183,12 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: boo
     with tempfile.TemporaryDirectory(prefix="rhot-") as folder:
         log = Path(folder) / videos[0].path.with_suffix(".rhotlog").name
         write_hand_log(log, rig, films)
-        if measure and any(video.still for video in videos):
-            bones = "The bones are the rig's: where nothing moves, nothing shows how well they are measured."
-        elif measure:
+        still = any(video.still for video in videos)
+        if measure:
             progress("measuring the bones", 0.9)
             rig, bones = with_measured_bones(rig, log)
+            if still and len(videos) > 1:
+                bones += " They are of one picture: their spread says nothing."
         if unknown_size and rig.hand == base.hand:
             rig = msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, float_scale=True))
         progress("tracking", 0.92)
@@ -222,7 +223,8 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: boo
                  for video, film, own in zip(videos, films, seen, strict=True)},
         bones=bones, side=rig.hand.side, seconds=time.perf_counter() - begun, left_out=frames_left_out(videos),
         figures=figures,
-        adapted=hand_file is not None and _adapted(hand_file, rig.hand, rig.hand != base.hand, bones))
+        adapted=hand_file is not None and _adapted(
+            hand_file, rig.hand, rig.hand != base.hand and not still, bones))
 
 
 def _side_of(films: Sequence[HandFilm]) -> str:

@@ -40,8 +40,8 @@ FPS = 1.0, 1000.0
 """frames/s that a video can have; what a file says beyond them is not a rate but missing."""
 
 STILL_FPS: Final = 30.0
-STILL_FRAMES: Final = 30
-"""What one picture is shown for: a second, in which a tracker settles."""
+STILL_FRAMES: Final = 60
+"""What one picture is shown for: two seconds, in which a hand is found, measured and settles."""
 
 _CLOCK_EVERY_NS = 1_000_000_000
 
@@ -178,7 +178,7 @@ def picture_files(path: Path) -> tuple[Path, ...]:
 
 
 def _open_pictures(node: RigNode, path: Path, pictures: tuple[Path, ...], fps: float | None) -> CameraVideo:
-    """One picture for a second, or those of a folder. Raises RecordingError."""
+    """One picture for two seconds, or those of a folder. Raises RecordingError."""
     try:
         height, width = read_picture(pictures[0]).shape[:2]
     except PictureError as exc:

@@ -22,12 +22,15 @@ from rhot_app.recording.landmark_log import write_landmark_log
 from rhot_app.rig_history import versions
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
 from rhot_app.state import Condition
+from rhot_node.capture.yuv import YuvWriter
+from rhot_node.detect.image import from_bgr
 from rhot_node.errors import KeypointError
 from rhot_node.files import resource_path
 from rhot_node.landmarks import networks
 from rhot_node.landmarks.install import installed_folder
 from rhot_node.landmarks.networks import DetectedHand, Region
 from rhot_node.pictures import open_video
+from rhot_node.video.avi import Stamp, append_picture, begin_video, encode_picture, finish_video
 
 needs_networks = pytest.mark.skipif(installed_folder() is None, reason="`rhot landmarks install` has not been run")
 SECONDS, RATE = 3.0, 20.0
@@ -203,10 +206,10 @@ def test_a_rig_file_without_markers_has_bare_hands(tmp_path):
 
 # -- pictures ----------------------------------------------------------------------------------------------------------
 
-def test_one_picture_of_each_camera_is_a_second_in_which_nothing_moves(drawn, monkeypatch, capsys):
+def test_one_picture_of_each_camera_is_a_film_in_which_nothing_moves(drawn, monkeypatch, capsys):
     _, words, folder = drawn
-    hand = moving_hand(RIG, "grasp", SECONDS, RATE, 1)
-    still = np.repeat(seen_by(RIG, hand.joints()[30:31]), 30, axis=1)
+    hand = moving_hand(RIG, "grasp", SECONDS, RATE, 1, 0.05)
+    still = np.repeat(seen_by(RIG, hand.joints()[30:31]), 60, axis=1)
     use_networks(monkeypatch, [StandIn(pixels[None], 0.95) for pixels in still])
     given = []
     for node in RIG.nodes:
@@ -214,10 +217,35 @@ def test_one_picture_of_each_camera_is_a_second_in_which_nothing_moves(drawn, mo
         cv2.imwrite(str(path), np.zeros((node.intrinsics.height, node.intrinsics.width, 3), np.uint8))
         given.append(f"{node.name}={path}")
     assert main(["track", *given, *words[3:], "--out", str(folder / "hand.csv"), "--json"]) == 0
-    assert "rig's" in json.loads(capsys.readouterr().out)["bones"], "nothing moves"
+    assert "of one picture" in json.loads(capsys.readouterr().out)["bones"]
     times, places = table_of(folder / "hand.csv")
-    assert len(times) == 30
+    assert len(times) == 60
     assert 1e3 * np.median(np.linalg.norm(places[-1] - hand.joints()[30], axis=1)) < 3.0
+    use_networks(monkeypatch, [StandIn(pixels[None], 0.95) for pixels in still])
+    assert main(["track", *given, *words[3:], "--adapt", str(folder / "mine.json")]) == 3
+    assert not (folder / "mine.json").exists(), "one picture tells too little"
+
+
+@pytest.mark.parametrize("with_rig", [True, False])
+def test_raw_frames_and_a_nodes_recording_have_their_own_times(drawn, capsys, with_rig):
+    use, words, folder = drawn
+    lens, name = RIG.nodes[0].intrinsics, RIG.nodes[0].name
+    times = np.cumsum([5_000_000_000, *[50_000_000, 40_000_000] * 8])
+    with YuvWriter(folder / "raw", lens.width, lens.height, 4_000_000, 0) as writer, (
+            folder / "node.avi").open("w+b") as file:
+        begin_video(file, lens.width, lens.height)
+        for number, t_ns in enumerate(times.tolist()):
+            image = from_bgr(np.zeros((lens.height, lens.width, 3), np.uint8))
+            writer.append(t_ns, np.concatenate([image.y.ravel(), image.u.ravel(), image.v.ravel()]))
+            append_picture(file, encode_picture(image, Stamp(number, t_ns, 4_000_000, 0)))
+        finish_video(file)
+    for path in (folder / "raw", folder / "node.avi"):
+        use()
+        given = [f"{name}={path}", *words[3:]] if with_rig else [str(path)]
+        assert main(["track", *given, "--out", str(folder / f"{path.stem}.csv")]) == 0
+        found, places = table_of(folder / f"{path.stem}.csv")
+        np.testing.assert_allclose(np.diff(found), 1e-9 * np.diff(times), atol=1e-6)
+        assert np.isfinite(places[-1]).all()
 
 
 def test_a_folder_of_pictures_is_a_film_of_the_rate_that_is_given(drawn, monkeypatch, capsys):
