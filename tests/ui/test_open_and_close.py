@@ -15,18 +15,20 @@ from typing import Any
 import pytest
 from OpenGL import GL
 from person import wait
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QOffscreenSurface, QOpenGLContext
 from PySide6.QtOpenGLWidgets import QOpenGLWidget
-from PySide6.QtWidgets import QApplication, QDialog
+from PySide6.QtWidgets import QApplication, QDialog, QDoubleSpinBox, QVBoxLayout, QWidget
 from wizard_rig import RigBackend
 
 from rhot_app.sources.discovery import Search
+from rhot_app.ui.common.disposal import plot_widget, release_style
 from rhot_app.ui.dialogs import dialogs
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
 from rhot_app.ui.main_window import MainWindow
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.framework.plan import WIZARDS, Wizard
+from rhot_app.ui.wizards.framework.window import WizardWindow
 
 ROUNDS, MANY = 3, 100
 NAMES = 4000
@@ -190,6 +192,37 @@ def test_a_scene_leaves_no_program_to_the_driver(lending, name):
         wait(lambda opened=opened: gc.collect() >= 0 and opened() is None)
         counts.append(programs())
     assert counts[0] == counts[-1] > 0
+
+
+def unknown(parts: list[QWidget]) -> list[str]:
+    """Those whose end Qt's style sheets would not hear of, so that what is kept for them stays. Viewports and the
+    frames of lists that fold out have no style of their own, and nothing is kept for them."""
+    return [type(part).__name__ for part in parts if not part.testAttribute(Qt.WidgetAttribute.WA_StyleSheet)
+            and getattr(part.parent(), "viewport", lambda: None)() is not part
+            and part.metaObject().className() != "QComboBoxPrivateContainer"]
+
+
+def test_the_style_of_parts_that_were_never_shown_is_forgotten(themed):
+    window, box = QWidget(), QDoubleSpinBox()
+    QVBoxLayout(window).addWidget(box)
+    assert "QLineEdit" in unknown(window.findChildren(QWidget)), "the line in a box is never known by itself"
+    release_style(window)
+    assert unknown([window, *window.findChildren(QWidget)]) == []
+
+
+def test_the_fields_of_a_plot_that_nobody_sees_are_known_to_the_style(themed):
+    plot = plot_widget()
+    fields = [part for part in vars(plot.getPlotItem().ctrl).values() if isinstance(part, QWidget)]
+    assert fields and unknown([one for part in fields for one in (part, *part.findChildren(QWidget))]) == []
+
+
+def test_what_is_closed_is_known_to_the_style(lending, monkeypatch):
+    """A wizard has pages that nobody has opened."""
+    opener, closed = next(one for one in OPENERS if one.name == "bones"), []
+    monkeypatch.setattr(WizardWindow, "deleteLater", lambda window: closed.extend(
+        unknown([window, *window.findChildren(QWidget)])) or QDialog.deleteLater(window))
+    open_and_close(lending.window, opener, escape=False)
+    assert closed == []
 
 
 def test_a_dialog_that_is_waited_for_does_not_stay(lending, monkeypatch):

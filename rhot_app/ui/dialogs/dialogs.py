@@ -26,6 +26,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig, RigNode
 from rhot_app.ui.common.controller import Controller
+from rhot_app.ui.common.disposal import dispose, release_style
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
 from rhot_app.ui.dialogs.networks_dialog import NetworksDialog
@@ -57,7 +58,7 @@ class Dialogs:
         """Hold a dialog until it is closed, then let go of it."""
         def forget() -> None:
             setattr(self, name, None)
-            dialog.deleteLater()
+            dispose(dialog)
 
         setattr(self, name, dialog)
         dialog.finished.connect(forget)
@@ -73,6 +74,7 @@ class Dialogs:
     def connect_nodes(self, scheme: Scheme) -> Path | None:
         """The rig file written for two nodes that answered; None when there is none."""
         dialog = NodesDialog(scheme, self._parent)
+        dialog.finished.connect(lambda: release_style(dialog))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         return dialog.rig_path if dialog.exec() else None
 

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QInputDialog, QWidget
 
 from rhot_app.engine.status import Level
 from rhot_app.ui.common.controller import Controller
+from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
 
@@ -98,7 +99,7 @@ class Recordings:
 
     def _forget_dialog(self) -> None:
         if self.dialog is not None:
-            self.dialog.deleteLater()
+            dispose(self.dialog)
             self.dialog = None
 
     def step(self) -> None:

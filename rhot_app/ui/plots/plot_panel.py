@@ -12,6 +12,7 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QGuiApplication, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QPushButton, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
+from rhot_app.ui.common.disposal import plot_widget
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.series import Peak, Series, peaks_above, round_top, to_csv, usual_top
 from rhot_app.ui.models.words import tip
@@ -239,7 +240,7 @@ class PlotPanel(QWidget):
                                         "Copy what the plot shows to the clipboard as comma-separated text.")
         self.reset_button.clicked.connect(self.begin_anew)
         self.copy_button.clicked.connect(self.copy_csv)
-        self.plot = pg.PlotWidget()
+        self.plot = plot_widget()
         self.legend = Legend(scheme, heads, widest_value)
         self._lay_out()
         self._style_plot()
@@ -269,7 +270,6 @@ class PlotPanel(QWidget):
 
     def _style_plot(self) -> None:
         self.plot.setBackground(self._scheme.panel)
-        self.plot.setMenuEnabled(False)
         self.plot.hideButtons()
         self.plot.setMinimumHeight(80)
         item = self.plot.getPlotItem()

@@ -7,6 +7,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
 
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark
+from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.dialogs.recordings import BookmarkDialog
 from rhot_app.ui.models.palette import Scheme
@@ -112,7 +113,7 @@ class BookmarkWriter(QObject):
 
     def _forget_dialog(self) -> None:
         if self.dialog is not None:
-            self.dialog.deleteLater()
+            dispose(self.dialog)
             self.dialog = None
 
     def _write(self, replay: Replay, bookmark: Bookmark) -> None:

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from rhot_app.project import Rig
 from rhot_app.ui.backend.solver import Solver
+from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording, recordings_folder
 from rhot_app.ui.models.palette import Scheme
@@ -73,12 +74,12 @@ class ReplayWindows:
 
     def _forget_window(self) -> None:
         if self.window is not None:
-            self.window.deleteLater()
+            dispose(self.window)
             self.window = None
 
     def _forget_library(self) -> None:
         if self.library is not None:
-            self.library.deleteLater()
+            dispose(self.library)
             self.library = None
 
 

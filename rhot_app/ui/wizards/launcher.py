@@ -20,6 +20,7 @@ from rhot_app.project import Rig, parse_rig
 from rhot_app.rig_history import Version
 from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.backend.solver import Solver
+from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import shape_icon
@@ -143,7 +144,7 @@ class Launcher(QObject):
 
     def _forget(self) -> None:
         if self.wizard is not None:
-            self.wizard.deleteLater()
+            dispose(self.wizard)
             self.wizard = None
 
     def _show_versions(self, now: RigNow) -> None:
@@ -158,7 +159,7 @@ class Launcher(QObject):
 
     def _forget_versions(self) -> None:
         if self.versions is not None:
-            self.versions.deleteLater()
+            dispose(self.versions)
             self.versions = None
 
     def _begin_fit(self) -> tuple[RigNow, HandFit]:
@@ -181,7 +182,7 @@ class Launcher(QObject):
 
     def _forget_fit(self) -> None:
         if self.fit is not None:
-            self.fit.deleteLater()
+            dispose(self.fit)
             self.fit = None
 
     def _not_opened(self, sentence: str) -> None:

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.calibration.verdict import Finding, Verdict
+from rhot_app.ui.common.disposal import plot_widget
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme, visible_on
@@ -181,8 +182,7 @@ class ChartView(QWidget):
 
     def _draw(self, chart: Chart) -> pg.PlotWidget:
         scheme = self._scheme
-        plot = pg.PlotWidget(background=scheme.panel)
-        plot.setMenuEnabled(False)
+        plot = plot_widget(background=scheme.panel)
         plot.setTitle(chart.title, color=scheme.text, size=f"{_TEXT_PT + 1}pt")
         plot.showGrid(x=True, y=True, alpha=0.15)
         for side, label in (("bottom", chart.x_label), ("left", chart.y_label)):
