@@ -79,9 +79,13 @@ class DataSet:
 
     folder: Path
     rig: Rig
-    truth: Truth
     seconds: float
     outdated: bool
+
+    @functools.cached_property
+    def truth(self) -> Truth:
+        """What really happened; raises SimulatorError when it cannot be read. That of half an hour is too large."""
+        return load_truth(self.folder / TRUTH_NAME)
 
     def records(self) -> list[Record]:
         """All records of the log, in the order of arrival."""
@@ -112,8 +116,7 @@ def data_set(order: Order, folder: Path, watch: Watch = lambda title: None) -> D
                 raise
     reader = LogReader(place / LOG_NAME)
     reader.close()
-    return DataSet(place, reader.rig, load_truth(place / TRUTH_NAME), order.seconds,
-                reader.about.get("sources") != _source_digest(order.sketched))
+    return DataSet(place, reader.rig, order.seconds, reader.about.get("sources") != _source_digest(order.sketched))
 
 
 def _film(order: Order, place: Path, progress: Progress | None) -> None:

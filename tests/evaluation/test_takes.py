@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from rhot_app.errors import SimulatorError
 from rhot_app.evaluation import data_sets as takes
 from rhot_app.evaluation import fault_injection as alter
 from rhot_app.evaluation.compare import judge, orders
@@ -17,7 +18,7 @@ from rhot_app.evaluation.data_sets import LOG_NAME, DataSet, Order, Stream, data
 from rhot_app.evaluation.track import tracked
 from rhot_app.project import TrackerSettings
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
-from rhot_app.simulator.film.film import Report
+from rhot_app.simulator.film.film import TRUTH_NAME, Report
 from rhot_app.simulator.film.node_log import CABLE, Network
 from rhot_app.simulator.film.shot import Shot
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
@@ -77,6 +78,16 @@ def test_one_order_is_filmed_once_and_the_same_anywhere(tmp_path: Path) -> None:
         assert not one.outdated
     assert told == ["pinch, 0.3 s, seed 3"] * 2
     assert logs[0] == logs[1] == logs[2] and logs[0]
+
+
+def test_a_take_is_replayed_without_its_truth(tmp_path: Path) -> None:
+    """That of half an hour is larger than what is read of a file."""
+    order = Order(scene(3), "pinch", 0.3, sketched=True)
+    (data_set(order, tmp_path).folder / TRUTH_NAME).write_bytes(b"too large")
+    one = data_set(order, tmp_path)
+    assert one.records()
+    with pytest.raises(SimulatorError, match=TRUTH_NAME):
+        _ = one.truth
 
 
 @pytest.mark.parametrize(("changed", "outdated"), [("_SKETCHED", True), ("_SEEN", False)])
