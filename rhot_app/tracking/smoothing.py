@@ -148,7 +148,7 @@ class RecordingEstimator(Estimator):
         state, covariance, later_ns = estimate.state, estimate.covariance, max(t_ns - instant.t_ns, 0)
         if later_ns:
             state, covariance = estimate.process.predict(state, covariance, 1e-9 * later_ns)
-        # The cameras' last observations are carried on by the estimate that they were compared with.
+        # What is triangulated stays as it was tracked: its observations are carried on by the motion of then.
         own = states.describe(instant.t_ns, knot.state, knot.covariance, 0, instant.observations, begun)
         out = states.describe(instant.t_ns + later_ns, state, covariance, 0, instant.observations, begun)
         return replace(out, marker_raw_positions=own.marker_raw_positions, epipolar_error_px=own.epipolar_error_px,
