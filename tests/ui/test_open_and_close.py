@@ -195,11 +195,8 @@ def test_a_scene_leaves_no_program_to_the_driver(lending, name):
 
 
 def unknown(parts: list[QWidget]) -> list[str]:
-    """Those whose end Qt's style sheets would not hear of, so that what is kept for them stays. Viewports and the
-    frames of lists that fold out have no style of their own, and nothing is kept for them."""
-    return [type(part).__name__ for part in parts if not part.testAttribute(Qt.WidgetAttribute.WA_StyleSheet)
-            and getattr(part.parent(), "viewport", lambda: None)() is not part
-            and part.metaObject().className() != "QComboBoxPrivateContainer"]
+    """Those whose end Qt's style sheets would not hear of, so that what is kept for them stays."""
+    return [type(part).__name__ for part in parts if not part.testAttribute(Qt.WidgetAttribute.WA_StyleSheet)]
 
 
 def test_the_style_of_parts_that_were_never_shown_is_forgotten(themed):

@@ -1,8 +1,8 @@
 """Deletes windows so that nothing of them stays.
 
-Qt keeps for good what a style sheet says of a part that was never polished, because it was never shown, and of the line
-in a box of numbers or choices, up to a kB each (QStyleSheetStyle hears of the end only of a part that has a style). A
-part that is polished, and a line with a sheet of its own, are forgotten when they are deleted.
+Qt keeps for good what a style sheet says of a part that was never polished, because it was never shown, and of one that
+has its style from another part: the line in a box of numbers or choices, a viewport. That is up to a kB for each.
+QStyleSheetStyle hears of the end only of parts that are polished and have a sheet of their own, or could have one.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import pyqtgraph as pg
-from PySide6.QtWidgets import QLineEdit, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
 
 
 def dispose(window: QWidget) -> None:
@@ -23,7 +24,7 @@ def release_style(widget: QWidget) -> None:
     """Have Qt forget about the style of a widget and its parts when they are deleted; none of them is in sight."""
     for part in (widget, *widget.findChildren(QWidget)):
         part.ensurePolished()
-        if isinstance(part, QLineEdit) and not part.styleSheet():
+        if not part.testAttribute(Qt.WidgetAttribute.WA_StyleSheet):
             part.setStyleSheet("border: none")
 
 
