@@ -70,7 +70,8 @@ class ContourFrame:
 
     `slices` (K, 5) as `find_edges` takes them; `expected_sd` (K,) px: of the contour along each slice.
     `slice_counts` (GROUPS, 2): of each finger, the palm and the forearm, the slices on which the contour was found, and
-    all, when last linearised. `repeated`: number of correlated images that count as one.
+    all, when last linearised. `repeated`: number of correlated images that count as one. `confusable`: part of the
+    slices on which the contour may be confused with its neighbour's, as it was predicted so uncertainly.
     """
 
     def __init__(self, surface: Surface, points: ContourPoints, pose: Array, intrinsics: Array, slices: Array,
@@ -85,6 +86,7 @@ class ContourFrame:
         self.edges: Edges | None = None
         self.clutter = np.empty((0, 0))
         self.slice_counts = np.zeros((GROUPS, 2))
+        self.confusable = 0.0
 
     def observe(self, edges: Edges) -> None:
         """Set the edges of the slices. The clutter density at an edge is that of the edges at least as strong."""

@@ -31,6 +31,7 @@ from rhot_app.barehand.relocalisation import ODDS_DROP, Relocaliser, pose_of
 from rhot_app.barehand.start import (
     AGREEMENT,
     FOUND,
+    MAJORITY,
     START_SD,
     STEP,
     ForegroundMaps,
@@ -284,10 +285,16 @@ class BareHandTracker:
              prediction: tuple[Array, Array], state: Array, extra: Sequence[Residual], passes: int) -> Knot:
         """Search the images and estimate the state, `passes` times; the first search is about `state`."""
         residuals: list[Residual] = []
+        confusable: list[float] = []
         covariance, velocity = prediction[1], velocity_of(prediction)
         for number in range(passes):
             frames = [self._search(camera, image, state, covariance * 0.25**number, number == passes - 1,
                                    late_s.get(camera, 0.0)) for camera, image in images.items()]
+            if number == 0:
+                confusable = [frame.confusable for frame in frames]
+            elif passes == PASSES:  # more of them search around a given start
+                for frame, share in zip(frames, confusable, strict=True):
+                    frame.confusable = share
             residuals = [Contours(frames, velocity), *self.constraints, *extra]
             if number < passes - 1:
                 better = update(self.process, t_s, prediction, residuals, state, self.filter.partial)
@@ -329,6 +336,7 @@ class BareHandTracker:
             points = contour_points(self.surface, then, size, pose, model.intrinsics, image_size, step_m)
         frame = slices_of(self.surface, state, covariance, pose, model.intrinsics, points, MOTION, self.row_s[camera],
                           REACH, LONGEST_PX, self._repeated[camera], late_s)
+        frame.confusable = float(np.mean(frame.expected_sd > CONFUSED_PX)) if len(frame.slices) else 0.0
         frame.expected_sd = np.minimum(frame.expected_sd, CONFUSED_PX)
         return frame
 
@@ -347,6 +355,9 @@ class BareHandTracker:
         place_joints(state, covariance, self.model.dh, self.surface.bone, points, covariances, motion)
         deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         frames = [frame for frame in self.frames if frame is not None]
+        # predicted so uncertainly, fingers are taken for each other
+        guessed = bool(frames) and min(frame.confusable for frame in frames) > MAJORITY
+        frames = [frame for frame in frames if frame.confusable <= MAJORITY]
         # cameras that found three slices or more of each finger, the palm and the forearm
         observing = np.zeros(GROUPS)
         if frames:
@@ -360,6 +371,8 @@ class BareHandTracker:
                 joints[k] = knowledge_of(joint_sd[k], observed, MEASURED_M, INFERRED_M)
             for k in range(ANGLE_SLICES[finger].start, ANGLE_SLICES[finger].stop):
                 angles[k] = knowledge_of(deviation[6 + k], observed, MEASURED_RAD, INFERRED_RAD)
+        if guessed:
+            joints[1:], angles[:] = int(Knowledge.GUESSED), int(Knowledge.GUESSED)
         turn_sd = float(np.sqrt(np.trace(covariance[3:6, 3:6])))
         world = np.eye(4)
         world[:3] = state[:ANGLES].reshape(3, 4)

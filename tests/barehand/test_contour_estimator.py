@@ -157,6 +157,18 @@ def test_a_hand_is_found_and_tracked_by_slow_cameras(film) -> None:
     assert nodes.states[-1].t_master_ns == FIRST_NS + 4 * number * PERIOD_NS, "no camera's edges wait for a frame"
 
 
+@pytest.mark.parametrize(("periods", "sure"), [(1, True), (4, False)])
+def test_fingers_that_may_be_taken_for_each_other_are_called_guessed(film, periods: int, sure: bool) -> None:
+    """Between two pictures of slow cameras a finger may move by more than a finger's breadth."""
+    nodes = shown_nodes(film)
+    for number in range(18):
+        nodes.step(number, film[0][1 if number >= 3 else 2], times_ns=[FIRST_NS + periods * number * PERIOD_NS] * 2)
+    last = nodes.states[-1]
+    assert last.tracked and (last.condition is Condition.TRACKING) == sure
+    assert (last.joint_knowledge[1:] == Knowledge.MEASURED).mean() > 0.8 if sure else (
+        last.joint_knowledge[1:] == Knowledge.GUESSED).all()
+
+
 @pytest.mark.study("rhot_app/barehand", "rhot_app/tracking/contours")
 @pytest.mark.parametrize("apart_ms", [2, 10])
 def test_a_camera_with_a_wrong_pose_gives_a_resting_hand_no_velocity(film, apart_ms: int) -> None:

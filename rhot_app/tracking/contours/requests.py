@@ -213,5 +213,7 @@ def _on(hand: BareHandTracker, camera: int, frame: ContourFrame, chosen: NDArray
     p = frame.points
     points = ContourPoints(p.capsule[chosen], p.kind[chosen], p.along[chosen], p.behind[chosen], p.pixel[chosen],
                            p.normal[chosen], p.scale[chosen])
-    return ContourFrame(hand.surface, points, frame.pose, frame.intrinsics, slices, frame.expected_sd[chosen],
-                        frame.late_s[chosen], MOTION, frame.repeated)
+    out = ContourFrame(hand.surface, points, frame.pose, frame.intrinsics, slices, frame.expected_sd[chosen],
+                       frame.late_s[chosen], MOTION, frame.repeated)
+    out.confusable = frame.confusable
+    return out

@@ -264,6 +264,8 @@ class ContourEstimator:
         self._used = waiting
         self._hand.frames = [None] * len(self._names)
         for number, (one, contour) in waiting.items():
+            if self._markers is not None:
+                contour.confusable = 0.0  # markers tell the fingers apart
             self._hand.frames[number] = contour
             self._requests.request_slices(number, one.t_row0_master_ns)
         self._evidence.take_edges(waiting.values())
