@@ -37,6 +37,7 @@ class HandFollower:
         self.starts = 0
         self.step_s: list[float] = []
         self._learns_skin, self._empty_until_ns = foreground is None, empty_until_ns
+        self._learn_next = False
         self._names = tuple(node.name for node in rig.nodes)
         self._following = False
         self._begun_ns: int | None = None
@@ -49,10 +50,11 @@ class HandFollower:
 
     def set_foreground(self, foreground: Sequence[Foreground]) -> None:
         """Use these models of hand and background, one of each camera, and learn no skin any more."""
-        self.tracker.foreground, self._learns_skin = list(foreground), False
+        self.tracker.foreground, self._learns_skin, self._learn_next = list(foreground), False, False
 
     def start(self, pose: HandPose, t_ns: int) -> None:
         """Start a track at a pose that somebody has shown (`BareHandTracker.start`)."""
+        self._learn_next = self._learns_skin
         self.tracker.start(pose, t_ns)
         self._following, self._image_ns, self._empty_until_ns = True, t_ns, t_ns
         self._started()
@@ -63,6 +65,8 @@ class HandFollower:
         begun, following = time.perf_counter(), self._following
         if not following and self._begun_ns is None and not self._begin(images, min(t_ns)):
             return self._none(min(t_ns), begun)
+        if self._learn_next:
+            self._learn_skin(images)
         state = self.tracker.step(images, t_ns)
         if any(image is not None for image in images):
             good = state.tracked and self._supported(images) and self._on_foreground(images, state, not following)
@@ -94,11 +98,17 @@ class HandFollower:
         if any(image is None for image in images) or t_ns < self._empty_until_ns:
             return False
         if self._learns_skin:
-            self.tracker.foreground = [learn_skin(image) for image in images if image is not None]
+            self._learn_skin(images)
         if not self.tracker.begin(images, t_ns):
             return False
         self._begun_ns = t_ns
         return True
+
+    def _learn_skin(self, images: Sequence[Image | None]) -> None:
+        """Learn the colours of skin from each image; a camera without one keeps what it has."""
+        self._learn_next = False
+        self.tracker.foreground = [before if image is None else learn_skin(image)
+                                   for image, before in zip(images, self.tracker.foreground, strict=True)]
 
     def _supported(self, images: Sequence[Image | None]) -> bool:
         """Whether most of the expected contour is found in these images."""

@@ -45,7 +45,7 @@ ODDS_SMOOTHING = 0.1
 
 class Relocaliser:
     """The searches for one tracked hand. `average_odds`: moving average of its log odds per pixel
-    (`log_odds_per_pixel`), 0 before the first images. `rng`: of all searches in images of files."""
+    (`log_odds_per_pixel`), 0 before the first images. `rng`: of all random searches."""
 
     def __init__(self, model: HandModel, surface: Surface, cameras: Sequence[CameraModel],
                  plane: PalmOnPlane | None) -> None:

@@ -34,7 +34,8 @@ START_SD = 0.015, 0.2, 0.2
 takes: about a thumb's breadth."""
 
 MAJORITY = 0.5
-"""Part of the expected contour that must be found, and of the joints that must lie on foreground: more than half."""
+"""Part of the expected contour that must be found, and of the joints that must lie on foreground: more than half. Where
+more slices may be confused, fingers are guessed."""
 
 HELD_NS = 300_000_000
 """ns: so long a hand holds the start pose before it is followed. Chosen: a hand that passes by is gone by then."""
@@ -127,7 +128,7 @@ def taken_pose(shown: HandPose, maps: ForegroundMaps, cameras: Sequence[CameraMo
     """The pose about the `shown` one that a hand of the file's shape has taken in foreground maps; None without.
 
     In every map some of the joints must lie on foreground where they are shown, and most where they are found.
-    `agreement` must be positive there. All this only saves work: whether it is the hand is told by `holds`.
+    `agreement` must be positive there. All this only saves work: `BareHandTracker.holds` decides whether it is the hand.
     """
     used = [camera for camera, one in zip(cameras, maps, strict=True) if one is not None]
     known = [one for one in maps if one is not None]

@@ -175,17 +175,14 @@ class BareHandTracker:
         self.start_pose = shown_pose(rig, self.cameras, self.model, self.plane, aside)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
-    def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD,
-              size: Array | None = None) -> None:
+    def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD) -> None:
         """Start a track at a pose whose position, rotation and angles have standard deviations `place_sd`, m, rad and
-        rad. `size` (SHAPE,): the shape to start with, 0 by default. Contours also fit what is no hand, so something
+        rad. Contours also fit what is no hand, so something
         else must have shown the pose: a person who has taken `start_pose`, or markers."""
         self._epoch_ns = t_ns
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, place_sd[:2])
         known = np.linalg.inv(covariance[6:POSE, 6:POSE]) + np.eye(POSE - 6) / place_sd[2] ** 2
         covariance[6:POSE, 6:POSE] = np.linalg.inv(known)
-        if size is not None:
-            state[BIAS:BIAS + SHAPE] = size
         self.filter.start(0.0, state, covariance)
         self.tracking = self._first_update = True
         self._taken_s = [-np.inf] * len(self.cameras)

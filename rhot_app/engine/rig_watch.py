@@ -217,7 +217,7 @@ class BonesWatch:
                                          if hand is not None):
             apart_mm = _apart_mm(found, self._rig.hand)
             self._offer = Advice("info", f"The landmarks show bones that differ from the rig's hand by {apart_mm:.0f} "
-                                 "mm (rms). Its joints are truer with the measured ones.", BONES_MENDER,
+                                 "mm (rms). With them the joints are more accurate.", BONES_MENDER,
                                  subject="information")
 
     def measured(self) -> dict[str, Any]:

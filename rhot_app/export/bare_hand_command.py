@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                             help="for contours: a video of the same scene without a hand; once for each camera")
     background.add_argument("--background-seconds", default=None, metavar="S",
                             help="for contours: the videos show no hand for so long at their beginning (default: the "
-                                 "background is not known, the hand is told by the colour of skin)")
+                                 "background is not known, the hand is recognised by the colour of skin)")
     parser.add_argument("--start", default=None, metavar="FRAME|POSE.json",
                         help="for contours: the frame, from 0, in which the hand is in the rig's start pose; or a file "
                              "with the pose that it takes (default: followed from where it takes the rig's)")

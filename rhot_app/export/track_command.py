@@ -75,8 +75,6 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
         raise RecordingError("--adapt writes the bones that are measured; leave --bones rig out.")
     if args.background or args.background_seconds is not None:
         said.append("Landmarks need no background: what was given of it is not used.")
-    if args.start is not None:
-        said.append("Landmarks need no start: --start is not used.")
     if rig is None:
         rig = assumed_rig([*args.videos, *(args.video or [])])
         lens = rig.nodes[0].intrinsics
@@ -107,7 +105,7 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
                               pictures=args.overlay, again=args.force, hand_file=args.adapt, progress=line.report)
     line.finish()
     if args.rig is None:
-        said.append(f"The hand is taken for a {summary.side} one, as the networks find more of these.")
+        said.append(f"The networks find mostly {summary.side} hands, so a {summary.side} hand is tracked.")
     document = summary.document() | {"out": args.out and str(args.out), "overlay": args.overlay and str(args.overlay),
                                      "hand_file": str(args.adapt) if summary.adapted else None,
                                      "notes": said}

@@ -79,16 +79,16 @@ class Adapted:
         for what, most in (("lengths", LENGTH_SD), ("radii", RADIUS_SD)):
             if not change[f"{what}_sd_percent"] < 100.0 * most:
                 findings.append(Finding(
-                    "hand_undetermined", Grade.POOR, f"The {what} are known to {change[f'{what}_sd_percent']:.1f} %, "
-                    f"those of any adult to {100.0 * most:.0f} %.", "The hand was seen in too few poses.",
+                    "hand_undetermined", Grade.POOR, f"The {what} are uncertain by {change[f'{what}_sd_percent']:.1f} %; "
+                    f"another adult's hand file is by {100.0 * most:.0f} %.", "The hand was seen in too few poses.",
                     "Spread and bend every finger, and turn the hand."))
         if not after < before:
             findings.append(Finding(
-                "not_confirmed", Grade.POOR, "Pictures that were kept aside fit the hand in use as well or better.",
+                "not_confirmed", Grade.POOR, "The hand in use fits pictures that were kept aside as well or better.",
                 "The contours are not those of one hand.", "Learn the background, and show one bare hand alone."))
         if np.any(np.abs(self.shape[:FOREARM_TURN]) >= SHAPE_LIMIT[:FOREARM_TURN]):
             findings.append(Finding(
-                "no_hand_has", Grade.POOR, "A length or radius is as far from the hand in use as no adult's is.",
+                "no_hand_has", Grade.POOR, "A length or radius differs from the hand in use by more than adults' do.",
                 "The contours are not a hand's, or the cameras' poses are wrong.",
                 "Check the stereo calibration, and show one bare hand alone."))
         return judge(f"by {len(self.states)} poses; lengths are known to {change['lengths_sd_percent']:.1f} %, radii "

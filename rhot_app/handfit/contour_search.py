@@ -28,6 +28,7 @@ from rhot_node.detect.foreground import Foreground, learn_skin
 
 Array = NDArray[np.float64]
 
+
 def fit_to_contours(solver: Solver, rig: Rig, state: FitState, instants: Sequence[int], freedom: Freedom,
                     anchor_sd_px: float) -> FitState:
     """The state after the contours of some instants were searched and fitted, from where the hand is now; anchors and

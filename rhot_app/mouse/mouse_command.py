@@ -57,7 +57,7 @@ REST_S = 10.0
 """s: period of the simulated hand's motion at rest."""
 
 NOTE_S = 15.0
-"""s: interval of the notes while the hand is searched for."""
+"""s: interval of the notes while the hand is not tracked."""
 
 TRACKED_S = 360.0
 """s: time limit of the search. The very first start compiles the numerical code, which takes minutes on a slow
@@ -322,14 +322,14 @@ def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterat
                 remote.show(EmptyShow())
                 _learn_backgrounds(client, deadline)
                 remote.show(show(str(rest)))
-            _note("the hand is looked for.")
+            _note("waiting until the hand is tracked.")
             while client.state is None or not client.state.tracked:
                 client.poll(0.1)
                 now = time.monotonic()
                 if now > note_s:
                     note_s += NOTE_S
                     condition = "no state yet" if client.state is None else client.state.condition.value
-                    _note(f"not found in {now - begun:.0f} s ({condition}); it is looked for until {TRACKED_S:.0f} s.")
+                    _note(f"not tracked after {now - begun:.0f} s ({condition}); giving up after {TRACKED_S:.0f} s.")
                 if now > deadline:
                     raise SimulatorError(f"the simulated hand was not tracked within {TRACKED_S:.0f} s. Is this "
                                          "computer busy? Try again.")

@@ -22,8 +22,8 @@ FIRST = {"still": "Holds still", "wave": "Waves", "brisk": "Waves briskly", "swe
 THINGS = (("held:wave", "Holds a tagged cube", "The hand waves with a cube of 40 mm that has a tag on each face. Rig, "
             "Add a tracked object offers its file."),
            ("bare:grasp", "Takes its markers off", "A bare hand that opens and closes."),
-           ("bare:still", "Holds a bare hand still", "A bare hand that waits to be found. Calibrate, Tracker chooses "
-            "it."),
+           ("bare:still", "Holds a bare hand still", "A bare hand that does not move. Calibrate, Tracker chooses what "
+            "follows it."),
            ("empty", "Leaves the pictures", "The background alone: Calibrate, Background and skin begins with it."),
            ("board", "Shows a board", "A chessboard of 9 x 6 corners, 25 mm squares, moved about with pauses."),
            ("table", "Lays the board on the table", "The same board, lying on the table."),

@@ -120,3 +120,12 @@ def test_no_hand_is_followed_in_a_dark_or_saturated_image(exposure: float, known
 def test_a_hand_that_holds_the_pose_is_followed(known: bool) -> None:
     found = states(hand, known)
     assert found[-1].tracked and wrong(found) == []
+
+
+def test_a_hand_whose_pose_somebody_has_given_is_followed_by_its_skin() -> None:
+    follower = HandFollower(rig_of(CAMERAS), None, known_size=True)
+    follower.start(near(pose_of(0)), 0)
+    found = [follower.step([hand(camera, empty, number) for camera, empty in zip(CAMERAS, WALLS, strict=True)],
+                           [round(1e9 * number / FPS)] * 2) for number in range(3)]
+    assert all(state.tracked for state in found) and wrong(found) == []
+    assert all(model.informative for model in follower.tracker.foreground)

@@ -65,7 +65,7 @@ class Evidence:
         self.start(NEVER)
 
     def start(self, t_ns: int) -> None:
-        """Start with a hand that was found at `t_ns`."""
+        """Start with a track of master time `t_ns`."""
         self.confirmed = False
         self._of_camera = [_CameraEvidence() for _ in self._cameras]
         self.observed_ns, self._checked_ns = t_ns, NEVER

@@ -113,7 +113,7 @@ class Finder:
         return False
 
     def found(self) -> tuple[HandPose, int] | None:
-        """The pose in which a hand was found and its time, master ns; None without a new one."""
+        """The pose about the start pose that a hand has taken and its time, master ns; None without a new one."""
         found, self._found = self._found, None
         return None if found is None or found[0] != self._run else found[1:]
 

@@ -113,7 +113,7 @@ class Requests:
             self._requests.append(SliceRequest(frame.camera, np.empty((0, 5)), STEP))
 
     def start(self, t_ns: int) -> None:
-        """Request slices of all cameras for a hand that was found at `t_ns`, and expect edges from all of them."""
+        """Request slices of all cameras for a track that starts at `t_ns`, and expect edges from all of them."""
         self._version = object()
         for number, camera in enumerate(self.cameras):
             if camera.newest is not None:

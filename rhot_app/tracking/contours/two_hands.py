@@ -237,7 +237,6 @@ class TwoBareHands(TwoHands):
         return self._both[0].key_frames
 
 
-
 def _palm_distance_m(ours: Array, theirs: Array) -> float:
     """Distance of the palms of two hands with joints (21, 3) m."""
     return float(np.linalg.norm((ours - theirs)[_PALM_JOINTS].mean(axis=0)))
