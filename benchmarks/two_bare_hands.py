@@ -2,8 +2,8 @@
 
     python benchmarks/two_bare_hands.py [--frames 60] [--seeds 3] [--only CASES] [--json FILE]
 
-A right and a left hand are drawn before a wall, in their start poses until both are tracked and then moving, and tracked live by the
-nodes' search of the pictures. The cases are
+A right and a left hand are drawn before a wall, in their start poses until both are tracked and then moving, and
+tracked live by the nodes' search of the pictures. The cases are
 
 * `alone`: the right hand, before a rig that has no other one;
 * `apart`: both move side by side;
@@ -12,8 +12,8 @@ nodes' search of the pictures. The cases are
 
 `joint mm` are of the tracked states of the moving hand, `tracked` is their share, while the hand is in both pictures.
 `swapped` is the share of frames in which a hand is estimated nearer to where the other one is, `in 3 sigma` the
-part of the joints' errors within their stated 3 sigma. Both hands begin in their start poses. Searches beside the frames
-end before the next frame, so their time is not in it.
+part of the joints' errors within their stated 3 sigma. Both hands begin in their start poses. Searches beside
+the frames end before the next frame, so their time is not in it.
 """
 
 from __future__ import annotations

@@ -128,7 +128,8 @@ def taken_pose(shown: HandPose, maps: ForegroundMaps, cameras: Sequence[CameraMo
     """The pose about the `shown` one that a hand of the file's shape has taken in foreground maps; None without.
 
     In every map some of the joints must lie on foreground where they are shown, and most where they are found.
-    `agreement` must be positive there. All this only saves work: `BareHandTracker.holds` decides whether it is the hand.
+    `agreement` must be positive there. All this only saves work: `BareHandTracker.holds` decides whether it is the
+    hand.
     """
     used = [camera for camera, one in zip(cameras, maps, strict=True) if one is not None]
     known = [one for one in maps if one is not None]

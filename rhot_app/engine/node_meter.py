@@ -148,8 +148,9 @@ def foreground_advice(name: str, state: Mapping[str, Any]) -> tuple[Advice, ...]
         return (Advice("info", f"Node {name} learns the background: keep the hand out of its picture.",
                        subject="sight"),)
     if not known.get("background") and known.get("skin") == "none":
-        return (Advice("warning", f"Node {name} has learnt neither background nor skin, so no bare hand can be tracked by its contours. "
-                                  "Use Calibrate, Background and skin.", "foreground", subject="tracking"),)
+        return (Advice("warning", f"Node {name} has learnt neither background nor skin, so no bare hand can be tracked "
+                                  "by its contours. Use Calibrate, Background and skin.", "foreground",
+                       subject="tracking"),)
     return ()
 
 

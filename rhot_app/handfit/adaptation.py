@@ -79,9 +79,9 @@ class Adapted:
         for what, most in (("lengths", LENGTH_SD), ("radii", RADIUS_SD)):
             if not change[f"{what}_sd_percent"] < 100.0 * most:
                 findings.append(Finding(
-                    "hand_undetermined", Grade.POOR, f"The {what} are uncertain by {change[f'{what}_sd_percent']:.1f} %; "
-                    f"another adult's hand file is by {100.0 * most:.0f} %.", "The hand was seen in too few poses.",
-                    "Spread and bend every finger, and turn the hand."))
+                    "hand_undetermined", Grade.POOR, f"The {what} are uncertain by "
+                    f"{change[f'{what}_sd_percent']:.1f} %; another adult's hand file is by {100.0 * most:.0f} %.",
+                    "The hand was seen in too few poses.", "Spread and bend every finger, and turn the hand."))
         if not after < before:
             findings.append(Finding(
                 "not_confirmed", Grade.POOR, "The hand in use fits pictures that were kept aside as well or better.",
