@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from rhot_app.barehand.start import start_pose_file
+from rhot_app.barehand.start import START_SD, start_pose_file
 from rhot_app.errors import TrackingError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import exp_so3
@@ -54,10 +54,6 @@ WITHIN_3_SD: Final = float(chi2.ppf(0.9973, 3))
 
 LOSS_S: Final = (1.5, 2.0)
 """When cameras deliver no pictures, where a case says so."""
-
-START_SD: Final = (0.015, 0.2, 0.2)
-"""Standard deviations of a random start, and of a person's hand about a pose that is shown: place m, rotation rad,
-angles rad; a thumb's breadth and half a finger's."""
 
 HOLDS_S: Final = 0.8
 """How long a hand holds the pose that it was shown. Chosen: a person holds still for a second when asked to."""

@@ -29,7 +29,7 @@ HAND_COLOUR, OTHER_COLOUR, SHOWN_COLOUR = "#ff2828", "#ffdc00", "#ffffff"
 """As in `barehand.overlay`: the contour before the background and within the hand, slices; edges, the hand's and
 others; and a pose that the hand is to take."""
 
-TAKE_POSE = "Take this pose with {hands}, and hold it"
+TAKE_POSE, TAKE_POSE_SHORT = "Take this pose with {hands}, and hold it", "Take this pose"
 
 _RING_PX = (4.0, 7.0)  # radius in small and in large pictures
 _ROOM_FOR_NAMES_PX = 320.0
@@ -134,7 +134,7 @@ class CameraView(QWidget):
         for contour in self.contours:
             paint_contour(painter, contour, scale)
         if any(contour.shown for contour in self.contours):
-            paint_tag(painter, QPointF(6, target.height() - 26), TAKE_POSE.format(hands=self.hands))
+            self._paint_request(painter, target.size())
         self._paint_rings(painter, places, target.width())
         if self.named:
             self._paint_names(painter, places, target.size())
@@ -145,6 +145,13 @@ class CameraView(QWidget):
             painter.setPen(QColor(self._scheme.muted))
             painter.drawText(target, Qt.AlignmentFlag.AlignCenter, "no picture yet")
         painter.end()
+
+    def _paint_request(self, painter: QPainter, picture: QSizeF) -> None:
+        """At the lower edge: to take the pose that is shown; in a small picture in fewer words."""
+        text = TAKE_POSE.format(hands=self.hands)
+        if QFontMetricsF(painter.font()).horizontalAdvance(text) > picture.width() - 20.0:
+            text = TAKE_POSE_SHORT
+        paint_tag(painter, QPointF(6, picture.height() - 26), text)
 
     def _paint_rings(self, painter: QPainter, places: list[QPointF], width: float) -> None:
         radius = _RING_PX[0] + (_RING_PX[1] - _RING_PX[0]) * min(1.0, width / _ROOM_FOR_NAMES_PX)
@@ -178,8 +185,8 @@ def paint_contour(painter: QPainter, seen: SeenContour, scale: float) -> None:
 
     painter.setPen(QPen(QColor(SLICE_COLOUR), 1.0))
     painter.drawLines([QLineF(*(float(value) for value in row)) for row in (seen.slices + 0.5) * scale])
-    dots(seen.contour[seen.outline], SHOWN_COLOUR if seen.shown else OUTLINE_COLOUR, 5.0)
-    dots(seen.contour[~seen.outline], SHOWN_COLOUR if seen.shown else INNER_COLOUR, 3.0 if seen.shown else 5.0)
+    dots(seen.contour[seen.outline], SHOWN_COLOUR if seen.shown else OUTLINE_COLOUR, 2.5 if seen.shown else 5.0)
+    dots(seen.contour[~seen.outline], SHOWN_COLOUR if seen.shown else INNER_COLOUR, 1.5 if seen.shown else 5.0)
     dots(seen.edges[~seen.of_hand], OTHER_COLOUR, 2.0)
     dots(seen.edges[seen.of_hand], HAND_COLOUR, 2.0)
 
