@@ -407,7 +407,7 @@ def test_a_recorded_hand_is_tracked_from_its_videos_alone(film, capsys):
 def test_one_video_without_a_rig_is_tracked_by_an_assumed_lens(film, capsys):
     assert main(["track", str(FOLDER / "cam1_first120.mp4"), "--out", str(film / "one.csv"), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
-    assert "60 degrees" in said["notes"][0] and "right one" in said["notes"][1]
+    assert "60 degrees" in said["notes"][0] and "right hand" in said["notes"][1]
     assert said["tracked"] > 0.9 and "one camera" in said["bones"]
     _, places = table_of(film / "one.csv")
     aligned = [aligned_mm(one, other) for one, other in zip(places[WHOLE:], recording().places, strict=False)]

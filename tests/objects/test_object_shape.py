@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import os
+import time
 
 import numpy as np
 import pytest
@@ -122,7 +123,7 @@ def test_a_fine_mesh_is_searched_in_groups(monkeypatch):
         sphere = trimesh.creation.icosphere(subdivisions=subdivisions, radius=0.05)
         mesh = Mesh(np.asarray(sphere.vertices), np.asarray(sphere.faces))
         mesh.signed_distance(points[:1])
-        times.append(quickest(lambda mesh=mesh: mesh.signed_distance(points)))
+        times.append(quickest(lambda mesh=mesh: mesh.signed_distance(points), clock=time.process_time))
     assert times[1] < 9.0 * times[0]
     monkeypatch.setattr("rhot_app.objects.shape.FACES_MAX", 11)
     with pytest.raises(RigError, match="12 faces; at most 11"):
