@@ -60,5 +60,5 @@ def test_the_simulated_bare_hand_works_the_mouse_live() -> None:
         late.cancel()
     assert moved_m > 0.05 and len(places) > 10, notes
     assert running.returncode == 0, notes
-    for stage in ("a simulated rig and an engine start", "learn the empty scene", "looked for", "is tracked"):
+    for stage in ("a simulated rig and an engine start", "learn the empty scene", "waiting until", "is tracked"):
         assert stage in notes
