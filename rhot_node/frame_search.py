@@ -1,4 +1,4 @@
-"""A search of whole frames beside that for markers: in a thread of its own, so that it delays no marker.
+"""A search of frames beside that for markers: for tags, landmarks or edges. Its own thread delays no marker.
 
 It takes the newest frame whenever it is done with the one before. Frames that come meanwhile are not searched, and
 counted.
@@ -14,45 +14,46 @@ from rhot_node.capture.camera import Frame
 from rhot_node.clock import NodeClock
 from rhot_node.network.session import Stream
 from rhot_node.threads import HANG_S, Worker
-from rhot_node.wire.messages import Fiducials, HandLandmarks
+from rhot_node.wire.messages import Fiducials, ForegroundPart, HandLandmarks, SliceEdges
 
 U32_MAX = 2**32 - 1
 
-Copy = TypeVar("Copy")
+Work = TypeVar("Work")
+Found = Fiducials | HandLandmarks | SliceEdges | ForegroundPart
 
 
 class SearchSender(Protocol):
     """Where what is found goes; the UDP link or a fake."""
 
-    def send(self, observations: Fiducials | HandLandmarks, stream: Stream) -> bool:
+    def send(self, observations: Found, stream: Stream) -> bool:
         """Send it where the stream goes; False when it could not be sent."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class Waiting(Generic[Copy]):
-    """A frame to be searched. `image`: a copy of what is searched, as the frame's own buffer is used again."""
+class Waiting(Generic[Work]):
+    """A frame to be searched. `work`: a copy of what is searched, as the frame's own buffer is used again."""
 
     frame: Frame
-    image: Copy
+    work: Work
     stream: Stream
     sender: SearchSender
 
 
-class FrameSearch(Generic[Copy]):
+class FrameSearch(Generic[Work]):
     """`step` searches one frame; after `start` a thread does so. The other methods belong to the daemon's thread. A
-    search has `search`, which sends one message with `send`."""
+    search has `search`, which sends messages with `send`."""
 
     def __init__(self, node_id: int, clock: NodeClock) -> None:
         self.searched = self.skipped = self.sent = self.not_sent = 0
         self._node_id, self._clock = node_id, clock
-        self._session = self._sequence = 0
+        self._session, self._sequences = 0, dict[type, int]()
         self._changed = threading.Condition()
-        self._waiting: Waiting[Copy] | None = None
+        self._waiting: Waiting[Work] | None = None
         self._busy = self._ending = False
         self._worker: Worker | None = None
 
-    def search(self, waiting: Waiting[Copy]) -> None:
+    def search(self, waiting: Waiting[Work]) -> None:
         """Search one frame and send what is found."""
         raise NotImplementedError
 
@@ -70,7 +71,7 @@ class FrameSearch(Generic[Copy]):
                 return False
         return True
 
-    def put(self, waiting: Waiting[Copy]) -> None:
+    def put(self, waiting: Waiting[Work]) -> None:
         """Have a frame searched."""
         with self._changed:
             self._waiting = waiting
@@ -83,28 +84,28 @@ class FrameSearch(Generic[Copy]):
             self._busy = waiting is not None
         if waiting is None:
             return False
+        self.searched += 1
         try:
             self.search(waiting)
         finally:
             self._busy = False
         return True
 
-    def head(self, waiting: Waiting[Copy]) -> tuple[int, int, int, int, int, int, int, int, int, int, int]:
-        """What the message of a frame begins with, node to frame number."""
+    def head(self, waiting: Waiting[Work], kind: type) -> tuple[int, int, int, int, int, int, int, int, int, int, int]:
+        """What a message of this `kind` begins with, node to frame number."""
         frame, session = waiting.frame, waiting.stream.session
         if session != self._session:
-            self._session, self._sequence = session, 0
-        sequence = self._sequence
-        self._sequence = (sequence + 1) & U32_MAX
+            self._session, self._sequences = session, {}
+        sequence = self._sequences.get(kind, 0)
+        self._sequences[kind] = (sequence + 1) & U32_MAX
         t_send_node_ns = self._clock.now_ns()
         processing_ns = min(max(t_send_node_ns - frame.t_available_node_ns, 0), U32_MAX)
         width, height = frame.image.size
         return (self._node_id, session, sequence, frame.t_node_ns, t_send_node_ns, processing_ns, frame.exposure_ns,
                 frame.row_time_ns, width, height, frame.number & U32_MAX)
 
-    def send(self, message: Fiducials | HandLandmarks, waiting: Waiting[Copy]) -> None:
+    def send(self, message: Found, waiting: Waiting[Work]) -> None:
         """Send what was found in a frame."""
-        self.searched += 1
         if waiting.sender.send(message, waiting.stream):
             self.sent += 1
         else:

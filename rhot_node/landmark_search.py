@@ -12,7 +12,7 @@ import numpy as np
 from rhot_node.capture.camera import Frame
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, network_model
-from rhot_node.detect.image import YuvImage, to_bgr
+from rhot_node.detect.image import YuvImage
 from rhot_node.errors import KeypointError
 from rhot_node.frame_search import FrameSearch, SearchSender, Waiting
 from rhot_node.health.checks import Check
@@ -69,8 +69,7 @@ class LandmarkSearch(FrameSearch[YuvImage]):
     def offer(self, frame: Frame, stream: Stream, sender: SearchSender) -> None:
         """Have a frame searched if landmarks are asked for and nothing else is being searched; costs a copy of it."""
         if self._model is not None and self.free():
-            image = frame.image
-            self.put(Waiting(frame, YuvImage(image.y.copy(), image.u.copy(), image.v.copy()), stream, sender))
+            self.put(Waiting(frame, frame.image.copy(), stream, sender))
 
     def count(self) -> dict[str, int]:
         """Counters, for the control channel."""
@@ -86,10 +85,10 @@ class LandmarkSearch(FrameSearch[YuvImage]):
         model = self._model
         networks = None if model is None else self._opened(model)
         if networks is not None:  # not switched off meanwhile
-            hands = networks.find(to_bgr(waiting.image))
+            hands = networks.find(waiting.work)
             self.found += len(hands)
-            self.send(HandLandmarks(*self.head(waiting), tuple(landmarked(hand, waiting.image.size)
-                                                                for hand in hands)), waiting)
+            self.send(HandLandmarks(*self.head(waiting, HandLandmarks), tuple(landmarked(hand, waiting.work.size)
+                                                                              for hand in hands)), waiting)
 
     def _opened(self, model: str) -> HandNetworks | None:
         """The networks of a model; None while they cannot be opened."""

@@ -6,10 +6,8 @@ that comes while one is being searched is left out and counted.
 
 from __future__ import annotations
 
-import threading
 import time
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +18,8 @@ from rhot_node.detect.edges import Edges, find_edges, noise_of
 from rhot_node.detect.foreground import foreground_map
 from rhot_node.detect.image import YuvImage
 from rhot_node.foreground_store import ForegroundStore, rgb_of
+from rhot_node.frame_search import U32_MAX, FrameSearch, SearchSender, Waiting
 from rhot_node.network.session import Stream
-from rhot_node.threads import Worker
 from rhot_node.wire.codec import EDGES_FIT, FOREGROUND_FIT
 from rhot_node.wire.edges import pack_edges
 from rhot_node.wire.foreground_map import pack_map
@@ -31,16 +29,7 @@ from rhot_node.wire.slices import unpack_slices
 VALID_S = 1.0
 """How long a request is in force: a hand has moved on by then."""
 
-U32_MAX = 2**32 - 1
 _NOISE_S = 1.0  # between two measurements of the image's noise
-
-
-class EdgeSender(Protocol):
-    """Where edges and foreground maps go; the UDP link or a fake."""
-
-    def send(self, observations: SliceEdges | ForegroundPart, stream: Stream) -> bool:
-        """Send them where the stream goes; False when they could not be sent."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,38 +44,25 @@ class _Order:
     until_s: float
 
 
-class _Waiting:
-    """A frame to be searched: its planes are copies, as the frame's own buffer is used again."""
-
-    def __init__(self, frame: Frame, order: _Order, stream: Stream, sender: EdgeSender) -> None:
-        image = frame.image
-        self.image = YuvImage(image.y.copy(), image.u.copy(), image.v.copy())
-        self.frame, self.order, self.stream, self.sender = frame, order, stream, sender
+Work = tuple[YuvImage, _Order]
 
 
-class SliceSearch:
-    """`take` belongs to the link's thread, `offer` to the daemon's; `step` searches one frame, a thread does so after
-    `prepare`."""
+class SliceSearch(FrameSearch[Work]):
+    """`take` belongs to the link's thread."""
 
     def __init__(self, node_id: int, clock: NodeClock, foreground: ForegroundStore) -> None:
-        self.searched = self.skipped = self.requests = self.sent = self.not_sent = 0
-        self._node_id, self._clock, self._foreground = node_id, clock, foreground
+        super().__init__(node_id, clock)
+        self.requests = 0
+        self._foreground = foreground
         self._order: _Order | None = None
         self._parts: dict[int, Slices] = {}
         self._collected = (0, 0)  # session and request whose parts are being collected
-        self._numbers: dict[type, int] = {}
-        self._session = 0  # whose numbers these are
         self._noise, self._noise_due_s = 1.0, 0.0
-        self._changed = threading.Condition()
-        self._waiting: _Waiting | None = None
-        self._busy = self._ending = False
-        self._worker: Worker | None = None
 
     def prepare(self) -> None:
         """Compile, because slices may be asked for while frames come, and start the thread."""
         self.warm_up()
-        self._worker = Worker("searches along slices", self.step, wait=self._await_frame)
-        self._worker.start()
+        self.start("searches along slices")
 
     def warm_up(self) -> None:
         """Have everything compiled that a search needs."""
@@ -118,35 +94,16 @@ class SliceSearch:
                              time.monotonic() + VALID_S)
         return ""
 
-    def offer(self, frame: Frame, stream: Stream, sender: EdgeSender) -> bool:
+    def offer(self, frame: Frame, stream: Stream, sender: SearchSender) -> bool:
         """Have a frame searched if slices are asked for and nothing else is being searched; costs a copy of it. False
         when it was asked for and is not done."""
         order = self._order
         if (order is None or order.session != stream.session or time.monotonic() > order.until_s
                 or order.size != frame.image.size):
             return True
-        with self._changed:
-            if self._busy or self._waiting is not None:
-                self.skipped += 1
-                return False
-        waiting = _Waiting(frame, order, stream, sender)
-        with self._changed:
-            self._waiting = waiting
-            self._changed.notify()
-        return True
-
-    def step(self) -> bool:
-        """Search the frame that waits; False when there is none."""
-        with self._changed:
-            waiting, self._waiting = self._waiting, None
-            self._busy = waiting is not None
-        if waiting is None:
+        if not self.free():
             return False
-        try:
-            self._search(waiting)
-        finally:
-            with self._changed:
-                self._busy = False
+        self.put(Waiting(frame, (frame.image.copy(), order), stream, sender))
         return True
 
     def count(self) -> dict[str, int]:
@@ -154,33 +111,21 @@ class SliceSearch:
         return {"slice_requests": self.requests, "slice_frames": self.searched, "slice_frames_skipped": self.skipped,
                 "edges_sent": self.sent, "edges_not_sent": self.not_sent}
 
-    def close(self) -> None:
-        """End the thread. May be called twice."""
-        with self._changed:
-            self._ending = True
-            self._changed.notify()
-        if self._worker is not None:
-            self._worker.close()
-
-    def _await_frame(self) -> None:
-        with self._changed:
-            while self._waiting is None and not self._ending:
-                self._changed.wait()
-
-    def _search(self, waiting: _Waiting) -> None:
-        order, image = waiting.order, rgb_of(waiting.image)
+    def search(self, waiting: Waiting[Work]) -> None:
+        """Search one frame."""
+        order, image = waiting.work[1], rgb_of(waiting.work[0])
         model = self._foreground.of_size(*order.size)
         now_s = time.monotonic()
         if now_s >= self._noise_due_s:
             self._noise, self._noise_due_s = noise_of(image), now_s + _NOISE_S
-        self.searched += 1
         if len(order.slices):
             self._send_edges(waiting, find_edges(image, order.slices, model, self._noise))
         if order.map_step:
             self._send_map(waiting, pack_map(foreground_map(image, model, order.map_step)))
 
-    def _send_edges(self, waiting: _Waiting, edges: Edges) -> None:
+    def _send_edges(self, waiting: Waiting[Work], edges: Edges) -> None:
         """The edges of one frame in as many datagrams as they need."""
+        order = waiting.work[1]
         valid = np.arange(edges.offset.shape[1]) < edges.number[:, None]
         indices = np.nonzero(valid)[0]
         values = np.column_stack([column[valid] for column in (edges.offset, edges.sd, edges.strength, edges.inside,
@@ -188,33 +133,12 @@ class SliceSearch:
         parts = max(1, -(-len(indices) // EDGES_FIT))
         for part in range(parts):
             own = slice(part * EDGES_FIT, (part + 1) * EDGES_FIT)
-            head = self._head(waiting, SliceEdges)
-            self._send(SliceEdges(*head, waiting.order.request, len(waiting.order.slices), part, parts,
-                                  pack_edges(indices[own], values[own])), waiting)
+            self.send(SliceEdges(*self.head(waiting, SliceEdges), order.request, len(order.slices), part, parts,
+                                 pack_edges(indices[own], values[own])), waiting)
 
-    def _send_map(self, waiting: _Waiting, data: bytes) -> None:
+    def _send_map(self, waiting: Waiting[Work], data: bytes) -> None:
         """A compressed map in as many datagrams as it needs."""
-        parts = -(-len(data) // FOREGROUND_FIT)
+        order, parts = waiting.work[1], -(-len(data) // FOREGROUND_FIT)
         for part in range(parts):
-            head = self._head(waiting, ForegroundPart)
-            self._send(ForegroundPart(*head, waiting.order.request, waiting.order.map_step, part, parts,
-                                      data[part * FOREGROUND_FIT:(part + 1) * FOREGROUND_FIT]), waiting)
-
-    def _head(self, waiting: _Waiting, kind: type) -> tuple[int, int, int, int, int, int, int, int, int, int, int]:
-        """What both messages begin with, node to frame number, with the next number of this kind of message."""
-        frame, session = waiting.frame, waiting.stream.session
-        if session != self._session:
-            self._session, self._numbers = session, {}
-        sequence = self._numbers.get(kind, 0)
-        self._numbers[kind] = (sequence + 1) & U32_MAX
-        t_send_node_ns = self._clock.now_ns()
-        processing_ns = min(max(t_send_node_ns - frame.t_available_node_ns, 0), U32_MAX)
-        width, height = waiting.order.size
-        return (self._node_id, session, sequence, frame.t_node_ns, t_send_node_ns, processing_ns, frame.exposure_ns,
-                frame.row_time_ns, width, height, frame.number & U32_MAX)
-
-    def _send(self, message: SliceEdges | ForegroundPart, waiting: _Waiting) -> None:
-        if waiting.sender.send(message, waiting.stream):
-            self.sent += 1
-        else:
-            self.not_sent += 1
+            self.send(ForegroundPart(*self.head(waiting, ForegroundPart), order.request, order.map_step, part, parts,
+                                     data[part * FOREGROUND_FIT:(part + 1) * FOREGROUND_FIT]), waiting)

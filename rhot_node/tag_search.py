@@ -58,9 +58,9 @@ class TagSearch(FrameSearch[Luma]):
         """Search one frame."""
         detector = self._detector_of(self._settings.sought)
         if detector is not None:  # not switched off meanwhile
-            found = detector.detect(waiting.image)
+            found = detector.detect(waiting.work)
             self.found += len(found)
-            self.send(Fiducials(*self.head(waiting), found), waiting)
+            self.send(Fiducials(*self.head(waiting, Fiducials), found), waiting)
 
     def _begin(self) -> None:
         if self._settings.enabled:

@@ -30,6 +30,10 @@ class YuvImage:
         """(width, height), px."""
         return self.y.shape[1], self.y.shape[0]
 
+    def copy(self) -> YuvImage:
+        """The same with planes of its own."""
+        return YuvImage(self.y.copy(), self.u.copy(), self.v.copy())
+
 
 def from_i420(buffer: Plane, width: int, height: int, stride: int | None = None) -> YuvImage:
     """View an I420 buffer (Y, then U, then V) as an image, without a copy.

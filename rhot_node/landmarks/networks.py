@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import KeypointError
 from rhot_node.landmarks.install import installed_folder, read_network
 from rhot_node.landmarks.runtime import Network, Tensor, best_runtime, open_network
@@ -37,8 +38,8 @@ SEARCH_EVERY: Final = 4
 """Pictures from one search to the next, for a further hand and in an empty scene. A search costs about as much as the
 landmarks of a hand."""
 
-EAGER: Final = 30
-"""Pictures without a hand, the first ones and those after a loss, that are all searched."""
+REACQUISITION: Final = 30
+"""Pictures without a hand, the first ones and those after a loss, that are all searched. Chosen: a second."""
 
 PART: Final = 0.6
 """Side, by the longer one of the picture, of its parts that are searched by turns with the whole: in the whole picture
@@ -118,18 +119,23 @@ class HandNetworks:
         self._regions: list[Region] = []
         self._unsearched, self._empty, self._searches = SEARCH_EVERY, 0, -1  # pictures since a search, and a hand
 
-    def find(self, picture: Picture) -> tuple[DetectedHand, ...]:
-        """The hands in a picture (H, W, 3) BGR, or (H, W) grey, uint8. Raises ValueError for any other array."""
+    def find(self, picture: Picture | YuvImage) -> tuple[DetectedHand, ...]:
+        """The hands in a picture (H, W, 3) BGR, or (H, W) grey, uint8, or one of planes, which is converted only when
+        it is searched. Raises ValueError for any other array."""
+        self._unsearched += 1
+        self._empty = 0 if self._regions else self._empty + 1
+        due = self._unsearched >= SEARCH_EVERY or (not self._regions and self._empty <= REACQUISITION)
+        if isinstance(picture, YuvImage):
+            if not self._regions and not due:
+                return ()
+            picture = to_bgr(picture)
         if picture.dtype != np.uint8 or picture.ndim not in (2, 3) or picture.shape[2:] not in ((), (3,)):
             raise ValueError(f"a picture is (H, W, 3) or (H, W) of uint8, not {picture.shape} of {picture.dtype}")
         hands: list[DetectedHand] = []
         for region in self._regions if picture.size else []:
             self._add(hands, picture, region)
-        self._unsearched += 1
-        self._empty = 0 if hands or self._regions else self._empty + 1
         lost = len(hands) < len(self._regions)
-        eager = lost or (not hands and self._empty <= EAGER)
-        if picture.size and len(hands) < self._most and (eager or self._unsearched >= SEARCH_EVERY):
+        if picture.size and len(hands) < self._most and (lost or due):
             self._unsearched, self._searches = 0, 0 if lost else self._searches + 1
             for palm in self._palms(picture, _view(picture, self._searches)):
                 if len(hands) < self._most and not any(_same(palm.points, palm.region, hand) for hand in hands):

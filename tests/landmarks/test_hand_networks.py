@@ -15,9 +15,9 @@ from fake_networks import FakeNetworks, gradient, hand_at
 from rhot_node.errors import KeypointError
 from rhot_node.landmarks.install import installed_folder
 from rhot_node.landmarks.networks import (
-    EAGER,
     HAND_PX,
     MODELS,
+    REACQUISITION,
     SEARCH_EVERY,
     HandNetworks,
     next_region,
@@ -120,16 +120,16 @@ def test_a_further_hand_is_searched_for_now_and_then() -> None:
 def test_an_empty_scene_is_searched_now_and_then_after_the_first_second() -> None:
     fake = FakeNetworks()
     networks = networks_for(fake)
-    for _ in range(EAGER + 20 * SEARCH_EVERY):
+    for _ in range(REACQUISITION + 20 * SEARCH_EVERY):
         assert networks.find(PICTURE) == ()
-    assert EAGER + 19 <= fake.palm_calls <= EAGER + 21
+    assert REACQUISITION + 19 <= fake.palm_calls <= REACQUISITION + 21
     fake.hands.append(hand_at((330.0, 250.0)))
     assert [len(networks.find(PICTURE)) for _ in range(SEARCH_EVERY)][-1] == 1
     fake.hands.clear()
     calls = fake.palm_calls
-    for _ in range(EAGER):
+    for _ in range(REACQUISITION):
         networks.find(PICTURE)
-    assert fake.palm_calls == calls + EAGER, "it was there a moment ago"
+    assert fake.palm_calls == calls + REACQUISITION, "it was there a moment ago"
 
 
 @pytest.mark.parametrize("shape", [(480, 640), (640, 480), (500, 500), (100, 1000)])

@@ -14,7 +14,7 @@ from shipped_markers import LANDMARKS21, RHOT6
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, changed_settings
 from rhot_node.daemon import NodeDaemon
-from rhot_node.detect.image import from_bgr
+from rhot_node.detect.image import YuvImage, from_bgr, to_bgr
 from rhot_node.errors import KeypointError, SettingsError
 from rhot_node.landmark_search import LandmarkSearch
 from rhot_node.landmarks import install
@@ -42,8 +42,8 @@ class FixedHands:
                            for _ in range(count))
         self.shapes: list[tuple[int, ...]] = []
 
-    def find(self, picture: np.ndarray) -> tuple[DetectedHand, ...]:
-        self.shapes.append(picture.shape)
+    def find(self, picture: YuvImage) -> tuple[DetectedHand, ...]:
+        self.shapes.append(to_bgr(picture).shape)
         return self.hands
 
 
