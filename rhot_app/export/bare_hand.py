@@ -10,7 +10,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,14 +17,14 @@ from rhot_app.barehand.follower import HandFollower
 from rhot_app.barehand.overlay import overlay
 from rhot_app.errors import ExportError, RecordingError, note_loss
 from rhot_app.export.export import check_place, format_of, make_writer, whole_file
-from rhot_app.export.pictures import check_pictures, whole_pictures
+from rhot_app.export.pictures import check_pictures, side_by_side, whole_pictures
 from rhot_app.export.plan import Plan
 from rhot_app.export.states import BLOCK, states_of
 from rhot_app.handfit.adaptation import REASON, Adapted, adapt
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.rig_history import accept_hand, require_hand_place
-from rhot_app.sources.frame_sets import CameraVideo, FrameSet, frame_sets, frames_left_out, overlap
+from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out, overlap
 from rhot_app.state import HandState
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 
@@ -35,7 +34,6 @@ BACKGROUND_PICTURES: Final = 16
 """Pictures of each camera from which its background is learnt: a pixel's noise is then known to 1/sqrt(2 n), 18 %."""
 
 TABLES: Final = (".csv", ".parquet", ".npz")
-_TEXT_RGB: Final = (255, 255, 255)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +99,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
     first, last = overlap(videos)
     run = HandFollower(rig, foreground, known_size=known_size,
                        empty_until_ns=first + round(1e9 * empty_s) if start_frame is None else last + 1)
-    spent: list[tuple[int, bool]] = []
+    tracker, spent = run.tracker, list[tuple[int, bool]]()
     begun = time.perf_counter()
     with contextlib.ExitStack() as stack:
         table = stack.enter_context(open_table(rig, videos[0].path.name, out)) if out is not None else None
@@ -109,14 +107,18 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
         drawn = stack.enter_context(whole_pictures(pictures, fps)) if pictures is not None else None
         for number, frames in enumerate(frame_sets(videos)):
             if number == start_frame:
-                run.start(run.tracker.start_pose, frames.first_ns)
+                run.start(tracker.start_pose, frames.first_ns)
             progress("tracking", min(max((frames.first_ns - first) / max(last - first, 1), 0.0), 1.0))
             state = run.step(frames.images, frames.t_ns)
             spent.append((state.t_master_ns, state.tracked))
             if table is not None:
                 table.add(state)
             if drawn is not None:
-                drawn.add(side_by_side(run, frames, state))
+                def draw(c: int, picture: Image, state: HandState = state) -> Image:
+                    frame = tracker.frames[c]
+                    return picture if frame is None or not run.following else overlay(
+                        picture, frame, tracker.filter.newest.state, tracker.cameras[c].project(state.joint_positions))
+                drawn.add(side_by_side(tracker.cameras, frames.images, state.condition.value, draw))
         if start_frame is not None and start_frame >= len(spent):
             raise RecordingError(f"--start {start_frame}: the videos show {len(spent)} frames together, 0 to "
                                  f"{len(spent) - 1}. Give the number of one of them.")
@@ -166,21 +168,16 @@ def check_outputs(videos: Sequence[CameraVideo], out: Path | None, pictures: Pat
         other = next((earlier for earlier, place in named[:k] if place == path), None)
         if other is not None:
             raise ExportError(f"{path}: {other} and {option} would both write it; give each a file of its own.")
+    if out is not None and out.suffix.lower() not in TABLES:
+        raise ExportError(f"{out}: a bare hand is written as .csv, .parquet or .npz; rhot export has the other formats "
+                          "for raw logs.")
     for video in videos:
         if out is not None:
-            check_table(video.path, out, again)
+            check_place(video.path, out, again)
         if pictures is not None:
             check_pictures(video.path, pictures, again)
     if hand_file is not None:
         require_hand_place(hand_file)
-
-
-def check_table(video: Path, target: Path, again: bool) -> None:
-    """Refuse a table that cannot be written. Raises ExportError."""
-    if target.suffix.lower() not in TABLES:
-        raise ExportError(f"{target}: a bare hand is written as .csv, .parquet or .npz; rhot export has the other "
-                          "formats for raw logs.")
-    check_place(video, target, again)
 
 
 class StateTable:
@@ -226,17 +223,3 @@ def open_table(rig: Rig, name: str, out: Path, zero_ns: int | None = None) -> It
     with (whole_file(out, lambda: None) as path,
           contextlib.closing(StateTable(rig, name, format_of(None, out), path, zero_ns)) as table):
         yield table
-
-
-def side_by_side(run: HandFollower, frames: FrameSet, state: HandState) -> Image:
-    """All cameras' pictures (H, W, 3) RGB of a frame set beside each other, with the hand's contour, slices and
-    skeleton, and the state's condition. A camera without picture is black."""
-    tracker, shown = run.tracker, []
-    for camera, image, frame in zip(tracker.cameras, frames.images, tracker.frames, strict=True):
-        picture = np.zeros((camera.height, camera.width, 3), np.uint8) if image is None else image.copy()
-        if run.following and image is not None and frame is not None:
-            picture = overlay(picture, frame, tracker.filter.newest.state, camera.project(state.joint_positions))
-        cv2.putText(picture, state.condition.value, (8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, _TEXT_RGB, 2, cv2.LINE_AA)
-        shown.append(picture)
-    height = max(picture.shape[0] for picture in shown)
-    return np.hstack([np.pad(picture, ((0, height - picture.shape[0]), (0, 0), (0, 0))) for picture in shown])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,18 +58,13 @@ def run(args: argparse.Namespace) -> int:
     for path in (*given.values(), *empty_given.values()):
         input_file(path)  # refused before numba is loaded
     from rhot_app.export.bare_hand import learn_backgrounds, track_videos
-    from rhot_app.sources.frame_sets import FPS, checked_seconds, on_one_clock
+    from rhot_app.sources.frame_sets import checked_seconds
     from rhot_node.compiled import announce_compilation
 
-    if args.fps is not None and not FPS[0] <= args.fps <= FPS[1]:
-        raise RecordingError(f"--fps {args.fps:g}: give the frames per second, from {FPS[0]:g} to {FPS[1]:g}.")
+    rig = msgspec.structs.replace(rig, nodes=tuple(node for node in rig.nodes if node.name in given),
+                                  depth=type(rig.depth)())
+    videos = opened_videos(args, rig, given)
     announce_compilation()
-    videos = open_all(rig, given, args.fps)
-    rig = msgspec.structs.replace(rig, nodes=tuple(node for video in videos for node in rig.nodes
-                                                   if node.name == video.camera), depth=type(rig.depth)())
-    offsets = {name: checked_seconds(text, f"--offset-s {name}")
-               for name, text in named(args.offset_s, "--offset-s", rig).items()}
-    videos = on_one_clock(videos, offsets)
     foreground, empty_s = None, 0.0
     if args.background:
         empty = open_all(rig, empty_given, args.fps)
@@ -137,6 +131,17 @@ def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:
     return found
 
 
+def opened_videos(args: argparse.Namespace, rig: Rig, given: dict[str, str]) -> list[CameraVideo]:
+    """The videos of cameras on one clock, by --fps and --offset-s, in the rig's order. Raises RecordingError."""
+    from rhot_app.sources.frame_sets import FPS, checked_seconds, on_one_clock
+
+    if args.fps is not None and not FPS[0] <= args.fps <= FPS[1]:
+        raise RecordingError(f"--fps {args.fps:g}: give the frames per second, from {FPS[0]:g} to {FPS[1]:g}.")
+    return on_one_clock(open_all(rig, given, args.fps), {
+        name: checked_seconds(text, f"--offset-s {name}")
+        for name, text in named(args.offset_s, "--offset-s", rig).items()})
+
+
 def open_all(rig: Rig, paths: dict[str, str], fps: float | None) -> list[CameraVideo]:
     """The videos of cameras, in the rig's order. Raises RecordingError."""
     from rhot_app.sources.frame_sets import open_video
@@ -158,18 +163,20 @@ def sentences(document: dict[str, Any]) -> list[str]:
     else:
         times = document["starts"]
         out.append(f"A hand in {100 * tracked:.0f} % of them; found {times} time{'' if times == 1 else 's'}.")
-    out.append(f"Computed: {document['computed_per_s']:.1f} frame sets a second overall, with reading, searching and "
-               "drawing.")
     if document["step_p50_ms"] is not None:
         out.append(f"Following the hand into the next set took {document['step_p50_ms']:.0f} ms (median), "
                    f"{document['step_p99_ms']:.0f} ms (99 %).")
-    if document["lost_s"] and tracked:
-        intervals = ", ".join(f"{begin:.2f} to {end:.2f}" for begin, end in document["lost_s"] if not math.isnan(end))
-        out.append(f"No hand at {intervals} s.")
     if document["adapted"]:
         one = document["adapted"]
         out.append(f"Hand adapted by {one['key_frames']} key frames: lengths by {one['lengths_percent']:.1f} ± "
                    f"{one['lengths_sd_percent']:.1f} %, radii by {one['radii_percent']:.1f} ± "
                    f"{one['radii_sd_percent']:.1f} % (rms).")
-    out += [f"Written: {document[key]}" for key in ("out", "overlay", "hand_file") if document[key]]
-    return out
+    return [*out, *closing_sentences(document)]
+
+
+def closing_sentences(document: dict[str, Any]) -> list[str]:
+    """What the summaries of landmarks and contours have in common: rate, losses, files."""
+    out = [f"Computed: {document['computed_per_s']:.1f} frame sets a second overall, with reading and drawing."]
+    if document["lost_s"] and document["tracked"]:
+        out.append("No hand at " + ", ".join(f"{a:.2f} to {b:.2f}" for a, b in document["lost_s"]) + " s.")
+    return [*out, *(f"Written: {document[key]}" for key in ("out", "overlay", "hand_file") if document[key])]

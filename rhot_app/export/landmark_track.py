@@ -26,7 +26,7 @@ from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.calibration.recorded_observations import read_instants
 from rhot_app.errors import CalibrationError, RecordingError, note_loss
 from rhot_app.export.bare_hand import check_outputs, lost_intervals, open_table
-from rhot_app.export.pictures import whole_pictures
+from rhot_app.export.pictures import side_by_side, whole_pictures
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.landmarks import ANATOMY_SD_M, NOISE_M
@@ -60,7 +60,6 @@ REASON: Final = "bones measured by landmarks"
 """Why a hand file is replaced."""
 
 FOUND_RGB: Final = (255, 220, 0)
-TEXT_RGB: Final = (255, 255, 255)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,10 +206,14 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: boo
             drawn = stack.enter_context(whole_pictures(pictures, 1e9 / min(video.period_ns for video in videos)))
             cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
             for frames in frame_sets(videos):
-                nearest = int(np.argmin(np.abs(times_s - 1e-9 * frames.first_ns)))
-                drawn.add(_side_by_side(cameras, frames.images, [
-                    film.hands[int(np.argmin(np.abs(film.times_s - 1e-9 * t)))]
-                    for film, t in zip(films, frames.t_ns, strict=True)], states[nearest]))
+                state = states[int(np.argmin(np.abs(times_s - 1e-9 * frames.first_ns)))]
+                hands = [state] if state.other is None else [state, state.other]
+
+                def draw(c: int, picture: Image, t_ns: Sequence[int] = frames.t_ns,
+                         hands: Sequence[HandState] = hands) -> Image:
+                    nearest = int(np.argmin(np.abs(films[c].times_s - 1e-9 * t_ns[c])))
+                    return _with_hands(cameras[c], picture, films[c].hands[nearest], hands)
+                drawn.add(side_by_side(cameras, frames.images, " ".join(hand.condition.value for hand in hands), draw))
     spent = [(round(1e9 * t), state.tracked) for t, state in zip(times_s, states, strict=True)]
     lost = tuple((1e-9 * spent[0][0] + begin, 1e-9 * spent[0][0] + end) for begin, end in lost_intervals(spent))
     return LandmarkSummary(
@@ -319,20 +322,13 @@ def _one_of_each_instant(states: Iterator[HandState], half_ns: int) -> Iterator[
         yield waiting
 
 
-def _side_by_side(cameras: Sequence[CameraModel], images: Sequence[Image | None],
-                  found: Sequence[tuple[LandmarkedHand, ...]], state: HandState) -> Image:
-    """All cameras' pictures beside each other, with the landmarks, the hands and the state's condition."""
-    shown, hands = [], [state] if state.other is None else [state, state.other]
-    for camera, image, seen in zip(cameras, images, found, strict=True):
-        picture = np.zeros((camera.height, camera.width, 3), np.uint8) if image is None else image.copy()
-        for x, y, variance, *_ in [point for hand in seen for point in hand.points]:
-            if variance > 0.0:
-                cv2.circle(picture, (round(float(x)), round(float(y))), 3, FOUND_RGB, -1, cv2.LINE_AA)
-        for hand in hands:
-            if hand.tracked:
-                draw_skeleton(picture, camera.project(hand.joint_positions), 2)
-        cv2.putText(picture, " ".join(hand.condition.value for hand in hands), (8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7,
-                    TEXT_RGB, 2, cv2.LINE_AA)
-        shown.append(picture)
-    height = max(picture.shape[0] for picture in shown)
-    return np.hstack([np.pad(picture, ((0, height - picture.shape[0]), (0, 0), (0, 0))) for picture in shown])
+def _with_hands(camera: CameraModel, picture: Image, found: Sequence[LandmarkedHand],
+                hands: Sequence[HandState]) -> Image:
+    """A camera's picture with the landmarks and the hands."""
+    for x, y, variance, *_ in [point for hand in found for point in hand.points]:
+        if variance > 0.0:
+            cv2.circle(picture, (round(float(x)), round(float(y))), 3, FOUND_RGB, -1, cv2.LINE_AA)
+    for hand in hands:
+        if hand.tracked:
+            draw_skeleton(picture, camera.project(hand.joint_positions), 2)
+    return picture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import ExportError
 from rhot_app.export.export import check_place, whole_file
+from rhot_app.geometry.camera import CameraModel
 
 Image = NDArray[np.uint8]
 
 _CODECS: Final = {".avi": "MJPG", ".mp4": "mp4v"}
+_TEXT_RGB: Final = (255, 255, 255)
 
 
 def check_pictures(video: Path, target: Path, again: bool) -> None:
@@ -93,3 +95,17 @@ def whole_pictures(target: Path, fps: float) -> Iterator[Pictures]:
         hidden.replace(target)
     finally:
         shutil.rmtree(hidden, ignore_errors=True)
+
+
+def side_by_side(cameras: Sequence[CameraModel], images: Sequence[Image | None], caption: str,
+                 draw: Callable[[int, Image], Image]) -> Image:
+    """All cameras' images (H, W, 3) RGB beside each other, as `draw` makes of each camera's number and copy, with a
+    caption. A camera without an image is black."""
+    shown = []
+    for number, (camera, image) in enumerate(zip(cameras, images, strict=True)):
+        picture = (np.zeros((camera.height, camera.width, 3), np.uint8) if image is None
+                   else draw(number, image.copy()))
+        cv2.putText(picture, caption, (8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, _TEXT_RGB, 2, cv2.LINE_AA)
+        shown.append(picture)
+    height = max(picture.shape[0] for picture in shown)
+    return np.hstack([np.pad(picture, ((0, height - picture.shape[0]), (0, 0), (0, 0))) for picture in shown])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from rhot_app.errors import RecordingError, input_file
 from rhot_app.export import bare_hand_command
-from rhot_app.export.bare_hand_command import named, open_all
+from rhot_app.export.bare_hand_command import closing_sentences, named, opened_videos
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -87,17 +87,12 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
         input_file(path)  # refused before numba is loaded
     from rhot_app.export.landmark_track import landmark_rig_of, track_landmarks
     from rhot_app.progress import ProgressLine
-    from rhot_app.sources.frame_sets import FPS, checked_seconds, on_one_clock
     from rhot_node.compiled import announce_compilation
     from rhot_node.landmarks.networks import open_hand_networks
 
-    if args.fps is not None and not FPS[0] <= args.fps <= FPS[1]:
-        raise RecordingError(f"--fps {args.fps:g}: give the frames per second, from {FPS[0]:g} to {FPS[1]:g}.")
     open_hand_networks()  # without them nothing is begun
     rig = landmark_rig_of(rig, tuple(given))
-    videos = on_one_clock(open_all(rig, given, args.fps), {
-        name: checked_seconds(text, f"--offset-s {name}")
-        for name, text in named(args.offset_s, "--offset-s", rig).items()})
+    videos = opened_videos(args, rig, given)
     announce_compilation()
     line = ProgressLine("tracking")
     summary = track_landmarks(rig, videos, either_side=args.rig is None, measure=args.bones == "measured",
@@ -182,7 +177,4 @@ def sentences(document: dict[str, Any]) -> list[str]:
     if document["reprojection_large"]:
         out.append("That is large. Do not rely on the hand: check the rig's calibration, the cameras' order and the "
                    "hand's side and size.")
-    out.append(f"Computed: {document['computed_per_s']:.1f} frame sets a second overall.")
-    if document["lost_s"]:
-        out.append("No hand at " + ", ".join(f"{a:.2f} to {b:.2f}" for a, b in document["lost_s"]) + " s.")
-    return [*out, *(f"Written: {document[key]}" for key in ("out", "overlay", "hand_file") if document[key])]
+    return [*out, *closing_sentences(document)]
