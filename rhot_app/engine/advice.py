@@ -9,6 +9,7 @@ from rhot_app.calibration.check.camera_calibration import NOT_CALIBRATED, calibr
 from rhot_app.engine.node_meter import RECENT_NS, Recent
 from rhot_app.engine.status import Advice, Level, NodeStatus
 from rhot_app.project import Rig
+from rhot_app.state import HandState
 from rhot_node.network.presence import is_loopback
 
 UNSEEN_S = 3.0
@@ -103,6 +104,14 @@ def no_marker_advice(all_facts: Sequence[NodeFacts], running: bool, painted: boo
         return [Advice("warning", f"No camera has seen a marker for {seconds:.0f} s. Hold the hand into both pictures; "
                                   "if the markers are visible there, calibrate their colours.", subject="sight")]
     return []
+
+
+def start_pose_advice(state: HandState | None) -> list[Advice]:
+    """What to do while hands that are tracked by their contours alone are not followed: they begin in a given pose."""
+    if state is None or state.tracked or (state.other is not None and state.other.tracked):
+        return []
+    return [Advice("info", "No hand is followed. Take the pose that the pictures show in white, and hold it.",
+                   subject="sight")]
 
 
 def moved_advice(rig: Rig, moved: Mapping[int, str]) -> list[Advice]:

@@ -12,7 +12,7 @@ import numpy as np
 from rhot_app.calibration.check.health import HealthMonitor, HealthSample
 from rhot_app.calibration.verdict import Grade
 from rhot_app.diagnostics import Diagnostic
-from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice
+from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice, start_pose_advice
 from rhot_app.engine.node_meter import RECENT_NS, NodeMeter
 from rhot_app.engine.pipeline import Pipeline
 from rhot_app.engine.rig_watch import BonesWatch, HandWatch, RigWatch
@@ -96,7 +96,8 @@ class Observer:
         facts = [replace(self._facts(camera, status, now_ns), black=black(status.node_id))
                  for camera, status in enumerate(nodes)]
         bare = self.rig.tracker.observe == "contours"  # nobody wears the markers
-        nowhere = [] if bare else no_marker_advice(facts, running, self.rig.painted)
+        nowhere = (no_marker_advice(facts, running, self.rig.painted) if not bare
+                   else start_pose_advice(self._pipeline.last_state) if running else [])
         marker_ids = self.rig.markers.ids
         visibility = not (nowhere or bare)
         found = [advice for one in facts for advice in node_advice(one, marker_ids, running, visibility=visibility)]

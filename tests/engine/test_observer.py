@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from test_engine_codec import make_state
 
+from rhot_app.engine.advice import start_pose_advice
 from rhot_app.engine.observer import condition_of
 from rhot_app.state import Condition
 
@@ -19,3 +20,12 @@ def test_two_hands_are_all_there_only_when_both_are(hand, other, word):
     state = make_state()
     both = None if other is None else replace(state, condition=other)
     assert condition_of(replace(state, condition=hand, other=both)) is word
+
+
+def test_a_hand_that_contours_have_not_found_is_told_to_take_the_pose_that_is_shown():
+    state = make_state()
+    (advice,) = start_pose_advice(replace(state, condition=SEARCHING, other=replace(state, condition=LOST)))
+    assert "Take the pose" in advice.text and "white" in advice.text
+    for told in (None, replace(state, condition=PARTIAL),
+                 replace(state, condition=LOST, other=replace(state, condition=TRACKING))):
+        assert start_pose_advice(told) == []
