@@ -66,7 +66,7 @@ SECTIONS = {
     "covariances": Section("python benchmarks/painted_hand.py --seconds 1.5", 8.0),
     "false-locks": Section("python benchmarks/false_locks.py", 20.0),
     "certificate": Section("python benchmarks/certificate_intervals.py --seeds 6", 3.0),
-    "bare-hand": Section("python benchmarks/bare_hand.py --only feature,matched --seeds 2 --frames 30", 3.0),
+    "bare-hand": Section("python benchmarks/bare_hand.py --only matched --seeds 2 --frames 30", 3.0),
     "thesis-speeds": Section("python benchmarks/thesis_speeds.py --seeds 2", 20.0),
     "contour-offsets": Section("python benchmarks/contour_offsets.py", 3.0),
     "hand-adaptation": Section("python benchmarks/hand_adaptation.py", 15.0),

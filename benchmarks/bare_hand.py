@@ -2,7 +2,7 @@
 
     python benchmarks/bare_hand.py [--frames 60] [--seeds 3] [--only NAMES]
 
-The names are matched, feature, shape, mismatched, one, lost and edges. `shape`: bones wrong by 5 % and radii by 8 %.
+The names are matched, shape, mismatched, one, lost and edges. `shape`: bones wrong by 5 % and radii by 8 %.
 `mismatched`: the cameras' calibration is wrong, too, and the hand takes a pose that is shown. `lengths %` is what is
 left of the bones' error at the end, rms. `edges`: how far the outline's edges are from the true contour, by what is
 learnt: one by one, and the means along a side of a phalanx over all frames (`edges.SHADED_PX`,
@@ -128,8 +128,7 @@ def run(case: str, motion: str, seed: int, frames: int) -> dict[str, float]:
                 foreground = [learn_skin(image, learn_background(
                     skin_foreground(), [np.clip(empty, 0, 255).astype(np.uint8)]))
                     for image, empty in zip(images, walls, strict=True)]
-            tracker = BareHandTracker(rig, foreground=foreground, known_size=not bad,
-                                      mode="feature" if case == "feature" else "contour")
+            tracker = BareHandTracker(rig, foreground=foreground, known_size=not bad)
             if case == "mismatched":
                 found = tracker.begin(images, t_ns)
             if case != "mismatched" or not found:
@@ -195,7 +194,7 @@ def main() -> int:
     parser = arguments(__doc__)
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--only", default="matched,feature,shape,mismatched,one,lost")
+    parser.add_argument("--only", default="matched,shape,mismatched,one,lost")
     args = parser.parse_args()
     found = {case: [edges(MOTIONS[seed % len(MOTIONS)], seed, args.frames) if case == "edges" else
                     run(case, MOTIONS[seed % len(MOTIONS)], seed, args.frames) for seed in range(args.seeds)]

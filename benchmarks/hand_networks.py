@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 DATA = Path(__file__).parents[1].parent / "shared" / "data" / "bare_hand_stereo"
 CAMERAS = 2
-LOOKS = 12
+SAMPLES = 12
 SHIFT, TURN, GROWTH = 0.03, 0.03, 0.015
 """Standard deviations by which a region is changed: a part of its side, rad, and a part of its side. The recorded
 hand's own regions change so from picture to picture."""
@@ -106,8 +106,8 @@ def spread(folder: Path, model: str) -> dict[str, Any]:
             for one in networks.find(picture):
                 if number % 4:
                     continue
-                looks = [landmarks_in(hand, picture, changed(one.region, rng))[0] for _ in range(LOOKS)]
-                parts.append(np.std(looks, axis=0, ddof=1) / one.region.side)
+                samples = [landmarks_in(hand, picture, changed(one.region, rng))[0] for _ in range(SAMPLES)]
+                parts.append(np.std(samples, axis=0, ddof=1) / one.region.side)
     sd = np.sqrt(np.mean(np.square(parts), axis=(0, 2)))  # of each landmark
     return {"sd, part of the side": float(np.sqrt(np.mean(sd**2))), "median landmark": float(np.median(sd)),
             "best": float(sd.min()), "worst": float(sd.max()), "px of the input": HAND_PX * float(np.median(sd))}

@@ -145,15 +145,14 @@ class MouseProcess(HandProcess):
         return self._lock(*super().predict(state, covariance, dt_s))
 
 
-def held(case: Case, mode: str, speed_m_s: float, seed: int) -> bool:
+def held(case: Case, speed_m_s: float, seed: int) -> bool:
     """Whether a hand of this speed is followed to the end."""
     _, surface = model_and_surface()
     direction = np.pi * seed / 3.0
     cameras = cameras_of(case)
     walls = [np.full((camera.height, camera.width, 3), CLOTH) for camera in cameras]
     known = [learn_background(skin_foreground(), [one.astype(np.uint8)]) for one in walls]
-    tracker = BareHandTracker(rig_of(cameras), mode="feature" if mode == "features" else "contour",
-                              foreground=known)
+    tracker = BareHandTracker(rig_of(cameras), foreground=known)
     if case.constrained:
         tracker.process = tracker.filter.process = MouseProcess(tracker, pose_at(0.0, speed_m_s, direction))
     for k in range(-REST_IMAGES, IMAGES):
@@ -171,16 +170,16 @@ def held(case: Case, mode: str, speed_m_s: float, seed: int) -> bool:
     return True
 
 
-def greatest_m_s(case: Case, mode: str, seeds: int) -> float:
+def greatest_m_s(case: Case, seeds: int) -> float:
     """By bisection of the speed's logarithm; NaN where not even the slowest hand is held."""
     def all_held(speed_m_s: float) -> bool:
-        return all(held(case, mode, speed_m_s, seed) for seed in range(seeds))
+        return all(held(case, speed_m_s, seed) for seed in range(seeds))
 
     low, high = SLOWEST_M_S, FASTEST_M_S
     while high > PRECISION * low:
         middle = np.sqrt(low * high)
         good = all_held(middle)
-        print(f"{case.name}, {mode}: {1e3 * middle:.0f} mm/s {'held' if good else 'lost'}", file=sys.stderr, flush=True)
+        print(f"{case.name}: {1e3 * middle:.0f} mm/s {'held' if good else 'lost'}", file=sys.stderr, flush=True)
         low, high = (middle, high) if good else (low, middle)
     return low if low > SLOWEST_M_S else np.nan
 
@@ -191,15 +190,12 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--only", default=",".join(CASES))
     args = parser.parse_args()
-    found = {name: {mode: 1e3 * greatest_m_s(CASES[name], mode, args.seeds) for mode in ("features", "contours")}
-             for name in args.only.split(",")}
-    publish(args, found, table(["greatest mean speed, mm/s", "features", "contours", "thesis"],
-                               [[CASES[name].name, one["features"], one["contours"], CASES[name].thesis]
-                                for name, one in found.items()]),
+    found = {name: 1e3 * greatest_m_s(CASES[name], args.seeds) for name in args.only.split(",")}
+    publish(args, found, table(["greatest mean speed, mm/s", "contours", "thesis"],
+                               [[CASES[name].name, one, CASES[name].thesis] for name, one in found.items()]),
             f"By bisection with {args.seeds} seeds: a single one that is lost at a middle speed ends the search above "
             "it, so chance makes speeds lower, and two runs with other seeds differ.")
-    return int(any(not value >= THESIS_MM_S for name, one in found.items() if CASES[name].constrained
-                   for value in one.values()))
+    return int(any(not value >= THESIS_MM_S for name, value in found.items() if CASES[name].constrained))
 
 
 if __name__ == "__main__":

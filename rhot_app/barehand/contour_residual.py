@@ -5,9 +5,9 @@ process along the slice. An edge is weighted by the probability, at the present 
 without edges, or with edges of other objects only, changes nothing.
 
 The lengths and radii of the phalanges are uncertain parts of the state (`tracker.PHALANGES`). Two opposite edges then
-determine the axis, as in feature mode, and one edge alone is less certain. The rest of the surface's error is partly
-common to one side of a capsule, in all cameras: that offset is marginalised. The error persists while the hand shows
-the same side, so images within that time count as one.
+determine the axis, and one edge alone is less certain. The rest of the surface's error is partly common to one side of
+a capsule, in all cameras: that nuisance parameter is marginalised. The error persists while the hand shows the same
+side, so images within that time count as one.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class ContourFrame:
                    e.offset, e.sd, e.inside, e.outside, self.expected_sd, self.clutter, offset, rows, good, sides)
         return offset, rows, good
 
-    def gather(self, predicted: Predicted, aside: Array, information: Array, pull: Array, sides: Array) -> float:
+    def gather(self, predicted: Predicted, nuisance: Array, information: Array, pull: Array, sides: Array) -> float:
         """Add the lower triangle of the slices' `information` (N, N), their gradient to `pull` (N,), and to `sides`
         (S, N + 2) the terms for `_marginalise`; returns their cost. The derivatives in `predicted` have N columns."""
         assert self.edges is not None, "the edges of the slices have not been observed"
@@ -151,7 +151,7 @@ class ContourFrame:
         self.slice_counts = np.zeros((GROUPS, 2))
         return float(_gather(
             self.surface, *predicted, p.capsule, p.kind, p.behind, self.shape_variance, self.side_sd, e.number,
-            e.offset, e.sd, e.inside, e.outside, self.expected_sd, self.clutter, aside, information, pull,
+            e.offset, e.sd, e.inside, e.outside, self.expected_sd, self.clutter, nuisance, information, pull,
             self.slice_counts, sides))
 
 
@@ -219,13 +219,13 @@ def gathered(frames: Sequence[ContourFrame], state: Array, velocity_root: Array 
     information, pull = np.zeros((count, count)), np.zeros(count)
     sides = np.zeros((SIDES * len(frames[0].surface.row), count + 2))
     predicted = [frame.add_sides(state, sides) for frame in frames]
-    aside = sides[:, -2] / (1.0 + sides[:, -1])
+    nuisance = sides[:, -2] / (1.0 + sides[:, -1])
     sides[:] = 0.0
-    cost = float(aside @ aside)
+    cost = float(nuisance @ nuisance)
     for frame, (offset, rows, good) in zip(frames, predicted, strict=True):
         if velocity_root is not None:
             rows = np.hstack([rows, frame.late_s.mean() * (rows[:, :POSE] @ velocity_root)])
-        cost += frame.gather((offset, rows, good), aside, information, pull, sides)
+        cost += frame.gather((offset, rows, good), nuisance, information, pull, sides)
     _marginalise(sides, information, pull)
     if velocity_root is not None:
         own, cross = information[COLUMNS:, COLUMNS:], information[COLUMNS:, :COLUMNS]
@@ -339,7 +339,7 @@ def _add_sides(surface, state, size, pose, intrinsics, late_s, capsule, kind, al
 
 @njit(cache=True)
 def _gather(surface, offset, rows, good, capsule, kind, behind, shape_variance, side_sd, count, offsets, sds, inside,
-            outside, expected_sd, clutter, aside, information, pull, slice_counts, sides):
+            outside, expected_sd, clutter, nuisance, information, pull, slice_counts, sides):
     """Add the slices' information to the lower triangle of `information` (N, N) and their gradient to `pull` (N,);
     returns their cost."""
     found, cost, own = np.empty(offsets.shape[1]), 0.0, np.empty(rows.shape[1], np.int64)
@@ -347,7 +347,7 @@ def _gather(surface, offset, rows, good, capsule, kind, behind, shape_variance, 
         if not good[s]:
             continue
         side = SIDES * capsule[s] + kind[s]
-        shift = aside[side] * side_sd[s]
+        shift = nuisance[side] * side_sd[s]
         one, weight, error, present = _mix(count[s], offsets[s], sds[s], inside[s], outside[s], behind[s],
                                            offset[s] + shift, shape_variance[s], expected_sd[s] ** 2, clutter[s], found)
         error += shift

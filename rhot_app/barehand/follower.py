@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.key_frames import KeyFrames
-from rhot_app.barehand.start import HELD_NS, MAJORITY
+from rhot_app.barehand.start import MAJORITY, MIN_DWELL_NS
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
@@ -74,8 +74,8 @@ class HandFollower:
         else:
             good = max(t_ns) - self._image_ns < BLIND_NS
         followed = following
-        if self._begun_ns is not None and (not good or min(t_ns) - self._begun_ns >= HELD_NS):
-            self._begun_ns, followed = None, good and self.tracker.holds(self.tracker.maps_of(images))
+        if self._begun_ns is not None and (not good or min(t_ns) - self._begun_ns >= MIN_DWELL_NS):
+            self._begun_ns, followed = None, good and self.tracker.verified(self.tracker.maps_of(images))
         self._following = good and followed
         if not self._following:
             return self._none(min(t_ns), begun)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike, NDArray
 
 from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, SHAPE, sized_table
 from rhot_app.hand.dh import DhArrays
@@ -12,12 +13,12 @@ from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCI
 from rhot_app.state import Knowledge
 
 
-def knowledge_of(sd: float, observed: bool, measured: float, inferred: float) -> int:
-    """MEASURED for an observed value with a standard deviation of `measured` or less, INFERRED up to `inferred`, else
+def knowledge_of(sd: ArrayLike, observed: ArrayLike, measured: float, inferred: float) -> NDArray[np.uint8]:
+    """MEASURED for observed values with a standard deviation of `measured` or less, INFERRED up to `inferred`, else
     GUESSED."""
-    if sd <= measured and observed:
-        return int(Knowledge.MEASURED)
-    return int(Knowledge.INFERRED if sd <= inferred else Knowledge.GUESSED)
+    guessed = np.where(np.asarray(sd) <= inferred, int(Knowledge.INFERRED), int(Knowledge.GUESSED))
+    certain = (np.asarray(sd) <= measured) & np.asarray(observed, np.bool_)
+    return np.where(certain, int(Knowledge.MEASURED), guessed).astype(np.uint8)
 
 
 @njit(cache=True)

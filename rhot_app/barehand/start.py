@@ -37,18 +37,18 @@ MAJORITY = 0.5
 """Part of the expected contour that must be found, and of the joints that must lie on foreground: more than half. Where
 more slices may be confused, fingers are guessed."""
 
-HELD_NS = 300_000_000
+MIN_DWELL_NS = 300_000_000
 """ns: so long a hand holds the start pose before it is followed. Chosen: a hand that passes by is gone by then."""
 
-FOUND = 0.85
+CONTOUR_THRESHOLD = 0.85
 """Part of the expected contour that is found of a hand that is followed from its start pose. Of drawn hands with errors
 below 3 mm 0.88 to 1.0 was found, of wrong poses on hands, forearms and faces mostly less."""
 
-AGREEMENT = 0.4
+LOG_ODDS_THRESHOLD = 0.4
 """Log odds per pixel of such a hand and its ring, if every other pixel were foreground. Of the same hands 0.46 to 0.99;
 of wrong poses 0.46 at most, and then less of the contour was found."""
 
-NEAR_SHARE = 0.25
+CANDIDATE_SHARE = 0.25
 """Part of the joints of the shown pose that must lie on foreground before a hand is looked for there. Chosen: fingers
 that are a finger's breadth off miss the hand."""
 
@@ -62,8 +62,8 @@ HEIGHT_PART, NEAR_M, FAR_M = 0.5, 0.25, 1.5
 """Part of an image's height that a shown hand fills, and the bounds of its distance, m. Chosen: it stays in the image
 when it moves by its own length."""
 
-ASIDE_M = 0.1
-"""m: of a shown hand from the middle, where there are two."""
+LATERAL_M = 0.1
+"""m: of a shown hand from the middle, where there are two. Chosen: two hands' breadths are then between the palms."""
 
 _CURLS_DEG = ((5.0, 10.0, 5.0), (20.0, 30.0, 20.0), (65.0, 80.0, 45.0))  # MCP, PIP, DIP: open, relaxed, closed
 _PARALLEL = 1e-3  # 3 degrees between the axes of two cameras
@@ -72,9 +72,9 @@ _THUMB_STEP = 0.5  # rad to either side of a relaxed thumb: a third of its range
 
 
 def shown_pose(rig: Rig, cameras: Sequence[CameraModel], model: HandModel, plane: PalmOnPlane | None = None,
-               aside: float = 0.0) -> HandPose:
+               lateral_m: float = 0.0) -> HandPose:
     """The pose that a hand is to take: the rig's; else a relaxed hand in the middle of the cameras' views that shows
-    the first camera its palm, or that lies on the `plane`. `aside`: m to the first camera's right."""
+    the first camera its palm, or that lies on the `plane`. `lateral_m`: to the first camera's right."""
     angles = model.pose_prior.mean.copy()
     for given in rig.tracker.start_poses[:1]:
         for name, degrees in given.angles_deg.items():
@@ -86,7 +86,7 @@ def shown_pose(rig: Rig, cameras: Sequence[CameraModel], model: HandModel, plane
         met = plane.met_by(first.centre, middle)
         middle = middle if met is None else met
         turn = plane.facing(-first.world_from_camera[:3, 1])
-    middle = middle + aside * first.world_from_camera[:3, 0]
+    middle = middle + lateral_m * first.world_from_camera[:3, 0]
     centre = np.array([0.5 * _length(model), 0.0, 0.0])
     return HandPose(rigid(turn, middle - turn @ centre), angles)
 
@@ -128,12 +128,11 @@ def taken_pose(shown: HandPose, maps: ForegroundMaps, cameras: Sequence[CameraMo
     """The pose about the `shown` one that a hand of the file's shape has taken in foreground maps; None without.
 
     In every map some of the joints must lie on foreground where they are shown, and most where they are found.
-    `agreement` must be positive there. All this only saves work: `BareHandTracker.holds` decides whether it is the
-    hand.
+    `mean_log_odds` must be positive there. All this only saves work: `BareHandTracker.verified` decides.
     """
     used = [camera for camera, one in zip(cameras, maps, strict=True) if one is not None]
     known = [one for one in maps if one is not None]
-    if not known or not _on_foreground(shown, known, used, model, NEAR_SHARE):
+    if not known or not _on_foreground(shown, known, used, model, CANDIDATE_SHARE):
         return None
     lenses = [camera.camera_from_world[:3] for camera in used], [camera.intrinsics for camera in used]
     covariance = np.diag(np.repeat(np.square(START_SD), (3, 3, 21)))
@@ -142,12 +141,12 @@ def taken_pose(shown: HandPose, maps: ForegroundMaps, cameras: Sequence[CameraMo
     world, angles = settle(surface, shown.world_from_palm, shown.angles, covariance, model, size,
                            log_odds_maps(known, STEP, *lenses), rng, plane)
     found = HandPose(world, angles)
-    if agreement(found, size, maps, cameras, surface) <= 0.0 or not _on_foreground(found, known, used, model, MAJORITY):
-        return None
-    return found
+    good = (mean_log_odds(found, size, maps, cameras, surface) > 0.0
+            and _on_foreground(found, known, used, model, MAJORITY))
+    return found if good else None
 
 
-def agreement(pose: HandPose, size: Array, maps: ForegroundMaps, cameras: Sequence[CameraModel],
+def mean_log_odds(pose: HandPose, size: Array, maps: ForegroundMaps, cameras: Sequence[CameraModel],
               surface: Surface) -> float:
     """Log odds per pixel of a hand of the shape `size` (SHAPE,) in foreground maps, and of the ring about it, if each
     pixel of the rest were foreground with probability 0.5: a large foreground, such as a face, has less."""

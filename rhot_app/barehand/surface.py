@@ -97,8 +97,8 @@ def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, 
     for k in range(3):
         add(roots[k], roots[k + 1], float(model.radii[k + 1, 0]), float(model.radii[k + 2, 0]))
     # The hypothenar: a capsule along 0.7 of the last one, a little thinner at its end. Chosen by that video.
-    aside = np.array([0.0, -HYPOTHENAR * 2.0 * thick, 0.0])
-    add(carpal + aside, carpal + 0.7 * (roots[3] - carpal) + aside, radius, 0.9 * radius)
+    ulnar = np.array([0.0, -HYPOTHENAR * 2.0 * thick, 0.0])
+    add(carpal + ulnar, carpal + 0.7 * (roots[3] - carpal) + ulnar, radius, 0.9 * radius)
     heel = np.array([CARPAL_X, 0.4 * thumb[1], -0.006])
     add(heel, thumb, thick, float(model.radii[0, 0]))
     add(thumb, 0.5 * (np.array([CARPAL_X, CARPAL_SPREAD * knuckles[0, 1], -0.002]) + knuckles[0]), 0.8 * thick, thick)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,17 +24,16 @@ from rhot_app.barehand.contour_residual import (
     velocity_of,
 )
 from rhot_app.barehand.contours import STEP_M, contour_points
-from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.joints import knowledge_of, place_joints
 from rhot_app.barehand.relocalisation import ODDS_DROP, Relocaliser, pose_of
 from rhot_app.barehand.start import (
-    AGREEMENT,
-    FOUND,
+    CONTOUR_THRESHOLD,
+    LOG_ODDS_THRESHOLD,
     MAJORITY,
     START_SD,
     STEP,
     ForegroundMaps,
-    agreement,
+    mean_log_odds,
     shown_pose,
     taken_pose,
 )
@@ -59,7 +57,7 @@ from rhot_app.hand.motion.hand_process import (
     HandProcess,
 )
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
-from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS, JOINT_SLICES, HandPose
+from rhot_app.hand.skeleton import FINGER_OF_ANGLE, FINGER_OF_JOINT, FINGERS, HandPose
 from rhot_app.project import Rig
 from rhot_app.state import (
     INFERRED_M,
@@ -77,13 +75,13 @@ from rhot_node.detect.foreground import Foreground, foreground_map, no_foregroun
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
-CONFUSED_PX = 6.0
+AMBIGUOUS_PX = 6.0
 """px: largest standard deviation of a contour that cannot be confused with its neighbour's: half a finger at 0.5 m."""
 
 REACH = 3.0
 """Half of a slice in standard deviations of the prediction: 99.7 % of contours lie on it."""
 
-LONGEST_PX = REACH * CONFUSED_PX + 6.0
+LONGEST_PX = REACH * AMBIGUOUS_PX + 6.0
 """px: half of the longest slice. Farther away, the edges of other fingers are as probable."""
 
 PASSES, START_PASSES = 2, 6
@@ -135,14 +133,12 @@ class Fit:
 class BareHandTracker:
     """One bare hand before the cameras of a rig."""
 
-    def __init__(self, rig: Rig, *, mode: Literal["contour", "feature"] = "contour", known_size: bool = True,
-                 foreground: Sequence[Foreground] | None = None, row_s: Sequence[float] | None = None,
-                 aside: float = 0.0) -> None:
-        """`mode`: slices across the visible contour, or across the links' axes (`features`). `known_size`: the prior of
-        lengths and radii is the rig's hand file with the standard deviations there; otherwise the variation of adults
-        about it. `foreground`: each camera's model of hand and background; uninformative by default. `row_s`: each
-        camera's time between two rows, s; 0 by default. `aside`: see `shown_pose`."""
-        self.mode = mode
+    def __init__(self, rig: Rig, *, known_size: bool = True, foreground: Sequence[Foreground] | None = None,
+                 row_s: Sequence[float] | None = None, lateral_m: float = 0.0) -> None:
+        """`known_size`: the prior of lengths and radii is the rig's hand file with the standard deviations there;
+        otherwise the variation of adults about it. `foreground`: each camera's model of hand and background;
+        uninformative by default. `row_s`: each camera's time between two rows, s; 0 by default. `lateral_m`: see
+        `shown_pose`."""
         self.model = with_locked(build_model(rig.hand), rig.tracker.locked_deg)
         plane = rig.tracker.palm_plane
         self.plane = None if plane is None else PalmOnPlane(plane)
@@ -172,7 +168,7 @@ class BareHandTracker:
         self.noise = [0.0] * len(self.cameras)
         self._sequence, self._epoch_ns, self._first_update = 0, 0, False
         self.relocaliser = Relocaliser(self.model, self.surface, self.cameras, self.plane)
-        self.start_pose = shown_pose(rig, self.cameras, self.model, self.plane, aside)
+        self.start_pose = shown_pose(rig, self.cameras, self.model, self.plane, lateral_m)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
     def start(self, pose: HandPose, t_ns: int, place_sd: tuple[float, float, float] = START_SD) -> None:
@@ -207,14 +203,14 @@ class BareHandTracker:
         return taken_pose(self.start_pose, maps, self.cameras, self.model, self.surface, self.relocaliser.rng,
                           self.plane)
 
-    def holds(self, maps: ForegroundMaps, state: Array | None = None) -> bool:
+    def verified(self, maps: ForegroundMaps, state: Array | None = None) -> bool:
         """Whether the last images and these maps show a hand in the newest state, or in `state` (n,) at the maps' time:
-        FOUND of its contour and AGREEMENT of its foreground."""
+        CONTOUR_THRESHOLD of its contour and LOG_ODDS_THRESHOLD of its foreground."""
         found, expected = self.fit.slice_counts.sum(axis=(0, 1))
         state = self.filter.newest.state if state is None else state
         known = any(one is not None for one in maps)
-        return bool(found > FOUND * expected > 0.0 and known and agreement(
-            pose_of(state), state[BIAS:BIAS + SHAPE].copy(), maps, self.cameras, self.surface) > AGREEMENT)
+        return bool(found > CONTOUR_THRESHOLD * expected > 0.0 and known and mean_log_odds(
+            pose_of(state), state[BIAS:BIAS + SHAPE].copy(), maps, self.cameras, self.surface) > LOG_ODDS_THRESHOLD)
 
     def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
         """The hand after one image (H, W, 3) RGB of each camera, None without one, at master times `t_ns`. Raises
@@ -327,14 +323,11 @@ class BareHandTracker:
             step[:POSE] = late_s * state[VELOCITY:ACCELERATION]
             then = self.process.retract(state, step)
         size, pose, image_size = state[BIAS:BIAS + SHAPE].copy(), self.poses[camera], (model.width, model.height)
-        if self.mode == "feature":
-            points = feature_points(self.surface, then, size, pose, model.intrinsics, image_size)
-        else:
-            points = contour_points(self.surface, then, size, pose, model.intrinsics, image_size, step_m)
+        points = contour_points(self.surface, then, size, pose, model.intrinsics, image_size, step_m)
         frame = slices_of(self.surface, state, covariance, pose, model.intrinsics, points, MOTION, self.row_s[camera],
                           REACH, LONGEST_PX, self._repeated[camera], late_s)
-        frame.confusable = float(np.mean(frame.expected_sd > CONFUSED_PX)) if len(frame.slices) else 0.0
-        frame.expected_sd = np.minimum(frame.expected_sd, CONFUSED_PX)
+        frame.confusable = float(np.mean(frame.expected_sd > AMBIGUOUS_PX)) if len(frame.slices) else 0.0
+        frame.expected_sd = np.minimum(frame.expected_sd, AMBIGUOUS_PX)
         return frame
 
     @property
@@ -359,15 +352,11 @@ class BareHandTracker:
         observing = np.zeros(GROUPS)
         if frames:
             observing = np.sum([frame.slice_counts[:, 0] >= 3.0 for frame in frames], axis=0)
-        joint_sd = np.sqrt(np.trace(covariances, axis1=1, axis2=2))
-        joints, angles = np.empty(21, np.uint8), np.empty(21, np.uint8)
-        joints[0] = knowledge_of(joint_sd[0], observing[PALM] >= 2, MEASURED_M, INFERRED_M)
-        for finger in range(5):
-            observed = observing[finger] >= 2
-            for k in range(JOINT_SLICES[finger].start, JOINT_SLICES[finger].stop):
-                joints[k] = knowledge_of(joint_sd[k], observed, MEASURED_M, INFERRED_M)
-            for k in range(ANGLE_SLICES[finger].start, ANGLE_SLICES[finger].stop):
-                angles[k] = knowledge_of(deviation[6 + k], observed, MEASURED_RAD, INFERRED_RAD)
+        observed = observing >= 2
+        joint_sd = np.sqrt(np.trace(covariances[:21], axis1=1, axis2=2))
+        group = np.where(FINGER_OF_JOINT < 0, PALM, FINGER_OF_JOINT)
+        joints = knowledge_of(joint_sd, observed[group], MEASURED_M, INFERRED_M)
+        angles = knowledge_of(deviation[6:POSE], observed[FINGER_OF_ANGLE], MEASURED_RAD, INFERRED_RAD)
         if guessed:
             joints[1:], angles[:] = int(Knowledge.GUESSED), int(Knowledge.GUESSED)
         turn_sd = float(np.sqrt(np.trace(covariance[3:6, 3:6])))
@@ -384,7 +373,7 @@ class BareHandTracker:
             camera_pixels=np.empty((cameras, 0, 2)), camera_flags=np.empty((cameras, 0), np.uint16),
             joint_positions=points[:21], joint_knowledge=joints, fingertip_positions=points[21:],
             angles=state[ANGLES:VELOCITY].copy(), angle_knowledge=angles, world_from_palm=world,
-            palm_knowledge=Knowledge(knowledge_of(turn_sd, observing[PALM] >= 2, MEASURED_RAD, INFERRED_RAD)),
+            palm_knowledge=Knowledge(int(knowledge_of(turn_sd, observed[PALM], MEASURED_RAD, INFERRED_RAD))),
             epipolar_error_px=np.empty(0),
             **UNESTIMATED | {
                 "joint_covariances": covariances[:21], "fingertip_covariances": covariances[21:],

@@ -55,8 +55,8 @@ BONES_MENDER = "measured"
 
 BONES_JUDGE_NS = 2_000_000_000
 
-LOOKS = 600
-"""Looks at a hand by which its bones are measured: the last minute of them."""
+MAX_INSTANTS = 600
+"""Instants of a hand by which its bones are measured: the last minute of them."""
 
 
 class RigWatch:
@@ -179,7 +179,7 @@ class BonesWatch:
         roles = [marker.role for marker in rig.markers.markers]
         self._columns = [roles.index(role) for role in LANDMARK_ROLES if role in roles]
         self._active = len(self._columns) == len(LANDMARK_ROLES) and len(rig.nodes) > 1
-        self._seen: deque[tuple[float, Array]] = deque(maxlen=LOOKS)
+        self._seen: deque[tuple[float, Array]] = deque(maxlen=MAX_INSTANTS)
         self._newest: BonesReport | None = None
         self._offer: Advice | None = None
         self._shown: HandAnatomy | None = None

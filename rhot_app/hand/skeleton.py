@@ -42,6 +42,10 @@ FLEXIONS: tuple[tuple[int, int, int], ...] = ((1, 3, 4), *((6 + 4 * k, 7 + 4 * k
 JOINT_SLICES: tuple[slice, ...] = tuple(slice(1 + 4 * k, 5 + 4 * k) for k in range(5))
 """Slice of `JOINTS` that belongs to each finger, in the order of `FINGERS`."""
 
+FINGER_OF_JOINT = np.repeat((-1, 0, 1, 2, 3, 4), (1, 4, 4, 4, 4, 4))
+FINGER_OF_ANGLE = np.repeat((0, 1, 2, 3, 4), (5, 4, 4, 4, 4))
+"""Finger of each of `JOINTS`, -1 for the wrist, and of `ANGLES`."""
+
 BONES: tuple[tuple[str, str, str], ...] = (("metacarpal", "proximal", "distal"),
                                            *(("proximal", "medial", "distal"),) * 4)
 """Names of each finger's three bones from its root to its tip, in the order of `FINGERS`."""

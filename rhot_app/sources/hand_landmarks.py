@@ -25,16 +25,16 @@ SIDE_S: Final = 0.2
 """s: over which the networks' word on a hand's side is averaged, so that a flicker turns no hand into the other one.
 Chosen: it holds against four wrong frames of 30 a second, and is turned round within half a second."""
 
-MOST_SURE: Final = 0.98
+PROBABILITY_MAX: Final = 0.98
 """Probability of a side beyond which a frame counts no more."""
 
-NEAR: Final = 0.5
+ASSOCIATION_GATE: Final = 0.5
 """Mean distance of landmarks from where a hand is predicted, as a part of its extent, from which it is another one."""
 
-FORGOTTEN_NS: Final = 500_000_000
+TRACK_TIMEOUT_NS: Final = 500_000_000
 """A hand that was not seen for so long is another one when it comes (`estimator.LOST_AFTER_NS`)."""
 
-STAYS: Final = 1.0
+HYSTERESIS: Final = 1.0
 """Log odds by which another hand must be likelier to take a hand's place: 73 to 27 %."""
 
 
@@ -125,7 +125,7 @@ class LandmarkMarkers:
             for number, k in enumerate(choice):
                 if k is not None:
                     gain += tracks[k].right if self._hands[number][0] else -tracks[k].right
-                    gain += STAYS if tracks[k].hand == number else 0.0
+                    gain += HYSTERESIS if tracks[k].hand == number else 0.0
             if gain > most:
                 most, best = gain, choice
         for k, track in enumerate(tracks):
@@ -134,18 +134,18 @@ class LandmarkMarkers:
 
     def _followed(self, found: Sequence[LandmarkedHand], t_ns: int) -> list[_Track]:
         """The track of each hand of a frame: the nearest one, or a new one."""
-        self._tracks = [track for track in self._tracks if abs(t_ns - track.t_ns) < FORGOTTEN_NS]
+        self._tracks = [track for track in self._tracks if abs(t_ns - track.t_ns) < TRACK_TIMEOUT_NS]
         hands = []
         for one in found:
             points = np.array(one.points)
             points[points[:, 2] <= 0.0] = np.nan
-            odds = min(max(one.right, 1.0 - MOST_SURE), MOST_SURE)
+            odds = min(max(one.right, 1.0 - PROBABILITY_MAX), PROBABILITY_MAX)
             hands.append((points[:, :2], math.log(odds / (1.0 - odds))))
         pairs = sorted((track.distance(points, t_ns), k, number) for number, track in enumerate(self._tracks)
                        for k, (points, _) in enumerate(hands))
         of_hand: dict[int, _Track] = {}
         for distance, k, number in pairs:
-            if distance < NEAR and k not in of_hand and self._tracks[number] not in of_hand.values():
+            if distance < ASSOCIATION_GATE and k not in of_hand and self._tracks[number] not in of_hand.values():
                 of_hand[k] = self._tracks[number]
         for k, (points, right) in enumerate(hands):
             if k in of_hand:

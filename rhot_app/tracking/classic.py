@@ -15,7 +15,7 @@ from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.places import with_markers
-from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, JOINT_SLICES, JOINTS, HandPose
+from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, FINGER_OF_ANGLE, JOINT_SLICES, JOINTS, HandPose
 from rhot_app.hand.solvers.finger_ik import FABRIK_ITERATIONS, TOLERANCE, solve_fingers_arrays
 from rhot_app.hand.solvers.methods import Method, solve
 from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, any_marker, fit_palm, track_arrays
@@ -209,7 +209,6 @@ Codes = NDArray[np.uint8]
 _INFERRED, _GUESSED = int(Knowledge.INFERRED), int(Knowledge.GUESSED)
 _JOINTS_OF = np.array([(joints.start, joints.stop) for joints in JOINT_SLICES])
 _ANGLES_OF = np.array([(angles.start, angles.stop) for angles in ANGLE_SLICES])
-_FINGER_OF_ANGLE = np.repeat(np.arange(5), np.diff(_ANGLES_OF).ravel())
 
 TARGET_SD_M = 1e-3
 """What a located marker is worth at working distance: a nearly stretched finger is not bent to meet noise."""
@@ -295,7 +294,7 @@ class HandSolver:
         if solved and self._method is not None:
             located = np.isfinite(tips[:, 0])
             bent = solve(self._method, make_problem(model, HandPose(world, last.angles), tips)).angles
-            angles[located[_FINGER_OF_ANGLE]] = bent[located[_FINGER_OF_ANGLE]]
+            angles[located[FINGER_OF_ANGLE]] = bent[located[FINGER_OF_ANGLE]]
             forward_arrays(model.dh, world, angles, np.empty((model.dh.parent.shape[0], 3, 4)), points)
         if solved:
             self._palm, self.pose, self._solved_s = HandPose(palm_world, palm_angles), HandPose(world, angles), t_s

@@ -9,7 +9,6 @@ from pictures import picture, two_cameras
 
 from rhot_app.barehand.contour_residual import ContourFrame, Contours, slices_of
 from rhot_app.barehand.contours import COLUMNS, INNER, SILHOUETTE, contour_points
-from rhot_app.barehand.features import feature_points
 from rhot_app.barehand.silhouette import log_odds_maps
 from rhot_app.barehand.surface import FOREARM_TURN, SHAPE, Surface
 from rhot_app.geometry.camera import CameraModel
@@ -24,10 +23,9 @@ def process_of(side: str = "right") -> HandProcess:
                        PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.zeros((SHAPE // 3, 3, 3)), 1e3)
 
 
-def frame_of(surface: Surface, state: np.ndarray, camera: CameraModel, features: bool = False) -> ContourFrame:
-    source = feature_points if features else contour_points
+def frame_of(surface: Surface, state: np.ndarray, camera: CameraModel) -> ContourFrame:
     pose, size = camera.camera_from_world[:3].copy(), (camera.width, camera.height)
-    points = source(surface, state, state[BIAS:].copy(), pose, camera.intrinsics, size)
+    points = contour_points(surface, state, state[BIAS:].copy(), pose, camera.intrinsics, size)
     return slices_of(surface, state, 1e-6 * np.eye(process_of().size), pose, camera.intrinsics, points, MOTION, 0.0,
                      3.0, 20.0)
 
@@ -65,27 +63,13 @@ def test_background_in_an_empty_image_says_nothing_and_unknown_pixels_neither() 
     assert odds.inside[0, 0, 0] < -2.0 and 0.0 < odds.outside[0, 0, 0] < 0.2
 
 
-def test_features_of_occluded_links_are_left_out() -> None:
-    """Outside of an inner point lies another part of the hand, outside of a silhouette point the background."""
-    _, surface = model_and_surface()
-    pose, camera = poses("grasp", (1.4,))[0], two_cameras()[0]
-    black = np.zeros((camera.height, camera.width, 3))
-    mask = picture(surface, pose.world_from_palm, pose.angles, camera, black, 0, blur_px=0.0, noise=0.0)[..., 0] > 0
-    points = feature_points(surface, state_of(pose), np.zeros(SHAPE), camera.camera_from_world[:3].copy(),
-                            camera.intrinsics, (camera.width, camera.height))
-    assert {SILHOUETTE, INNER} == set(points.behind)
-    at = np.rint(points.pixel + 2.0 * points.normal).astype(int)
-    assert np.mean(mask[at[:, 1], at[:, 0]] == (points.behind == INNER)) > 0.9
-
-
-@pytest.mark.parametrize("features", [False, True])
-def test_contours_have_the_jacobian_of_finite_differences(features: bool) -> None:
+def test_contours_have_the_jacobian_of_finite_differences() -> None:
     _, surface = model_and_surface()
     process, pose = process_of(), poses("grasp", (0.9,))[0]
     camera, state = two_cameras()[1], state_of(pose)
     state[BIAS:] = np.random.default_rng(0).normal(0.0, 0.05, SHAPE)
     state[BIAS + FOREARM_TURN:] = 0.4, -0.2
-    frame = frame_of(surface, state, camera, features)
+    frame = frame_of(surface, state, camera)
     start, rows, good = frame.predict(state)
     assert good.all()
     assert np.abs(start).max() < 1e-3

@@ -97,8 +97,8 @@ def test_a_hand_in_two_videos_is_a_table_and_a_film(recorded: Recorded, tmp_path
                                                      capsys: pytest.CaptureFixture[str]) -> None:
     given = str(EMPTY)
     if start == "pose":
-        monkeypatch.setattr("rhot_app.barehand.follower.HELD_NS", 0)  # the film is short
-        monkeypatch.setattr("rhot_app.barehand.tracker.FOUND", 0.5)  # pictures 320 px wide
+        monkeypatch.setattr("rhot_app.barehand.follower.MIN_DWELL_NS", 0)  # the film is short
+        monkeypatch.setattr("rhot_app.barehand.tracker.CONTOUR_THRESHOLD", 0.5)  # pictures 320 px wide
         document = msgspec.to_builtins(load_rig(recorded.rig).tracker.start_poses[0])
         (tmp_path / "start.json").write_text(json.dumps({"format": "rhot-pose", "version": 1} | document))
         given = str(tmp_path / "start.json")
@@ -138,7 +138,7 @@ def test_a_hand_that_is_found_again_has_its_own_key_frames(recorded: Recorded,
                             known_size=True)
     followed.start(there[0].truth.pose, 0)
     shown = [*there[:4], *away, *[there[0]] * 8]
-    monkeypatch.setattr("rhot_app.barehand.tracker.FOUND", 0.5)
+    monkeypatch.setattr("rhot_app.barehand.tracker.CONTOUR_THRESHOLD", 0.5)
     for number, frame in enumerate(shown):
         if number == len(shown) - 8:
             monkeypatch.setattr(BareHandTracker, "begin", find)

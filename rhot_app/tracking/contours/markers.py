@@ -15,7 +15,7 @@ from rhot_app.barehand.contour_residual import SAME_TIME_S, ContourFrame, Contou
 from rhot_app.barehand.observations import EdgeFrame
 from rhot_app.barehand.relocalisation import RELOCALISATION_LOG_ODDS
 from rhot_app.barehand.surface import SHAPE
-from rhot_app.barehand.tracker import CONFUSED_PX, PASSES, BareHandTracker
+from rhot_app.barehand.tracker import AMBIGUOUS_PX, PASSES, BareHandTracker
 from rhot_app.estimation.filter import IteratedFilter, Knot, update
 from rhot_app.estimation.residual import Residual
 from rhot_app.hand.landmarks import LASTING_S
@@ -224,7 +224,7 @@ def update_hand(hand: BareHandTracker, markers: MarkersOfHand | None,
     residuals: list[Residual] = [*found, edges, *hand.constraints]
     for number in range(PASSES):
         for contour, spread in zip(contours, spreads, strict=True):
-            contour.expected_sd = np.minimum(spread * 0.5**number, CONFUSED_PX)
+            contour.expected_sd = np.minimum(spread * 0.5**number, AMBIGUOUS_PX)
         if number < PASSES - 1:
             better = update(hand.process, t_s, prediction, residuals, initial, hand.filter.partial)
             initial = better.state

@@ -19,7 +19,7 @@ from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
-from rhot_app.barehand.start import HELD_NS
+from rhot_app.barehand.start import MIN_DWELL_NS
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.hand.skeleton import HandPose
@@ -41,13 +41,13 @@ Estimate = tuple[Array, Array]
 class ContourEstimator:
     """Implements `Tracker` and `ImageTracking`: a state after the edges of each frame."""
 
-    def __init__(self, rig: Rig, hands: int = 1, aside: float = 0.0) -> None:
-        """`hands`: number of hands that share the nodes' requests. `aside`: see `barehand.start.shown_pose`. Raises
+    def __init__(self, rig: Rig, hands: int = 1, lateral_m: float = 0.0) -> None:
+        """`hands`: number of hands that share the nodes' requests. `lateral_m`: see `barehand.start.shown_pose`. Raises
         RigError when markers are observed and one has no position on the hand."""
         self.diagnostics = Diagnostics()
         self._rig, self._max_slices = rig, SLICES_MAX // hands
         self.occluder: Callable[[int], Capsules | None] = lambda _: None
-        self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale, aside=aside)
+        self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale, lateral_m=lateral_m)
         self._markers = MarkersOfHand(rig, self._hand) if _marked(rig) else None
         self._finder = Finder(self._hand)
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
@@ -303,8 +303,8 @@ class ContourEstimator:
             return
         if maps.t_ns - self._agreed_ns < SAME_MAPS_NS:
             self._evidence.confirmed = self._was_confirmed = True
-        elif observed_ns - self._epoch_ns >= HELD_NS:
-            if self._hand.holds(maps.probabilities, self._predict(maps.t_ns)[0]):
+        elif observed_ns - self._epoch_ns >= MIN_DWELL_NS:
+            if self._hand.verified(maps.probabilities, self._predict(maps.t_ns)[0]):
                 self._evidence.confirmed = self._was_confirmed = True
             else:
                 self.drop_track()

@@ -18,7 +18,7 @@ from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest
 from rhot_app.barehand.relocalisation import RELOCALISATION_LOG_ODDS
 from rhot_app.barehand.silhouette import CORRELATED, score
-from rhot_app.barehand.start import ASIDE_M, START_SD, STEP
+from rhot_app.barehand.start import LATERAL_M, START_SD, STEP
 from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.geometry.camera import CameraModel
@@ -55,7 +55,7 @@ class TwoBareHands(TwoHands):
     def __init__(self, rig: Rig) -> None:
         """Raises RigError as `ContourEstimator`."""
         super().__init__(rig, lambda own: ContourEstimator(  # a right palm that faces a camera is to its left
-            own, hands=2, aside=-ASIDE_M if own.hand.side == "right" else ASIDE_M))
+            own, hands=2, lateral_m=-LATERAL_M if own.hand.side == "right" else LATERAL_M))
         assert isinstance(self._hand, ContourEstimator) and isinstance(self._other, ContourEstimator)
         self._both = self._hand, self._other
         for hand in self._both:

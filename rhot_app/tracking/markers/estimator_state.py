@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, POSE, VELOCITY
-from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, TIP_ROLES, WRIST_ROLE
+from rhot_app.hand.skeleton import FINGER_OF_ANGLE, FINGER_OF_JOINT, TIP_ROLES, WRIST_ROLE
 from rhot_app.state import (
     INFERRED_M,
     INFERRED_RAD,
@@ -56,10 +56,6 @@ _INLIER_WEIGHT = 6.0 / (4.0 + GATE)  # of the centroids' kernel, at the gate
 
 _MEASURED, _INFERRED, _GUESSED = int(Knowledge.MEASURED), int(Knowledge.INFERRED), int(Knowledge.GUESSED)
 _FIRST_TIP, _FIRST_MARKER = 21, 26
-_FINGER_OF_JOINT = np.array([-1] + [finger for finger, rows in enumerate(JOINT_SLICES)
-                                    for _ in range(rows.stop - rows.start)])
-_FINGER_OF_ANGLE = np.array([finger for finger, columns in enumerate(ANGLE_SLICES)
-                             for _ in range(columns.stop - columns.start)])
 
 
 class RecentObservations:
@@ -336,12 +332,12 @@ def _conclude(covariance, covariances, shown, finger, markers, joints, angles, a
         count[finger[m] + 1] += markers[m] == _MEASURED
     turn = count[0] >= 3
     for joint in range(21):
-        needed = 2 if _FINGER_OF_JOINT[joint] >= 0 and (joint - 1) % 4 < 3 else 1
-        joints[joint] = _know(_sd(covariances[joint]), count[_FINGER_OF_JOINT[joint] + 1] >= needed, MEASURED_M,
+        needed = 2 if FINGER_OF_JOINT[joint] >= 0 and (joint - 1) % 4 < 3 else 1
+        joints[joint] = _know(_sd(covariances[joint]), count[FINGER_OF_JOINT[joint] + 1] >= needed, MEASURED_M,
                               INFERRED_M)
     for angle in range(21):
         angle_sd[angle] = math.sqrt(max(covariance[6 + angle, 6 + angle], 0.0))
-        angles[angle] = _know(angle_sd[angle], turn and count[_FINGER_OF_ANGLE[angle] + 1] >= 2, MEASURED_RAD,
+        angles[angle] = _know(angle_sd[angle], turn and count[FINGER_OF_ANGLE[angle] + 1] >= 2, MEASURED_RAD,
                               INFERRED_RAD)
     return _know(_sd(covariance[3:6, 3:6]), turn, MEASURED_RAD, INFERRED_RAD)
 

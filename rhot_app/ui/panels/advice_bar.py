@@ -23,7 +23,7 @@ from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.palette import Scheme
 
-LOOKS: dict[str, tuple[str, str]] = {"info": ("info", "accent"), "warning": ("half", "caution"),
+STYLES: dict[str, tuple[str, str]] = {"info": ("info", "accent"), "warning": ("half", "caution"),
                                      "error": ("octagon", "fault")}
 RESERVED = 2
 """Lines of text that are kept free, so that a sentence that comes or goes moves nothing above it."""
@@ -65,7 +65,7 @@ class NoticeLine(QWidget):
         """Another notice, or none."""
         self.notice = notice
         if notice is not None:
-            shape, tone = LOOKS[notice.level]
+            shape, tone = STYLES[notice.level]
             self.mark.set_shape(shape, scheme.tone(tone))
             self.label.setToolTip(notice.text)
             self.setAccessibleName(notice.text)
