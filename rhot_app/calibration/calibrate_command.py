@@ -25,8 +25,16 @@ KINDS: dict[str, str] = {
 ALIASES = {"lens": "intrinsics", "together": "stereo", "tracker": "alignment"}
 """Other words for a calibration, and its name."""
 
-_ELSEWHERE = {"alignment": "rhot_app.objects.alignment.alignment_command"}
-"""Modules of calibrations that do not stand in `commands` under their name."""
+FILES: dict[str, str] = {
+    "import": "read lenses and poses from a file of OpenCV, ROS, Kalibr, anipose or caliscope",
+    "export": "write a rig's lenses and poses as a file of one of these",
+}
+"""What is done with calibrations of other programs."""
+
+_ELSEWHERE = {"alignment": "rhot_app.objects.alignment.alignment_command",
+              "import": "rhot_app.calibration.commands.import_files",
+              "export": "rhot_app.calibration.commands.export_files"}
+"""Modules that do not stand in `commands` under their name."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         room = kinds.add_parser(kind, help=summary, description=f"Calibrate {summary}.",
                                 aliases=[word for word, meant in ALIASES.items() if meant == kind])
         _module(kind).add_arguments(room)
+    for kind, summary in FILES.items():
+        room = kinds.add_parser(kind, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
+        _module(kind).add_arguments(room)
     add_examples(parser, "rhot calibrate intrinsics --images 'left*.jpg' --out left.json",
                  "rhot calibrate stereo --left 'left*.jpg' --right 'right*.jpg' --out desk.json")
 
@@ -43,10 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the chosen calibration; exit code 2 when its result may not be used. Without one, list all."""
     if args.kind is None:
-        rows = "\n".join(f"  {kind:12s}{summary}" for kind, summary in KINDS.items())
+        rows = "\n".join(f"  {kind:12s}{summary}" for kind, summary in (KINDS | FILES).items())
         print(f"rhot calibrate KIND, one of:\n{rows}\n`rhot calibrate KIND --help` has its options.", file=sys.stderr)
         return 2
-    announce_compilation()
+    if args.kind in KINDS or args.kind in ALIASES:
+        announce_compilation()
     return int(_module(ALIASES.get(args.kind, args.kind)).run(args))
 
 

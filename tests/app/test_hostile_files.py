@@ -61,6 +61,7 @@ READERS = {
     "layers": ["layers", "FILE", "--out", "FOLDER/layers.png"], "object": ["object", "FILE"],
     "depth": ["calibrate", "depth", "--table", "FILE"], "replay": ["replay", "FILE", "--json"],
     "bones": ["calibrate", "bones", "--tsv", "FILE"],
+    "import": ["calibrate", "import", "FILE", "--out", "FOLDER/rig.json"],
     "pictures": ["calibrate", "intrinsics", "--images", "FILE", "--board", "9x6", "--square-mm", "20"],
     "colours": ["calibrate", "colours", "--image", "FILE", "--sample", "a=1,1,2,2", "--out", "FOLDER/markers.json"],
 }

@@ -17,7 +17,7 @@ import pytest
 
 from rhot_app.__main__ import SUBCOMMANDS, parse
 from rhot_app.__main__ import main as rhot
-from rhot_app.calibration.calibrate_command import ALIASES, KINDS
+from rhot_app.calibration.calibrate_command import ALIASES, FILES, KINDS
 from rhot_app.ui.wizards.framework.plan import WIZARDS
 from rhot_node.__main__ import daemon_parser
 from rhot_node.commands import COMMANDS
@@ -39,6 +39,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot landmarks": ("CSV", "--rig", "--out", "--fps", "--json", "install", "--wheel"),
     "rhot track": ("CAMERA=VIDEO", "--rig", "--observe", "--bones", "--smooth", "--fps", "--offset-s", "--out",
                    "--overlay", "--force", "--json"),
+    "rhot offset": ("NAME=FILM", "--by", "--json"),
     "rhot bare-hand": ("--rig", "--video", "--background", "--background-seconds", "--fps", "--offset-s",
                        "--unknown-size", "--out", "--overlay", "--force", "--json"),
     "rhot export": ("LOG", "--out", "--format", "--rig", "--tracker", "--rate", "--frame", "--units", "--hand",
@@ -56,6 +57,9 @@ OPTIONS: dict[str, tuple[str, ...]] = {
                                "--lag-ms", "--json"),
     "rhot calibrate time": ("--log", "--rig", "--out", "--json"),
     "rhot calibrate depth": ("--table", "--rig", "--out", "--baseline-mm", "--view-angle-deg", "--json"),
+    "rhot calibrate import": ("FILE", "--format", "--unit", "--square-mm", "--size", "--camera", "--rig-from",
+                              "--keep-world", "--out", "--intrinsics", "--json"),
+    "rhot calibrate export": ("--rig", "--format", "--camera", "--unit", "--square-mm", "--out", "--force"),
     "rhot calibrate intrinsics": ("--images", "--board", "--square-mm", "--marker-mm", "--dictionary",
                                   "--legacy-pattern", "--square-pixels", "--out", "--rig", "--node", "--json"),
     "rhot target": ("chessboard", "--board", "--square-mm", "--marker-mm", "--dictionary", "--legacy-pattern",
@@ -65,7 +69,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot certify": ("--rig", "--recordings", "--step", "--facing", "--marker", "--rod-mm", "--rod-markers",
                      "--simulated", "--sketched", "--seed", "--keep", "--out", "--compare", "--json"),
     "rhot calibrate stereo": (
-        "--left", "--right", "--camera", "--board", "--square-mm", "--marker-mm", "--dictionary", "--legacy-pattern",
+        "--left", "--right", "--camera", "--offset-s", "--board", "--square-mm", "--marker-mm", "--dictionary",
+        "--legacy-pattern",
         "--left-intrinsics", "--right-intrinsics", "--intrinsics", "--refine-intrinsics", "--baseline-mm", "--ruler-mm",
         "--ruler", "--table-image", "--rig-from", "--out", "--json"),
     "rhot hand": ("HAND", "--length", "--proportions", "--side", "--name", "--rows", "--out", "--rig", "--draw",
@@ -142,7 +147,8 @@ def test_a_program_starts_as_a_module(module: str) -> None:
     assert done.returncode == 0 and "usage: " in done.stdout, done.stderr
 
 
-EVERY_COMMAND = ("rhot", *(f"rhot {name}" for name in SUBCOMMANDS), *(f"rhot calibrate {kind}" for kind in KINDS),
+EVERY_COMMAND = ("rhot", *(f"rhot {name}" for name in SUBCOMMANDS),
+                 *(f"rhot calibrate {kind}" for kind in KINDS | FILES),
                  "rhot-node", *(f"rhot-node {name}" for name in COMMANDS))
 
 
@@ -231,6 +237,7 @@ NO_SUCH_FILE = (
     "calibrate filters --log-still NONE --log-fast NONE --rig RIG",
     "calibrate colours --image x.png --markers NONE --out x",
     "calibrate depth --table NONE", "calibrate alignment --foreign NONE --rig-points NONE", "hand NONE", "object NONE",
+    "offset NONE NONE", "calibrate import NONE", "calibrate export --rig NONE --format ros --out x",
     "layers NONE --out x.png", "fit-hand --rig NONE --pictures a b", "check --rig NONE", "engine --rig NONE",
     "certify --rig NONE", "report NONE --out x.zip", "--rig NONE",
 )

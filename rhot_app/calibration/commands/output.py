@@ -81,6 +81,30 @@ def show(fields: dict[str, Any], lines: list[str], verdict: Verdict, *, as_json:
     return 2
 
 
+# -- arguments about the files of other programs -----------------------------------------------------------------------
+
+FORMAT_NAMES = ("opencv", "ros", "kalibr", "anipose", "caliscope")
+"""Of `exchange.formats.FORMATS`, which loads OpenCV."""
+
+_UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+
+
+def add_length_arguments(parser: argparse.ArgumentParser) -> None:
+    """The unit of lengths in a format that does not say it."""
+    unit = parser.add_mutually_exclusive_group()
+    unit.add_argument("--unit", choices=tuple(_UNITS_M), help="of lengths, where the format does not say it (OpenCV, "
+                      "anipose)")
+    unit.add_argument("--square-mm", type=positive_number, metavar="S",
+                      help="lengths are in sides of a board's square, of S mm")
+
+
+def unit_of(args: argparse.Namespace) -> float | None:
+    """Metres per unit of length as `add_length_arguments` says, None where nothing was given."""
+    if args.square_mm is not None:
+        return 1e-3 * float(args.square_mm)
+    return None if args.unit is None else _UNITS_M[args.unit]
+
+
 # -- arguments that describe a board -----------------------------------------------------------------------------------
 
 def add_board_arguments(parser: argparse.ArgumentParser) -> None:

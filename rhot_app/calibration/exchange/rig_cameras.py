@@ -1,0 +1,86 @@
+"""Cameras of other programs in a rig, and a rig's cameras for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.calibration.check.camera_calibration import with_lens
+from rhot_app.calibration.check.checks import all_pairs, lens_figures, lens_findings, pair_findings
+from rhot_app.calibration.exchange.records import ForeignCamera
+from rhot_app.calibration.verdict import Finding
+from rhot_app.errors import CalibrationError
+from rhot_app.geometry.transforms import inverse, quaternion_from_rotation, rigid, rotation_from_quaternion
+from rhot_app.project import CameraPose, Rig, RigNode
+
+Array = NDArray[np.float64]
+
+
+def new_rig(name: str, cameras: Mapping[str, ForeignCamera]) -> Rig:
+    """A rig of a bare hand with these cameras, by name, still without their poses. Raises CalibrationError."""
+    nodes = [{"node_id": k, "name": node, "intrinsics": camera.lens}
+             for k, (node, camera) in enumerate(cameras.items(), 1)]
+    try:
+        return msgspec.convert(msgspec.to_builtins({"name": name, "nodes": nodes}), Rig)
+    except msgspec.ValidationError as exc:
+        raise CalibrationError(f"these cameras are no rig: {str(exc).replace('`', '')}.") from exc
+
+
+def with_cameras(rig: Rig, cameras: Mapping[str, ForeignCamera], *, keep_world: bool = False) -> Rig:
+    """`rig` with other lenses of its nodes, and where the cameras have poses, with these.
+
+    The rig frame is then the first camera's; with `keep_world` it is the file's world, whose z axis points up. Nodes
+    that are not among `cameras` stay where they were beside the first one. No record says how the cameras were
+    calibrated. Raises CalibrationError: only some cameras have a pose, or one that no rig holds.
+    """
+    unposed = [name for name, camera in cameras.items() if camera.camera_from_world is None]
+    if unposed and len(unposed) < len(cameras):
+        raise CalibrationError(f"{' and '.join(unposed)} has no pose in the file, others have; choose those with "
+                               "--camera NAME=THEIRS.")
+    if unposed:
+        for name, camera in cameras.items():
+            rig = with_lens(rig, name, camera.lens)
+        return rig
+    poses = {name: inverse(camera.camera_from_world) for name, camera in cameras.items()
+             if camera.camera_from_world is not None}
+    first = next(node.name for node in rig.nodes if node.name in cameras)
+    origin = np.eye(4) if keep_world else inverse(poses[first])
+    old = next(node.pose for node in rig.nodes if node.name == first)
+    new_from_old = origin @ poses[first] @ inverse(_matrix(old))
+    nodes = tuple(_moved(node, cameras.get(node.name), origin @ poses[node.name] if node.name in cameras
+                         else new_from_old @ _matrix(node.pose)) for node in rig.nodes)
+    return msgspec.structs.replace(rig, nodes=nodes, up="z" if keep_world else "-y", calibration=None,
+                                   depth=msgspec.structs.replace(rig.depth, mode="stereo"))
+
+
+def camera_findings(rig: Rig, cameras: Mapping[str, ForeignCamera]) -> list[Finding]:
+    """Whether these can be lenses and places. Where the hand will be is not known, so what cameras see together is not
+    looked at; ``rhot check`` does."""
+    nodes = [node for node in rig.nodes if node.name in cameras]
+    found = [finding for node in nodes for finding in lens_findings(node, lens_figures(node))]
+    if all(camera.camera_from_world is not None for camera in cameras.values()):
+        found += [finding for finding in pair_findings(rig, all_pairs(rig)) if finding.code != "overlap"]
+    return found
+
+
+def cameras_of(rig: Rig) -> list[ForeignCamera]:
+    """The cameras of a rig; their world is the rig frame."""
+    return [ForeignCamera(node.name, node.intrinsics, inverse(_matrix(node.pose))) for node in rig.nodes]
+
+
+def _moved(node: RigNode, camera: ForeignCamera | None, world_from_camera: Array) -> RigNode:
+    w, x, y, z = (float(value) for value in quaternion_from_rotation(world_from_camera[:3, :3]))
+    tx, ty, tz = (float(value) for value in world_from_camera[:3, 3])
+    try:
+        pose = msgspec.convert({"rotation_wxyz": (w, x, y, z), "translation_m": (tx, ty, tz)}, CameraPose)
+    except msgspec.ValidationError as exc:
+        raise CalibrationError(f"{node.name} stands at ({tx:g}, {ty:g}, {tz:g}) m, farther than rigs reach. Is the "
+                               "unit right (--unit)?") from exc
+    return msgspec.structs.replace(node, pose=pose, intrinsics=node.intrinsics if camera is None else camera.lens)
+
+
+def _matrix(pose: CameraPose) -> Array:
+    return rigid(rotation_from_quaternion(pose.rotation_wxyz), pose.translation_m)
