@@ -32,6 +32,7 @@ SUBCOMMANDS = {
     "video": Subcommand("rhot_app.recording.video_command", "fetch the videos that nodes recorded beside a log"),
     "landmarks": Subcommand("rhot_app.export.landmark_command", "make a raw log of landmark tables of a bare hand"),
     "track": Subcommand("rhot_app.export.track_command", "track a bare hand in recorded videos"),
+    "offset": Subcommand("rhot_app.sources.offset_command", "find when films of one scene began, by sound or a flash"),
     "bare-hand": Subcommand("rhot_app.export.track_command", "the former name of track, for one release"),
     "recover": Subcommand("rhot_app.recording.raw_log", "write a damaged log's sound records to a clean one"),
     "export": Subcommand("rhot_app.export.export_command", "write a raw log's hand as a file for other programs"),

@@ -27,6 +27,9 @@ PIXELS_MAX: Final = 64_000_000
 BYTES_MAX: Final = 4 * PIXELS_MAX
 """Of a file."""
 
+VIDEO_SUFFIXES: Final = frozenset({".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v"})
+"""Of a video's name, where pictures and videos are both expected."""
+
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong with a file is said in a sentence
 
 _SEGMENTS_MAX: Final = 4096  # before the size of a JPEG picture

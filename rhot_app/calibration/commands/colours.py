@@ -56,7 +56,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Define the command's options."""
     parser.epilog = EPILOG
     parser.add_argument("--image", type=Path, action="append", required=True, metavar="PATH",
-                        help="a picture as the camera gives it; several are numbered 1, 2, ...")
+                        help="a picture as the camera gives it, or a film's frame, as in hand.mp4@2.5 for second 2.5; "
+                             "several are numbered 1, 2, ...")
     parser.add_argument("--sample", action="append", required=True, metavar="NAME=x,y,w,h",
                         help="a box on the paint of marker NAME (NAME@2=...: in the second picture)")
     parser.add_argument("--markers", type=input_file, metavar="BASE", help="marker file whose markers are learnt anew")
@@ -168,13 +169,14 @@ def _read_all(paths: list[Path]) -> tuple[list[YuvImage | PictureError], list[Fi
 
 def _read(path: Path) -> YuvImage | PictureError:
     """The picture, or why it cannot be decoded. Raises CalibrationError for one that is missing or tiny."""
+    from rhot_app.calibration.lens.film import frame_at, names_frame
     from rhot_node.detect.image import from_bgr
     from rhot_node.pictures import read_picture
 
-    if not path.is_file():
+    if not names_frame(path) and not path.is_file():
         raise CalibrationError(f"--image {path}: there is no such file (a pipe or a device is none).")
     try:
-        bgr = read_picture(path)
+        bgr = frame_at(path) if names_frame(path) else read_picture(path)
     except PictureError as exc:
         return exc
     if bgr.shape[0] * bgr.shape[1] > PIXELS_MAX:

@@ -1,4 +1,4 @@
-"""``rhot calibrate intrinsics``: one camera's lens from pictures of a board."""
+"""``rhot calibrate intrinsics``: one camera's lens from pictures or films of a board."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot calibrate intrinsics``."""
     parser.add_argument("--images", required=True, nargs="+", metavar="PATTERN",
-                        help="pictures of one camera, such as 'left*.jpg'")
+                        help="pictures of one camera, such as 'left*.jpg', or films of a moving board")
     add_board_arguments(parser)
     parser.add_argument("--square-pixels", action="store_true", help="the same focal length along x and y")
     parser.add_argument("--out", type=Path, metavar="FILE", help="intrinsics file to write, for calibrate stereo")
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--node", metavar="NAME", help="the rig's camera that took the pictures")
     add_json_argument(parser)
     add_examples(parser, "rhot calibrate intrinsics --images 'left*.jpg' --square-mm 24.8 --out left.json",
-                 "rhot calibrate intrinsics --images 'left*.jpg' --rig desk.json --node left")
+                 "rhot calibrate intrinsics --images left.mp4 --rig desk.json --node left")
 
 
 def run(args: argparse.Namespace) -> int:

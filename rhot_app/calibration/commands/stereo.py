@@ -1,4 +1,4 @@
-"""``rhot calibrate stereo``: two or more cameras from pictures of a board that they took at the same moments."""
+"""``rhot calibrate stereo``: two or more cameras from pictures or films of a board that they took together."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
-from rhot_app.errors import CalibrationError, positive_number
+from rhot_app.errors import CalibrationError, finite, positive_number
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -96,7 +96,8 @@ def _split(text: str, option: str, form: str) -> tuple[str, str]:
 # -- the command -------------------------------------------------------------------------------------------------------
 
 EPILOG = """Patterns stand in quotes. Pictures of one moment have the same number in their names, such as left07.jpg and
-right07.jpg. Two cameras are --left and --right; more, or others, are --camera NAME=PATTERN, named as in the rig.
+right07.jpg. Or give one film of each camera, of a board that moves and rests: frames are chosen by themselves. Two
+cameras are --left and --right; more, or others, are --camera NAME=PATTERN, named as in the rig.
 
 The rig is written only when the verdict allows it; what was in --out before is kept (rhot history)."""
 
@@ -109,6 +110,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     pictures.add_argument("--right", metavar="PATTERN", help="pictures of the camera called right")
     pictures.add_argument("--camera", action="append", default=[], metavar="NAME=PATTERN",
                           help="pictures of a camera of the rig; once per camera")
+    pictures.add_argument("--offset-s", action="append", default=[], metavar="NAME=S",
+                          help="seconds to add to the times of a camera's film, where films did not begin together "
+                               "(rhot offset finds them)")
     add_board_arguments(parser)
     lenses = parser.add_argument_group("lenses; found from the same pictures where they are not given")
     lenses.add_argument("--left-intrinsics", type=Path, metavar="FILE", help="lens of left")
@@ -170,7 +174,7 @@ def _calibrate(args: argparse.Namespace, files: dict[str, list[Path]], base: Rig
     names = list(files)
     known, given = known_lengths(args, names), _given_lenses(args, names)
     tables = named_paths(args.table_image, "--table-image", names)
-    read = read_shared(files, board, progress=progress)
+    read = read_shared(files, board, offsets_s=_offsets(args, names), progress=progress)
     lenses = [given[name] if name in given else find_lens(read.views.of_camera(camera), board, name)
               for camera, name in enumerate(names)]
     nodes = {node.name: node for node in base.nodes}
@@ -192,6 +196,19 @@ def _given_lenses(args: argparse.Namespace, names: list[str]) -> dict[str, LensS
         if path is not None:
             given[name] = path
     return {name: load_intrinsics(path).lens for name, path in given.items()}
+
+
+def _offsets(args: argparse.Namespace, names: list[str]) -> dict[str, float]:
+    offsets = {}
+    for text in args.offset_s:
+        name, seconds = _split(text, "--offset-s", "NAME=S")
+        try:
+            offsets[name] = finite(seconds)
+        except argparse.ArgumentTypeError as exc:
+            raise CalibrationError(f"--offset-s {text}: {exc}.") from exc
+        if name not in names:
+            raise CalibrationError(f"--offset-s {text}: the cameras are {', '.join(names)}.")
+    return offsets
 
 
 def _base_rig(args: argparse.Namespace) -> Rig:

@@ -103,10 +103,18 @@ def _skew(quad: Array) -> float:
 ENOUGH = 12
 """Views at least; more come where the bars are not full."""
 
-_STILL_PX, _STILL_PX_S = 0.7, 15.0  # noise between two frames; and the speed whose blur in 30 ms is half a pixel
+STILL_PX = 0.7
+"""Movement of a still board between two frames: noise."""
+
+NEW = 0.2
+"""Sum of the changes of x, y, size and skew since the most similar view, from which on a view is another one."""
+
+BLURRED_PX = 2.2
+"""SD of the blur from which on a view is too blurred."""
+
+_STILL_PX_S = 15.0  # the speed whose blur in 30 ms is half a pixel
 _LOOKED_AWAY_S = 1.0  # frames farther apart say nothing about movement
-_NEW = 0.2  # sum of the changes of x, y, size and skew since the most similar view
-_BLURRED_PX, _SMALL_PX = 2.2, 8.0
+_SMALL_PX = 8.0
 _FULL = 0.999
 
 
@@ -158,7 +166,7 @@ class CaptureGuide:
             self._views, self._places, self._before = [], [], None
         moved, self._before = self._moved(view, t_s), (view, t_s)
         where = place(view, self._board)
-        new = not self._places or min(float(np.abs(where - each).sum()) for each in self._places) > _NEW
+        new = not self._places or min(float(np.abs(where - each).sum()) for each in self._places) > NEW
         trouble = self._trouble(view, moved, new)
         if trouble:
             return Decision(False, trouble)
@@ -180,7 +188,7 @@ class CaptureGuide:
             return self._wish() or "That is enough."
         if moved is None or moved > 1.0:
             return "Hold still."
-        if view.blur_px > _BLURRED_PX:
+        if view.blur_px > BLURRED_PX:
             return "The picture is blurred: more light, a shorter exposure, or focus the lens."
         return ""
 
@@ -193,7 +201,7 @@ class CaptureGuide:
         if not len(mine):
             return None
         step = float(np.median(np.linalg.norm(view.pixels[mine] - before.pixels[its], axis=1)))
-        return step / max(_STILL_PX, _STILL_PX_S * (t_s - then))
+        return step / max(STILL_PX, _STILL_PX_S * (t_s - then))
 
     def _wish(self) -> str:
         """What is missing most, as something to do; empty when nothing is."""

@@ -1,4 +1,4 @@
-"""From picture files to views of a board: what cannot be used is named and left out, the rest goes on."""
+"""From picture files and films to views of a board: what cannot be used is named and left out, the rest goes on."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from rhot_app.calibration.board.boards import Board, Chessboard
 from rhot_app.calibration.board.corners import BoardView, Gray, detect
 from rhot_app.calibration.board.shared_views import Dropped
 from rhot_app.calibration.board.size_check import Beyond, look_beyond, size_finding, why_missing
+from rhot_app.calibration.lens.film import FilmFrames, choose_frames, is_film
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
-from rhot_app.progress import Progress, silent
+from rhot_app.progress import Progress, silent, within
 from rhot_node import pictures
 from rhot_node.errors import PictureError
 
@@ -47,13 +48,18 @@ class ViewSet:
 
 
 def read_views(files: Sequence[Path], board: Board, *, progress: Progress = silent) -> ViewSet:
-    """Find the board in the pictures of one camera. Raises CalibrationError when none shows it, and says why."""
+    """Find the board in the pictures and films of one camera; of a film, in frames that are chosen
+    (`lens.film`). Raises CalibrationError when none shows it, and says why."""
     if not files:
         raise CalibrationError("There are no pictures. Give a pattern in quotes, such as 'left*.jpg'.")
     reads = []
     for number, path in enumerate(files):
         progress(f"looking for the board in {path.name}", number / len(files))
-        reads.append(read_picture(path, board))
+        if is_film(path):
+            part = within(progress, number / len(files), (number + 1) / len(files))
+            reads += of_film([path], choose_frames([path], board, progress=part), board)[0]
+        else:
+            reads.append(read_picture(path, board))
     drop_other_sizes(reads)
     progress("looking for what is wrong with the other pictures", 0.95)
     explain(reads, board)
@@ -62,6 +68,15 @@ def read_views(files: Sequence[Path], board: Board, *, progress: Progress = sile
         raise CalibrationError(no_board(f"{files[0].parent}", reads, board))
     dropped = tuple(Dropped(each.path.name, each.trouble, each.code) for each in reads if each.path and each.trouble)
     return ViewSet(views, dropped, size_of(reads, board))
+
+
+def of_film(films: Sequence[Path], frames: FilmFrames, board: Board) -> list[list[Read]]:
+    """The frames that were chosen of films as pictures, film by film; of one without a board, why that is."""
+    reads = [[Read(path, None if seen is None else seen.view, beyond=None if seen is None else seen.beyond)
+              for seen in (moment.views[k] for moment in frames.moments)] for k, path in enumerate(films)]
+    for those, path, without in zip(reads, films, frames.unexplained, strict=True):
+        those += [Read(path, None, why_missing(gray, board), "no_board") for gray in without]
+    return reads
 
 
 def read_picture(path: Path, board: Board) -> Read:
@@ -78,6 +93,8 @@ def read_picture(path: Path, board: Board) -> Read:
 
 def open_picture(path: Path) -> tuple[Gray | None, str]:
     """The picture in grey levels, or None and the reason."""
+    if is_film(path):
+        return None, "is a film"
     try:
         return pictures.read_picture(path, grey=True), ""
     except PictureError as exc:
@@ -98,7 +115,7 @@ def drop_other_sizes(reads: Sequence[Read]) -> None:
 
 def explain(reads: Sequence[Read], board: Board) -> None:
     """Find out why pictures show no board; of many only the first `MOST_EXPLAINED`."""
-    lost = [each for each in reads if each.code == "no_board" and each.path is not None]
+    lost = [each for each in reads if each.code == "no_board" and each.path is not None and not is_film(each.path)]
     for each in lost[:MOST_EXPLAINED]:
         assert each.path is not None
         gray, _ = open_picture(each.path)

@@ -1,4 +1,4 @@
-"""From the picture files of several cameras to shared views: what cannot be used is named and left out."""
+"""From the picture files or films of several cameras to shared views: what cannot be used is named and left out."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from pathlib import Path
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.shared_views import BoardShot, Dropped, SharedViews
+from rhot_app.calibration.lens.film import choose_frames, is_film
 from rhot_app.calibration.lens.views import (
     Read,
     drop_other_sizes,
     explain,
     in_natural_order,
     no_board,
+    of_film,
     read_picture,
     size_of,
 )
@@ -34,33 +36,62 @@ class ReadPictures:
     size: Finding | None
 
 
-def read_shared(files: Mapping[str, Sequence[Path]], board: Board, *, progress: Progress = silent) -> ReadPictures:
-    """Find the board in the pictures of all cameras, `files` per camera's name.
+def read_shared(files: Mapping[str, Sequence[Path]], board: Board, *, offsets_s: Mapping[str, float] | None = None,
+                progress: Progress = silent) -> ReadPictures:
+    """Find the board in the pictures of all cameras, `files` per camera's name; or in one film of each camera, in
+    moments that are chosen (`lens.film`), with `offsets_s` added to the times of a camera's film.
 
     Raises CalibrationError when nothing can be put together, or one camera shows the board in no picture.
     """
-    matched = match_files(files)
-    rows: list[list[Read]] = []
-    for number, shot in enumerate(matched.shots):
-        progress(f"looking for the board in {shot.name}", number / len(matched.shots))
-        rows.append([Read(None) if path is None else read_picture(path, board) for path in shot.files])
-    dropped = list(matched.alone)
-    for camera, name in enumerate(files):
-        reads = [row[camera] for row in rows]
+    if any(is_film(path) for those in files.values() for path in those):
+        names, columns, dropped = _read_films(files, board, offsets_s or {}, progress)
+    else:
+        matched = match_files(files)
+        names, dropped, columns = [shot.name for shot in matched.shots], list(matched.alone), [[] for _ in files]
+        for number, shot in enumerate(matched.shots):
+            progress(f"looking for the board in {shot.name}", number / len(matched.shots))
+            for reads, path in zip(columns, shot.files, strict=True):
+                reads.append(Read(None) if path is None else read_picture(path, board))
+    for name, reads in zip(files, columns, strict=True):
         drop_other_sizes(reads)
         explain(reads, board)
         if not any(each.view is not None for each in reads):
             raise CalibrationError(no_board(name, reads, board))
         dropped += [Dropped(_name(each.path, name), each.trouble, each.code)
                     for each in reads if each.path and each.trouble]
-    shots = tuple(BoardShot(shot.name, tuple(each.view for each in row))
-                  for shot, row in zip(matched.shots, rows, strict=True))
-    size = size_of([each for row in rows for each in row], board)
+    shots = tuple(BoardShot(name, tuple(each.view for each in row))
+                  for name, row in zip(names, zip(*columns, strict=True), strict=True))
+    size = size_of([each for reads in columns for each in reads], board)
     return ReadPictures(SharedViews(tuple(files), board, shots), tuple(dropped), size)
 
 
+def _read_films(files: Mapping[str, Sequence[Path]], board: Board, offsets_s: Mapping[str, float],
+                progress: Progress) -> tuple[list[str], list[list[Read]], list[Dropped]]:
+    """Names of the moments that were chosen, and what each camera's film shows then."""
+    for name, those in files.items():
+        if len(those) != 1 or not is_film(those[0]):
+            raise CalibrationError(f"{name}: give one film of each camera, or pictures of each.")
+    films = [those[0] for those in files.values()]
+    frames = choose_frames(films, board, [offsets_s.get(name, 0.0) for name in files], progress=progress)
+    columns = of_film(films, frames, board)
+    for name, found, reads in zip(files, frames.found, columns, strict=True):
+        if not found:
+            raise CalibrationError(no_board(name, reads, board))
+    if not frames.moments:
+        raise CalibrationError(f"In {frames.searched} frames that were searched no two cameras see the board at once. "
+                               "Did the films begin together? Else give --offset-s NAME=S.")
+    return [f"{moment.t_s:.2f} s" for moment in frames.moments], columns, []
+
+
 def read_view(path: Path, board: Board) -> BoardView:
-    """The board in one picture; raises CalibrationError when the file cannot be read or the board is not there."""
+    """The board in one picture, or in a film's frame in which it is stillest; raises CalibrationError when the file
+    cannot be read or the board is not there."""
+    if is_film(path):
+        frames = choose_frames([path], board)
+        seen = [each for moment in frames.moments for each in moment.views if each is not None]
+        if not seen:
+            raise CalibrationError(no_board(path.name, of_film([path], frames, board)[0], board))
+        return min(seen, key=lambda each: each.badness).view
     read = read_picture(path, board)
     explain([read], board)
     if read.view is None:

@@ -12,15 +12,13 @@ from rhot_app.errors import CalibrationError
 from rhot_app.handfit.pictures import files_by_camera, read_picture
 from rhot_app.project import Rig
 from rhot_app.sources.frame_sets import on_one_clock, open_video, overlap
+from rhot_node.pictures import VIDEO_SUFFIXES
 
 Image = NDArray[np.uint8]
 
-VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v")
-
-
 def is_video(path: Path) -> bool:
     """Whether a file is a video, by its name."""
-    return path.suffix.lower() in VIDEOS
+    return path.suffix.lower() in VIDEO_SUFFIXES
 
 
 def read_instant(rig: Rig, given: Sequence[str], at_s: float = 0.0) -> dict[int, Image]:

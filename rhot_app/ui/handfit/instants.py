@@ -15,12 +15,14 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.handfit.state import Image
 from rhot_app.ui.backend.feed import LiveFeed
 from rhot_app.ui.handfit.changes import FOLDER_KEY, Changes
-from rhot_app.ui.handfit.files import VIDEOS, in_order, is_video, read_instant
+from rhot_app.ui.handfit.files import in_order, is_video, read_instant
 from rhot_app.ui.handfit.frame import FitFrame
 from rhot_app.ui.wizards.framework.plan import Memory
+from rhot_node.pictures import VIDEO_SUFFIXES
 
 TITLE: Final = "Fit the hand to pictures"
-_PICTURES = (f"Pictures and videos (*.png *.jpg *.jpeg *.tif *.tiff *.webp {' '.join(f'*{end}' for end in VIDEOS)});;"
+_PICTURES = ("Pictures and videos (*.png *.jpg *.jpeg *.tif *.tiff *.webp "
+             f"{' '.join(f'*{end}' for end in sorted(VIDEO_SUFFIXES))});;"
              "All files (*)")
 _LONGEST_S = 1e5  # of a video: a day
 
