@@ -41,6 +41,7 @@ FORMATS: dict[str, Format] = {
     "npz": Format("rhot_app.export.tables:NpzWriter", (".npz",), "m"),
     "parquet": Format("rhot_app.export.tables:ParquetWriter", (".parquet",), "mm"),
     "mcap": Format("rhot_app.export.formats.mcap_file:McapWriter", (".mcap",), "m", units_free=False),
+    "ros2": Format("rhot_app.export.formats.ros2_file:Ros2Writer", (".mcap",), "m", units_free=False),
 }
 
 

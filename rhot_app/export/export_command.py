@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -> None:
     """What ``rhot export`` and ``rhot batch`` have in common; `without_format` says what holds without --format."""
     parser.add_argument("--format", default=None, metavar="F",
-                        help=f"csv, trc, c3d, bvh, gltf (or glb), npz, parquet or mcap ({without_format})")
+                        help=f"csv, trc, c3d, bvh, gltf (or glb), npz, parquet, mcap or ros2 ({without_format})")
     parser.add_argument("--rig", type=input_file, metavar="FILE",
                         help="track with this rig instead of the one the log was recorded with")
     parser.add_argument("--tracker", choices=("classic", "estimator"), default=None,

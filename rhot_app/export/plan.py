@@ -113,9 +113,11 @@ class Plan:
 
     def about(self) -> dict[str, str]:
         """What formats with room for it say of themselves."""
+        began = self.wall_clock_offset_ns
         return {"log": self.log, "created": self.created, "rig": self.rig.name, "tracker": self.rig.tracker.kind,
                 "frame": self.frame, "up": self.rig.up, "units": self.units, "smoothed": "yes" if self.smooth else "no",
-                "first_t_master_ns": str(self.first_ns)}
+                "first_t_master_ns": str(self.first_ns),
+                "first_t_unix_ns": "" if began is None else str(self.first_ns + began)}
 
 
 class Writer(Protocol):

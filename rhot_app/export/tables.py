@@ -28,15 +28,19 @@ _TURN = "_qw", "_qx", "_qy", "_qz"
 _TWIST = "x", "y", "z", "rx", "ry", "rz"
 
 
-def columns(states: HandStates, scale: float, first_ns: int | None) -> Iterator[tuple[str, Column]]:
+def columns(states: HandStates, scale: float, first_ns: int | None,
+            wall_clock_offset_ns: int | None = None) -> Iterator[tuple[str, Column]]:
     """The columns of a table, each (N,), by name; `scale` is the unit of length per metre, 1000 or 1.
 
-    `first_ns`: where `time_s` is 0; None: at the first of these states.
+    `first_ns`: where `time_s` is 0; None: at the first of these states. `wall_clock_offset_ns`: ns since 1970 less the
+    master's clock; without it there is no column of wall clock time.
     """
     unit = "mm" if scale == 1000.0 else "m"
     begin = states.t_master_ns[:1] if first_ns is None else first_ns
     yield "time_s", 1e-9 * (states.t_master_ns - begin)
     yield "t_master_ns", states.t_master_ns
+    if wall_clock_offset_ns is not None:
+        yield "t_unix_ns", states.t_master_ns + wall_clock_offset_ns
     yield "sequence", states.sequence
     yield "condition", np.array(states.conditions, dtype=object)
     for index, marker in enumerate(states.marker_ids):
@@ -126,7 +130,7 @@ class CsvWriter:
 
     def add(self, states: HandStates) -> None:
         """Write these rows."""
-        table = list(columns(states, self._plan.scale, self._plan.first_ns))
+        table = list(columns(states, self._plan.scale, self._plan.first_ns, self._plan.wall_clock_offset_ns))
         if not self._line:
             self._file.write(",".join(_quoted(name) for name, _ in table) + "\n")
             self._line = ",".join(_cell(name, column, self._plan.scale) for name, column in table) + "\n"
@@ -176,7 +180,8 @@ class ParquetWriter:
     def add(self, states: HandStates) -> None:
         """Take these rows; some thousand are written at a time."""
         arrays = {name: self._column(name, column)
-                  for name, column in columns(states, self._plan.scale, self._plan.first_ns)}
+                  for name, column in columns(states, self._plan.scale, self._plan.first_ns,
+                                              self._plan.wall_clock_offset_ns)}
         self._waiting.append(self._arrow.table(arrays))
         self._rows += len(states)
         if self._rows >= ROW_GROUP:

@@ -78,6 +78,7 @@ class ObjectSample:
 @dataclass(frozen=True, slots=True)
 class Sample:
     """One instant as an output sends it. `age_s`: since the instant that it describes; NaN for a replayed log.
+    `t_unix_ns`: that instant by this computer's wall clock, since 1970; None for a replayed log.
     `joints`: the names of each hand's rows. `state`: where it comes from, for what is not in here."""
 
     joint_set: JointSet
@@ -86,6 +87,7 @@ class Sample:
     hands: tuple[HandSample, ...]
     state: HandState
     objects: tuple[ObjectSample, ...] = ()
+    t_unix_ns: int | None = None
 
 
 class JointConverter:
@@ -101,12 +103,13 @@ class JointConverter:
 
     def sample(self, state: HandState, joint_set: JointSet) -> Sample:
         """The state's hands with these joints."""
-        age_s = 1e-9 * (time.monotonic_ns() - state.t_master_ns)
+        age_ns = time.monotonic_ns() - state.t_master_ns
+        live = 0 <= age_ns < 1e9 * LIVE_S
         states = [state] if state.other is None else [state, state.other]
         hands = tuple(hand.sample(one, joint_set) for hand, one in zip(self._hands, states, strict=False))
         objects = tuple(self._object(one, joint_set) for one in state.objects)
-        return Sample(joint_set, JOINT_NAMES[joint_set], age_s if 0.0 <= age_s < LIVE_S else math.nan, hands, state,
-                      objects)
+        return Sample(joint_set, JOINT_NAMES[joint_set], 1e-9 * age_ns if live else math.nan, hands, state, objects,
+                      time.time_ns() - age_ns if live else None)
 
     def _object(self, one: ObjectState, joint_set: JointSet) -> ObjectSample:
         position = one.world_from_object[:3, 3]
@@ -179,7 +182,8 @@ def json_message(sample: Sample) -> bytes:
     """The whole sample. An unknown joint is null, as is the age of a replayed state."""
     age_s = None if math.isnan(sample.age_s) else round(sample.age_s, _DIGITS)
     return msgspec.json.encode({
-        "sequence": sample.state.sequence, "t_master_ns": sample.state.t_master_ns, "age_s": age_s,
+        "sequence": sample.state.sequence, "t_master_ns": sample.state.t_master_ns,
+        "t_unix_ns": sample.t_unix_ns, "age_s": age_s,
         "joint_set": sample.joint_set, "joints": sample.joints, "hands": [_hand(hand) for hand in sample.hands],
         **({"objects": [_object(one) for one in sample.objects]} if sample.objects else {})})
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from rhot_app.export.plan import ExportOptions
 from rhot_app.export.resample import Resampler
 from rhot_app.export.states import HandStates, joined
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
+from rhot_app.recording.raw_log import LogReader
 
 AXES = "xyz"
 
@@ -33,6 +35,9 @@ def test_csv_holds_the_states_of_the_estimator(log: Path, states_by: Callable[[s
     table, states = pandas.read_csv(done.path), states_by("estimator")
     assert len(table) == done.states == len(states) > 100
     assert list(table["t_master_ns"]) == list(states.t_master_ns)
+    about = LogReader(log).about
+    began_ns = round(1e6 * datetime.fromisoformat(about["created"]).timestamp()) * 1000
+    assert list(table["t_unix_ns"] - table["t_master_ns"]) == [began_ns - about["created_t_master_ns"]] * len(table)
     assert list(table["condition"]) == list(states.conditions)
     assert table["time_s"].to_numpy() == pytest.approx(states.times_s, abs=1e-8)
     for kind, names, positions in (("joint", JOINTS, states.joint_positions), ("fingertip", FINGERS,

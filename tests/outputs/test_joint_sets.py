@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import msgspec
@@ -13,7 +14,7 @@ from streams import palm_before_cameras, state_of, unknown
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
-from rhot_app.outputs.joints import MEDIAPIPE_JOINTS, JointConverter
+from rhot_app.outputs.joints import MEDIAPIPE_JOINTS, JointConverter, json_message
 from rhot_app.outputs.openxr import OPENXR_JOINTS
 from rhot_app.outputs.vmc import bone_poses, bones_of
 from rhot_app.project import Rig
@@ -102,7 +103,16 @@ def test_what_is_unknown_stays_unknown(rig: Rig, joint_set: str) -> None:
 
 def test_a_replayed_state_has_no_age(rig: Rig) -> None:
     state = replace(state_of(rig, neutral_pose()), t_master_ns=5)
-    assert np.isnan(JointConverter(rig).sample(state, "own").age_s)
+    sample = JointConverter(rig).sample(state, "own")
+    assert np.isnan(sample.age_s) and sample.t_unix_ns is None
+
+
+def test_a_live_state_has_a_wall_clock_time(rig: Rig) -> None:
+    before, state = time.time_ns(), replace(state_of(rig, neutral_pose()), t_master_ns=time.monotonic_ns())
+    sample = JointConverter(rig).sample(state, "own")
+    assert sample.t_unix_ns is not None
+    assert before - 10_000_000 <= sample.t_unix_ns <= time.time_ns()
+    assert msgspec.json.decode(json_message(sample))["t_unix_ns"] == sample.t_unix_ns
 
 
 def test_two_hands_have_two_names(two_hands: Rig) -> None:
