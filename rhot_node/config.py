@@ -41,6 +41,8 @@ class CameraSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     timestamp_marks: Literal["readout", "exposure"] = "readout"  # what a Pi camera's SensorTimestamp is the start of
     timestamp_offset_us: Annotated[float, Meta(ge=-100_000, le=100_000)] = 0.0  # added to it, as calibrated
     sync: Literal["off", "server", "client"] = "off"  # frames of several Pis at the same time
+    turned: bool = False  # by 180 degrees: the camera hangs upside down
+    mirrored: bool = False  # left and right are exchanged before anything is looked for
 
     @property
     def exposure_ns(self) -> int:

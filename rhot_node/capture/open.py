@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Reporting
+from rhot_node.capture.orientation import OrientedCamera
 from rhot_node.capture.paced import IMAGE_SUFFIXES, ImageFiles, ImageSource, PacedCamera, VideoFile
 from rhot_node.capture.stream import StreamCamera
-from rhot_node.capture.webcam import Webcam
+from rhot_node.capture.webcam import NetworkCamera, Webcam
 from rhot_node.capture.yuv import YuvRecording
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
@@ -26,6 +27,7 @@ SPEC_HELP = """camera specs:
   pi, pi:1, ...         the Raspberry Pi's camera, or its second one, through picamera2
   0, 1, ...             the webcam /dev/video0, /dev/video1, ...
   /dev/videoN           a webcam by its device
+  http://, rtsp://      a network camera, a phone or a Pi that sends motion JPEG or RTSP
   FILE or FOLDER        a video file, an image, or a folder of images in the order of their names; a video plays at its
                         own rate, images at the settings' fps; with ?rate=max behind it, as fast as possible
   yuv:FOLDER            a recording of raw YUV420 frames with their times, played in real time
@@ -36,6 +38,11 @@ SPEC_HELP = """camera specs:
 
 def open_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera:
     """Open what `spec` names (see SPEC_HELP). Raises CameraError saying what is wrong and what to do."""
+    camera = _open(spec, settings, clock)
+    return OrientedCamera(camera, settings) if settings.turned or settings.mirrored else camera
+
+
+def _open(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera:
     if match := re.fullmatch(r"pi(?::(\d))?", spec):
         from rhot_node.capture.pi_camera import PiCamera
         return PiCamera(int(match[1] or 0), settings, clock)
@@ -44,6 +51,8 @@ def open_camera(spec: str, settings: CameraSettings, clock: NodeClock) -> Camera
     if spec.startswith("/dev/") and not Path(spec).is_file():
         _require_video(Path(spec))
         return Webcam(spec, settings, clock)
+    if re.match(r"[a-z]+://", spec):
+        return NetworkCamera(spec, settings, clock)
     if spec.startswith("stream:"):
         return StreamCamera(Path(spec.removeprefix("stream:")), settings, clock)
     if spec.startswith(PREFIX):

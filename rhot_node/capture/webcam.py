@@ -1,15 +1,18 @@
-"""Webcams through OpenCV (V4L2), with every automatic mode off."""
+"""Webcams through OpenCV (V4L2), with every automatic mode off, and network cameras through FFmpeg."""
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import re
+import socket
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
+from urllib.parse import SplitResult, urlsplit
 
 import cv2
 import numpy as np
@@ -44,9 +47,60 @@ def open_v4l2(device: str) -> Capture:
     return cv2.VideoCapture(int(match[1]) if match else device, cv2.CAP_V4L2)
 
 
-class Webcam:
-    """A webcam. It cannot say when a frame was exposed: mid-exposure of row 0 is taken to be the time at which the
+class GrabbedCamera:
+    """A camera that cannot say when a frame was exposed: mid-exposure of row 0 is taken to be the time at which the
     read returned, less the readout of the frame (rows x row time) and half the exposure; transfer time adds to that."""
+
+    def __init__(self, name: str, remedy: str, capture: Capture, settings: CameraSettings, clock: NodeClock) -> None:
+        """Wait for the first frame of an opened `capture`. `name` and `remedy` begin and end each sentence about it.
+        Raises CameraError when no frame comes."""
+        self._name, self._remedy = name, remedy
+        self._exposure_ns = settings.exposure_ns
+        self._row_time_ns = settings.row_time_ns
+        self._grabber = LatestGrabber(lambda: _read(capture), capture.release, clock)
+        first = self._grabber.take(FIRST_FRAME_S)
+        if first is None:
+            self.close()
+            raise CameraError(f"{name}: opened, but no frame came within {FIRST_FRAME_S:.0f} s. {remedy}")
+        self._size = from_bgr(first.image).size
+        self._delay_ns = available_delay_ns(self._exposure_ns, self._row_time_ns, self._size[1])
+        self._heard_s = time.monotonic()
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), px, as the camera delivers it."""
+        return self._size
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """The newest frame. Raises CameraError when the camera is gone, silent, or changed its image size."""
+        grabbed = self._grabber.take(timeout_s)
+        if grabbed is None:
+            if self._grabber.failed:
+                raise CameraError(f"{self._name}: the camera stopped delivering frames. {self._remedy}")
+            if time.monotonic() - self._heard_s > SILENCE_S:
+                raise CameraError(f"{self._name}: no frame for {SILENCE_S:.0f} s. {self._remedy}")
+            return None
+        self._heard_s = time.monotonic()
+        image = from_bgr(grabbed.image)
+        if image.size != self._size:
+            raise CameraError(f"{self._name}: the image size changed from {self._size[0]} x {self._size[1]} to "
+                              f"{image.size[0]} x {image.size[1]} px.")
+        return Frame(
+            image=image,
+            number=grabbed.number,
+            t_node_ns=grabbed.t_return_node_ns - self._delay_ns,
+            t_available_node_ns=grabbed.t_return_node_ns,
+            exposure_ns=self._exposure_ns,
+            row_time_ns=self._row_time_ns,
+        )
+
+    def close(self) -> None:
+        """Release the device."""
+        self._grabber.close()
+
+
+class Webcam(GrabbedCamera):
+    """A webcam."""
 
     def __init__(self, device: str, settings: CameraSettings, clock: NodeClock,
                  open_capture: Callable[[str], Capture] = open_v4l2) -> None:
@@ -62,53 +116,72 @@ class Webcam:
         self.refused = tuple(configure(capture, settings))
         for name in self.refused:
             log.warning("%s: the camera does not take the setting %s", device, name)
-        self._device = device
-        self._exposure_ns = settings.exposure_ns
-        self._row_time_ns = settings.row_time_ns
-        self._grabber = LatestGrabber(lambda: _read(capture), capture.release, clock)
-        first = self._grabber.take(FIRST_FRAME_S)
-        if first is None:
-            self.close()
-            raise CameraError(f"{device}: opened, but no frame came within {FIRST_FRAME_S:.0f} s. Plug it in again.")
-        self._size = from_bgr(first.image).size
-        if self._size != (settings.width, settings.height):
-            log.warning("%s: delivers %d x %d px instead of %d x %d", device, *self._size, settings.width,
+        super().__init__(device, "Is the camera plugged in well?", capture, settings, clock)
+        if self.size != (settings.width, settings.height):
+            log.warning("%s: delivers %d x %d px instead of %d x %d", device, *self.size, settings.width,
                         settings.height)
-        self._delay_ns = available_delay_ns(self._exposure_ns, self._row_time_ns, self._size[1])
-        self._heard_s = time.monotonic()
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """(width, height), px, as the camera delivers it."""
-        return self._size
 
-    def read(self, timeout_s: float) -> Frame | None:
-        """The newest frame. Raises CameraError when the camera is gone, silent, or changed its image size."""
-        grabbed = self._grabber.take(timeout_s)
-        if grabbed is None:
-            if self._grabber.failed:
-                raise CameraError(f"{self._device}: the camera stopped delivering frames. Is it still plugged in?")
-            if time.monotonic() - self._heard_s > SILENCE_S:
-                raise CameraError(f"{self._device}: no frame for {SILENCE_S:.0f} s. Is the camera still plugged in?")
-            return None
-        self._heard_s = time.monotonic()
-        image = from_bgr(grabbed.image)
-        if image.size != self._size:
-            raise CameraError(f"{self._device}: the image size changed from {self._size[0]} x {self._size[1]} to "
-                              f"{image.size[0]} x {image.size[1]} px.")
-        return Frame(
-            image=image,
-            number=grabbed.number,
-            t_node_ns=grabbed.t_return_node_ns - self._delay_ns,
-            t_available_node_ns=grabbed.t_return_node_ns,
-            exposure_ns=self._exposure_ns,
-            row_time_ns=self._row_time_ns,
-        )
+# -- network cameras ---------------------------------------------------------------------------------------------------
 
-    def close(self) -> None:
-        """Release the device."""
-        self._grabber.close()
+PORTS = {"http": 80, "https": 443, "rtsp": 554, "rtsps": 322}
+"""Schemes of network cameras and their ports (RFC 9110, RFC 7826)."""
 
+ANSWER_S = 3.0
+"""A camera of the local network answers within a fraction of this."""
+
+_REMEDY = "Does the program that sends them still run, and is the address right?"
+
+
+def open_url(url: str) -> Capture:
+    """Open the pictures of an address with FFmpeg, which gives up after `FIRST_FRAME_S`."""
+    wait_ms = round(1e3 * FIRST_FRAME_S)
+    return cv2.VideoCapture(url, cv2.CAP_FFMPEG, [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, wait_ms,
+                                                  cv2.CAP_PROP_READ_TIMEOUT_MSEC, wait_ms])
+
+
+class NetworkCamera(GrabbedCamera):
+    """Pictures that a network camera, a phone or a Pi sends by HTTP (motion JPEG) or RTSP."""
+
+    def __init__(self, url: str, settings: CameraSettings, clock: NodeClock,
+                 open_capture: Callable[[str], Capture] = open_url) -> None:
+        """Connect and wait for a first frame. Raises CameraError when nobody answers, or sends no pictures."""
+        name = shown_url(url)
+        _require_answer(_split_url(url), name)
+        capture = open_capture(url)
+        if not capture.isOpened():
+            capture.release()
+            raise CameraError(f"{name}: answers, but sends no pictures that can be decoded. Give the address of the "
+                              "pictures themselves (motion JPEG or RTSP), not of the page that shows them.")
+        super().__init__(name, _REMEDY, capture, settings, clock)
+
+
+def shown_url(url: str) -> str:
+    """The address as it may be shown: without user, password and query."""
+    parts = _split_url(url)
+    host = f"[{parts.hostname}]" if ":" in (parts.hostname or "") else parts.hostname
+    return f"{parts.scheme}://{host}{'' if parts.port is None else f':{parts.port}'}{parts.path}"
+
+
+def _split_url(url: str) -> SplitResult:
+    with contextlib.suppress(ValueError):
+        parts = urlsplit(url)
+        if parts.scheme in PORTS and parts.hostname and parts.port != 0:
+            return parts
+    raise CameraError(f"{url.partition('://')[0]}://...: is no address of a network camera. It begins with "
+                      f"{', '.join(f'{scheme}://' for scheme in PORTS)} and names a host.")
+
+
+def _require_answer(parts: SplitResult, name: str) -> None:
+    place = parts.hostname or "", parts.port or PORTS[parts.scheme]
+    try:
+        socket.create_connection(place, ANSWER_S).close()
+    except (OSError, UnicodeError) as exc:
+        why = "no answer" if isinstance(exc, TimeoutError) else getattr(exc, "strerror", None) or "no such host"
+        raise CameraError(f"{name}: nobody answers at {place[0]}, port {place[1]} ({why}). {_REMEDY}") from exc
+
+
+# -- settings of a webcam ----------------------------------------------------------------------------------------------
 
 def configure(capture: Capture, settings: CameraSettings) -> list[str]:
     """Turn automatic modes off, then set what is given; returns the names of what the driver refused.

@@ -1,0 +1,156 @@
+"""The cameras of this computer as Video4Linux knows them: names, modes, and whether another program holds one.
+
+Structures and numbers are those of the kernel's ``videodev2.h`` on 64-bit machines and on ARM.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import re
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+Ioctl = Callable[[int, int, bytearray], object]
+"""``ioctl(descriptor, request, structure)``; raises OSError."""
+
+QUERYCAP, ENUM_FMT, REQBUFS, ENUM_FRAMESIZES, ENUM_FRAMEINTERVALS = (
+    0x80685600, 0xC0405602, 0xC0145608, 0xC02C564A, 0xC034564B)  # VIDIOC_...
+_CAPABILITY: Final = struct.Struct("<16s32s32sIII12x")
+_FORMAT: Final = struct.Struct("<III32sI16x")
+_BUFFERS: Final = struct.Struct("<III8x")
+_SIZE: Final = struct.Struct("<IIIIIIIII8x")
+_INTERVAL: Final = struct.Struct("<IIIIIII24x")
+_VIDEO_CAPTURE, _DEVICE_CAPS = 0x00000001, 0x80000000
+_CAPTURE_TYPE, _MMAP, _DISCRETE = 1, 1, 1
+_MOST: Final = 256  # of an enumeration; a driver that never ends one is broken
+
+USUAL: Final = 640, 480, 30.0
+"""What most webcams have, and what a node asks for by itself."""
+
+SMOOTH_HZ: Final = 25.0
+"""Slower modes are chosen only where there is no other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """A picture size, px, and its highest rate, frames/s."""
+
+    width: int
+    height: int
+    fps: float
+
+    def __str__(self) -> str:
+        return f"{self.width} x {self.height} at {self.fps:g}/s"
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """A camera. `modes`: smallest picture first. `problem`: a sentence when it cannot be used now, else ""."""
+
+    path: str
+    name: str
+    bus: str = ""
+    modes: tuple[Mode, ...] = ()
+    problem: str = ""
+
+    @property
+    def mode(self) -> Mode:
+        """The mode nearest to the usual one that is not slow."""
+        width, height, _ = USUAL
+        return min(self.modes, key=lambda mode: (mode.fps < SMOOTH_HZ, abs(mode.width * mode.height - width * height)),
+                   default=Mode(*USUAL))
+
+
+def list_devices(folder: Path = Path("/dev"), ioctl: Ioctl = fcntl.ioctl) -> tuple[Device, ...]:
+    """All cameras, in the order of their numbers. Devices that give no pictures, such as a webcam's metadata, are left
+    out."""
+    numbered = sorted((int(match[1]), path) for path in folder.glob("video*")
+                      if (match := re.fullmatch(r"video(\d+)", path.name)))
+    found = (look_at_device(path, ioctl) for _, path in numbered)
+    return tuple(device for device in found if device is not None)
+
+
+def look_at_device(path: Path, ioctl: Ioctl = fcntl.ioctl) -> Device | None:
+    """What a device says; None when it is no camera. One that cannot be opened is a Device with a problem."""
+    try:
+        handle = os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
+    except (FileNotFoundError, IsADirectoryError):
+        return None
+    except PermissionError:
+        return Device(str(path), path.name, problem="You may not read this camera. Join its group, then log in again: "
+                                                    "`sudo usermod -aG video $USER`.")
+    except OSError as exc:
+        return Device(str(path), path.name, problem=_held(path) if exc.errno == errno.EBUSY else
+                      f"The camera cannot be opened ({exc.strerror}). Plug it in again.")
+    try:
+        data = bytearray(_CAPABILITY.size)
+        ioctl(handle, QUERYCAP, data)
+        _, card, bus, _, capabilities, own = _CAPABILITY.unpack(data)
+        if not (own if capabilities & _DEVICE_CAPS else capabilities) & _VIDEO_CAPTURE:
+            return None
+        modes = tuple(sorted(_modes(handle, ioctl), key=lambda mode: (mode.width * mode.height, mode.width)))
+        return Device(str(path), _text(card) or path.name, _text(bus), modes,
+                      _held(path) if _is_held(handle, ioctl) else "")
+    except OSError:
+        return None  # it answers no question that every camera answers
+    finally:
+        os.close(handle)
+
+
+def _held(path: Path) -> str:
+    return f"Another program uses this camera. Close it: `fuser {path}` names it."
+
+
+def _is_held(handle: int, ioctl: Ioctl) -> bool:
+    """Whether the driver refuses buffers because another program has some."""
+    try:
+        ioctl(handle, REQBUFS, bytearray(_BUFFERS.pack(1, _CAPTURE_TYPE, _MMAP)))
+    except OSError as exc:
+        return exc.errno == errno.EBUSY
+    with contextlib.suppress(OSError):
+        ioctl(handle, REQBUFS, bytearray(_BUFFERS.pack(0, _CAPTURE_TYPE, _MMAP)))
+    return False
+
+
+def _modes(handle: int, ioctl: Ioctl) -> list[Mode]:
+    """Each size once, at the highest rate of any pixel format."""
+    best: dict[tuple[int, int], float] = {}
+    for fields in _enumerate(handle, ioctl, ENUM_FMT, _FORMAT, _CAPTURE_TYPE, 0, b"", 0):
+        pixel_format = fields[4]
+        for size in _enumerate(handle, ioctl, ENUM_FRAMESIZES, _SIZE, pixel_format, *7 * (0,)):
+            width, height = size[3:5] if size[2] == _DISCRETE else (min(size[4], USUAL[0]), min(size[7], USUAL[1]))
+            fps = _rate(handle, ioctl, pixel_format, width, height)
+            best[width, height] = max(fps, best.get((width, height), 0.0))
+            if size[2] != _DISCRETE:
+                break  # one entry is a whole range
+    return [Mode(width, height, fps) for (width, height), fps in best.items()]
+
+
+def _rate(handle: int, ioctl: Ioctl, pixel_format: int, width: int, height: int) -> float:
+    """Frames/s: the highest rate; the usual one where the driver names none."""
+    rates = [fields[6] / fields[5] for fields in _enumerate(
+        handle, ioctl, ENUM_FRAMEINTERVALS, _INTERVAL, pixel_format, width, height, 0, 0, 0)
+        if fields[5] and fields[6]]
+    return round(max(rates, default=USUAL[2]), 2)
+
+
+def _enumerate(handle: int, ioctl: Ioctl, request: int, layout: struct.Struct,
+               *asked: int | bytes) -> Iterator[tuple[int, ...]]:
+    """The answers to a question that is `asked` with an index, until the driver has no more."""
+    for index in range(_MOST):
+        data = bytearray(layout.pack(index, *asked))
+        try:
+            ioctl(handle, request, data)
+        except OSError:
+            return
+        yield layout.unpack(data)
+
+
+def _text(raw: bytes) -> str:
+    return raw.split(b"\0")[0].decode("utf-8", "replace").strip()
