@@ -5,10 +5,11 @@ docs/rig.md describes the format. Nothing else on the master is configured anywh
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Annotated, Final, Literal, NamedTuple
+from typing import Annotated, ClassVar, Final, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
@@ -59,9 +60,17 @@ class Intrinsics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     cx: Pixel
     cy: Pixel
     distortion: Distortion = (0.0, 0.0, 0.0, 0.0, 0.0)
+    ASSUMED_DEG: ClassVar[float] = 60.0
+    """Horizontal field of view of a camera of which nothing is known: webcams have 55 to 70 degrees."""
 
     def __post_init__(self) -> None:
         require_distortion(self.distortion)
+
+    @classmethod
+    def assumed(cls, width: int, height: int) -> Intrinsics:
+        """The lens of a camera of which nothing but the size of its pictures is known, px."""
+        focal = 0.5 * width / math.tan(0.5 * math.radians(cls.ASSUMED_DEG))
+        return cls(width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1))
 
     @property
     def nominal(self) -> bool:
@@ -97,6 +106,7 @@ class RigNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     time_offset_s: Annotated[float, Meta(ge=-10, le=10)] = 0.0  # calibrated correction added to this camera's times
     pairing_port: Port = 47803  # the node's: who it is, pairing
     public_key: PublicKey = ""  # the node's; empty: the node is not paired, and what it says is untrusted
+    pose_known: bool = True  # whether `pose` was measured or set; without, the camera is shown and not tracked with
 
     def __post_init__(self) -> None:
         if self.text_datagrams and self.public_key:
@@ -384,6 +394,8 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise ValueError(f"two nodes have the same {what} {doubled[0]!r}; each node needs its own")
         if self.depth.mode == "disparity" and len(self.nodes) != 2:
             raise ValueError(f"depth.mode is \"disparity\", which needs two cameras; the rig has {len(self.nodes)}")
+        if not any(self.tracked_with):
+            raise ValueError("no node has a known pose; the first camera's pose is the rig frame: set its pose_known")
         self._check_hands()
         self._check_objects()
         known = set(self.markers.ids)
@@ -399,6 +411,11 @@ class Rig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         landmarks = [marker.shape == "landmark" for marker in self.markers.markers]
         return not any(landmarks) or any(marker.role is not None and not landmark
                                          for marker, landmark in zip(self.markers.markers, landmarks, strict=True))
+
+    @property
+    def tracked_with(self) -> tuple[bool, ...]:
+        """Of each node, whether its camera is tracked with: its pose is known, or distance follows from disparity."""
+        return tuple(node.pose_known or self.depth.mode == "disparity" for node in self.nodes)
 
     @property
     def models(self) -> tuple[ObjectModel, ...]:

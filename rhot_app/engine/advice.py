@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rhot_app.calibration.check.camera_calibration import NOT_CALIBRATED, calibration_finding
 from rhot_app.engine.node_meter import RECENT_NS, Recent
 from rhot_app.engine.status import Advice, Level, NodeStatus
-from rhot_app.project import Rig
+from rhot_app.project import Intrinsics, Rig
 from rhot_app.state import HandState
 from rhot_node.network.presence import is_loopback
 
@@ -90,15 +90,17 @@ def node_advice(facts: NodeFacts, marker_ids: Sequence[str], running: bool, *, v
     return found
 
 
-def no_marker_advice(all_facts: Sequence[NodeFacts], running: bool, painted: bool = True) -> list[Advice]:
+def no_marker_advice(all_facts: Sequence[NodeFacts], running: bool, painted: bool = True,
+                     hand: str = "hand") -> list[Advice]:
     """The one sentence that replaces all others about visibility when no camera sees anything; none while a picture is
-    black, which is said of each camera. `painted`: whether the rig has painted markers, not landmarks alone."""
+    black, which is said of each camera. `painted`: whether the rig has painted markers, not landmarks alone. `hand`:
+    which one is looked for."""
     if any(facts.black for facts in all_facts):
         return []
     seconds = min((min(facts.unseen_s) for facts in all_facts), default=0.0)
     if running and seconds > UNSEEN_S and any(facts.recent.accepted for facts in all_facts):
         if not painted:
-            return [Advice("warning", f"No camera has seen the hand for {seconds:.0f} s. Hold it into the pictures. "
+            return [Advice("warning", f"No camera has seen a {hand} for {seconds:.0f} s. Hold it into the pictures. "
                                       "Each node needs the hand networks (`rhot-node landmarks install`) and "
                                       "\"detector\": \"landmarks\" in its settings.", subject="sight")]
         return [Advice("warning", f"No camera has seen a marker for {seconds:.0f} s. Hold the hand into both pictures; "
@@ -240,6 +242,26 @@ def calibration_advice(rig: Rig) -> list[Advice]:
         return []
     level: Level = "warning" if found.finding.figure == NOT_CALIBRATED else "info"
     return [Advice(level, found.finding.sentence, found.mender, lasting=True, subject="calibration")]
+
+
+def one_camera_advice(rig: Rig) -> list[Advice]:
+    """What a hand that one camera tracks cannot tell, and which cameras wait to be put together with it."""
+    used = [node for node, tracked in zip(rig.nodes, rig.tracked_with, strict=True) if tracked]
+    apart = [node.name for node in rig.nodes if node not in used]
+    if len(used) > 1 and not apart:
+        return []
+    names, by = " and ".join(apart), " and ".join(node.name for node in used)
+    mender = "stereo" if apart else ""
+    if len(used) == 1 and rig.painted and rig.tracker.observe == "markers" and rig.tracker.palm_plane is None:
+        remedy = f"Put {names} together with it" if apart else "Add a second camera"
+        return [Advice("info", f"{by} alone does not find a hand by painted markers. {remedy}, or track a bare hand.",
+                       mender, lasting=True, subject="calibration")]
+    waiting = f" until {names} {'is' if len(apart) == 1 else 'are'} put together with it" if apart else ""
+    guess = ("" if len(used) > 1 else " How far the hand is follows from its size"
+             + (f" and a lens that is assumed to see {Intrinsics.ASSUMED_DEG:.0f} degrees: a guess."
+                if used[0].intrinsics.nominal else "."))
+    return [Advice("info", f"{by} alone tracks the hand{waiting}.{guess}", mender, lasting=True,
+                   subject="calibration")]
 
 
 def _visibility_advice(facts: NodeFacts, marker_ids: Sequence[str]) -> list[Advice]:

@@ -12,7 +12,14 @@ import numpy as np
 from rhot_app.calibration.check.health import HealthMonitor, HealthSample
 from rhot_app.calibration.verdict import Grade
 from rhot_app.diagnostics import Diagnostic
-from rhot_app.engine.advice import NodeFacts, calibration_advice, no_marker_advice, node_advice, start_pose_advice
+from rhot_app.engine.advice import (
+    NodeFacts,
+    calibration_advice,
+    no_marker_advice,
+    node_advice,
+    one_camera_advice,
+    start_pose_advice,
+)
 from rhot_app.engine.node_meter import RECENT_NS, NodeMeter
 from rhot_app.engine.pipeline import Pipeline
 from rhot_app.engine.rig_watch import BonesWatch, HandWatch, RigWatch
@@ -96,7 +103,7 @@ class Observer:
         facts = [replace(self._facts(camera, status, now_ns), black=black(status.node_id))
                  for camera, status in enumerate(nodes)]
         bare = self.rig.tracker.observe == "contours"  # nobody wears the markers
-        nowhere = (no_marker_advice(facts, running, self.rig.painted) if not bare
+        nowhere = (no_marker_advice(facts, running, self.rig.painted, f"{self.rig.hand.side} hand") if not bare
                    else start_pose_advice(self._pipeline.last_state) if running else [])
         marker_ids = self.rig.markers.ids
         visibility = not (nowhere or bare)
@@ -111,7 +118,7 @@ class Observer:
         found += [Advice(one.level, one.sentence, subject="tracking" if one.level == "error" else "sight")
                   for one in self._diagnosed(now_ns)]
         notices = [Advice("info", text, subject="information") for text in self._source.notices()]
-        return [*found, *nowhere, *calibration_advice(self.rig), *notices]
+        return [*found, *nowhere, *calibration_advice(self.rig), *one_camera_advice(self.rig), *notices]
 
     def _facts(self, camera: int, status: NodeStatus, now_ns: int) -> NodeFacts:
         meter = self._meters[camera]

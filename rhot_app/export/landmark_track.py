@@ -121,7 +121,7 @@ def find_hands(video: CameraVideo, progress: Progress = silent) -> HandFilm:
 def with_measured_bones(rig: Rig, path: Path) -> tuple[Rig, str]:
     """The rig with the bones of its hands that the landmarks of a log show, as far as they are usable, and a sentence
     on them."""
-    if len(rig.nodes) < 2:
+    if sum(rig.tracked_with) < 2:
         return rig, "The bones are the rig's: one camera does not show how long they are, nor how far the hand is."
     try:
         _, instants = read_instants(path, rig)

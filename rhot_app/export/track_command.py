@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from rhot_app.errors import RecordingError, input_file
 from rhot_app.export import bare_hand_command
@@ -15,10 +14,6 @@ from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
-
-ASSUMED_DEG: Final = 60.0
-"""Horizontal field of view of a camera of which nothing is known: webcams have 55 to 70 degrees."""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot track``, whose former name is ``rhot bare-hand``."""
@@ -78,7 +73,7 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
     if rig is None:
         rig = assumed_rig([*args.videos, *(args.video or [])])
         lens = rig.nodes[0].intrinsics
-        said.append(f"Without --rig the lens is assumed to see {ASSUMED_DEG:.0f} degrees across (focal length "
+        said.append(f"Without --rig the lens is assumed to see {lens.ASSUMED_DEG:.0f} degrees across (focal length "
                     f"{lens.fx:.0f} px) and the hand to be of usual size; distances are as wrong as these.")
         given = {rig.nodes[0].name: next(iter([*args.videos, *(args.video or [])]))}
     else:
@@ -110,17 +105,14 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
 
 def assumed_rig(videos: list[str]) -> Rig:
     """A rig of one camera whose lens is assumed, for one video. Raises RecordingError."""
-    from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode
+    from rhot_app.project import Intrinsics, Rig, RigNode
 
     if len(videos) != 1:
         raise RecordingError(f"{len(videos)} videos need a calibrated rig with a camera for each; give it with --rig. "
                              "One video alone is tracked without." if videos else
                              "give a video, or a rig with --rig and a video of each camera.")
-    width, height = picture_size(input_file(videos[0]))
-    focal = 0.5 * width / math.tan(0.5 * math.radians(ASSUMED_DEG))
-    lens = Intrinsics(width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1), (0.0, 0.0, 0.0, 0.0, 0.0))
-    node = RigNode(1, "camera", lens, CameraPose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    return Rig("one assumed camera", (node,))
+    lens = Intrinsics.assumed(*picture_size(input_file(videos[0])))
+    return Rig("one assumed camera", (RigNode(1, "camera", lens),))
 
 
 def picture_size(path: Path) -> tuple[int, int]:

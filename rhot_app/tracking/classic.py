@@ -40,7 +40,7 @@ class ClassicTracker:
 
     def __init__(self, rig: Rig) -> None:
         self.diagnostics = Diagnostics()
-        self._rig = compile_rig(rig)
+        self._rig, self._tracked_with = compile_rig(rig), rig.tracked_with
         cameras, markers = len(self._rig.camera_names), len(self._rig.marker_ids)
         self._pairing = Pairing(cameras, markers)
         self._association = MarkerAssociation(self._rig)
@@ -70,7 +70,8 @@ class ClassicTracker:
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; about 10 µs."""
-        self._pairing.ingest(self._association.select(observations))
+        if self._tracked_with[observations.camera]:
+            self._pairing.ingest(self._association.select(observations))
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, None before its first."""

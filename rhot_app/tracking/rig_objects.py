@@ -50,7 +50,7 @@ class RigObjects:
         used."""
         cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
         self._tracker = ObjectTracker(rig.models, cameras, diagnostics, [node.name for node in rig.nodes])
-        ids = rig.markers.ids
+        ids, self._tracked_with = rig.markers.ids, rig.tracked_with
         worn = [marker.marker for model in rig.models for marker in model.markers]
         self._columns = np.array([ids.index(name) for name in worn], np.intp)
         self._ids = tuple(ids[column] for column in self._columns)
@@ -69,12 +69,12 @@ class RigObjects:
         """Take the tags of one frame, or a pose of another tracker, in."""
         if isinstance(frame, MeasuredPose):
             self._tracker.take_pose(frame.name, PoseMeasurement(frame.t_ns, frame.world_from_object, frame.covariance))
-        else:
+        elif self._tracked_with[frame.camera]:
             self._tracker.take(frame)
 
     def ingest_markers(self, frame: CameraObservations) -> None:
         """Take the objects' markers of one frame in: the best candidate of each."""
-        if len(self._columns):
+        if len(self._columns) and self._tracked_with[frame.camera]:
             self._tracker.take(MarkerPoints(frame.camera, frame.t_row0_master_ns, frame.row_time_ns, self._ids,
                                             frame.pixels[self._columns], frame.covariances[self._columns]))
 

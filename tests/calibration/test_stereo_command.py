@@ -94,13 +94,15 @@ def test_the_board_is_the_one_of_rhot_target_where_nobody_names_another() -> Non
 def test_a_rig_that_was_there_is_kept_and_nothing_else_in_it_changes(pictures: Path) -> None:
     out = pictures / "rig.json"
     before = msgspec.structs.replace(load_rig(resource_path("rigs", "two_pis.json")), name="bench")
+    before = msgspec.structs.replace(before, nodes=(before.nodes[0], msgspec.structs.replace(
+        before.nodes[1], pose_known=False)))
     save_rig(out, before)
     assert stereo(pictures, "--out", str(out)) == 0
     after = load_rig(out)
     assert after.name == "bench"
     assert after.hand == before.hand
     assert after.nodes[0].address == before.nodes[0].address
-    assert after.nodes[1].pose != before.nodes[1].pose
+    assert after.nodes[1].pose != before.nodes[1].pose and after.nodes[1].pose_known
     (version,) = rig_history.versions(out)
     assert version.replaced_by == "stereo calibration"
     assert main(["history", str(out), "--restore", "1"]) == 0

@@ -6,10 +6,17 @@ import msgspec
 import pytest
 
 from rhot_app.calibration.check.checks import check_rig
-from rhot_app.engine.advice import NodeFacts, calibration_advice, disk_advice, no_marker_advice, node_advice
+from rhot_app.engine.advice import (
+    NodeFacts,
+    calibration_advice,
+    disk_advice,
+    no_marker_advice,
+    node_advice,
+    one_camera_advice,
+)
 from rhot_app.engine.node_meter import Recent
 from rhot_app.engine.status import Advice, NodeStatus, most_urgent_first
-from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, load_rig, with_tracker
+from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, load_rig, with_tracker
 from rhot_node.files import resource_path
 
 IDS = ("thumb", "index", "wrist")
@@ -152,3 +159,24 @@ def test_a_disk_that_will_be_full_is_told_in_minutes(seconds: float, level: str,
     (advice,) = disk_advice("/data/RHOT", seconds)
     assert advice.level == level and words in advice.text and "/data/RHOT" in advice.text
     assert disk_advice("/data/RHOT", 600.0) == disk_advice("/data/RHOT", float("inf")) == []
+
+
+def test_what_one_camera_cannot_know_is_said() -> None:
+    painted = load_rig(resource_path("rigs", "two_pis.json"))
+    left, right = painted.nodes
+    lone, = one_camera_advice(msgspec.structs.replace(painted, nodes=(left,)))
+    assert "does not find a hand by painted markers" in lone.text
+    rig = Rig("bare", painted.nodes)
+    assert one_camera_advice(rig) == []
+    alone, = one_camera_advice(msgspec.structs.replace(rig, nodes=(left,)))
+    assert "left alone" in alone.text and "assumed to see 60" in alone.text and not alone.mender
+    apart = msgspec.structs.replace(rig, nodes=(left, msgspec.structs.replace(right, pose_known=False)))
+    advice, = one_camera_advice(apart)
+    assert "until right is put together" in advice.text and advice.mender == "stereo"
+    calibrated = msgspec.structs.replace(left, intrinsics=Intrinsics(640, 480, 530.0, 530.0, 318.0, 240.0))
+    known, = one_camera_advice(msgspec.structs.replace(rig, nodes=(calibrated,)))
+    assert "its size" in known.text and "assumed" not in known.text
+    findings = check_rig(msgspec.structs.replace(apart, nodes=(calibrated, msgspec.structs.replace(
+        apart.nodes[1], intrinsics=calibrated.intrinsics)))).verdict.findings
+    codes = {finding.code for finding in findings}
+    assert "unknown_poses" in codes and "coincident" not in codes

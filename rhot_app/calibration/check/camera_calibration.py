@@ -36,6 +36,11 @@ def calibration_finding(rig: Rig) -> HealthFinding | None:
         return HealthFinding("lens", Finding(
             "nominal", Grade.FAIR, NOT_CALIBRATED, f"The lenses of {' and '.join(nominal)} are nominal.{exact}",
             "Calibrate the intrinsics of each camera, then stereo."))
+    apart = [node.name for node, used in zip(rig.nodes, rig.tracked_with, strict=True) if not used]
+    if apart:
+        return HealthFinding("stereo", Finding(
+            "unknown_poses", Grade.FAIR, NOT_CALIBRATED, f"Where {' and '.join(apart)} stands is not known.",
+            "Do the stereo calibration with a board."))
     if rig.calibration is not None and rig.calibration.method == "outdated":
         return HealthFinding("stereo", Finding(
             "outdated_poses", Grade.FAIR, NOT_CALIBRATED,

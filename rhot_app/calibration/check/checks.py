@@ -120,8 +120,8 @@ def pair_findings(rig: Rig, pairs: list[PairGeometry]) -> list[Finding]:
 
 
 def all_pairs(rig: Rig) -> list[PairGeometry]:
-    """The geometry of all pairs of cameras."""
-    return [pair_geometry(a, b) for a, b in combinations(rig.nodes, 2)]
+    """The geometry of all pairs of cameras whose poses are known."""
+    return [pair_geometry(a, b) for a, b in combinations([node for node in rig.nodes if node.pose_known], 2)]
 
 
 _CALIBRATE = "Calibrate the intrinsics of this camera."
@@ -167,7 +167,7 @@ def _overlap_findings(pairs: list[PairGeometry]) -> list[Finding]:
 
 
 def _side_findings(rig: Rig) -> list[Finding]:
-    nodes = {node.name.lower(): node for node in rig.nodes}
+    nodes = {node.name.lower(): node for node in rig.nodes if node.pose_known}
     if "left" not in nodes or "right" not in nodes:
         return []
     left, right = _model(nodes["left"]), _model(nodes["right"])

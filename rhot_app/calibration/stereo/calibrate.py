@@ -207,22 +207,24 @@ def lens_of(node: RigNode) -> LensStart:
 def calibrated_rig(rig: Rig, figures: StereoFigures, frame: WorldFrame | None = None) -> Rig:
     """`rig` with the lenses and places of the calibrated cameras, in the table's `frame` where one was placed.
 
-    Cameras that were not calibrated keep their lens and their place relative to the first calibrated one. Raises
-    CalibrationError when a camera is not in the rig.
+    Cameras that were not calibrated keep their lens and their place relative to the first calibrated one, if both were
+    known. Raises CalibrationError when a camera is not in the rig.
     """
     names = [camera.name for camera in figures.cameras]
     require_nodes(rig, names)
     poses = figures.world_from_camera if frame is None else frame.world_from_camera
-    old = next(node.pose for node in rig.nodes if node.name == names[0])
-    new_from_old = poses[0] @ inverse(_matrix(old))
+    old = next(node for node in rig.nodes if node.name == names[0])
+    new_from_old = poses[0] @ inverse(_matrix(old.pose))
     nodes = []
     for node in rig.nodes:
         if node.name in names:
             camera = figures.cameras[names.index(node.name)]
             lens = rig_intrinsics(camera.size, camera.lens)
-            nodes.append(msgspec.structs.replace(node, intrinsics=lens, pose=_pose(poses[names.index(node.name)])))
+            nodes.append(msgspec.structs.replace(node, intrinsics=lens, pose=_pose(poses[names.index(node.name)]),
+                                                 pose_known=True))
         else:
-            nodes.append(msgspec.structs.replace(node, pose=_pose(new_from_old @ _matrix(node.pose))))
+            nodes.append(msgspec.structs.replace(node, pose=_pose(new_from_old @ _matrix(node.pose)),
+                                                 pose_known=node.pose_known and old.pose_known))
     up: Literal["-y", "z"] = "-y" if frame is None else "z"
     error_m = figures.error_m[0]
     record = CameraCalibration("board", figures.lengths, error_m if np.isfinite(error_m) else None, WORKING_DISTANCE_M)

@@ -51,7 +51,7 @@ class ContourEstimator:
         self._markers = MarkersOfHand(rig, self._hand) if _marked(rig) else None
         self._finder = Finder(self._hand)
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
-        self._names = tuple(node.name for node in rig.nodes)
+        self._names, self._tracked_with = tuple(node.name for node in rig.nodes), rig.tracked_with
         self.key_frames = KeyFrames(self._hand.model)
         self._shown_contours: list[SeenContour] = []
         self._sequence = 0
@@ -85,11 +85,13 @@ class ContourEstimator:
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take the markers of one frame, which also has the time of the camera's frame."""
-        self._pending.append(observations)
+        if self._tracked_with[observations.camera]:
+            self._pending.append(observations)
 
     def ingest_image(self, frame: ImageFrame) -> None:
         """Take the edges or the foreground of one frame."""
-        self._pending.append(frame)
+        if self._tracked_with[frame.camera]:
+            self._pending.append(frame)
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, None before its first."""

@@ -62,6 +62,7 @@ class Estimator:
         """Raises RigError when a marker has no place on the hand."""
         self.diagnostics = Diagnostics()
         self._rig, self._markers = compile_rig(rig), compile_markers(rig)
+        self._tracked_with = rig.tracked_with
         self._file_size, prior = self._markers, self._markers.pose_prior
         self._size: HandSize | None = None
         if rig.tracker.float_scale:
@@ -93,7 +94,8 @@ class Estimator:
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; it is weighed by the next `solve`."""
-        self._pending = [*self._pending[1 - _PENDING:], observations]
+        if self._tracked_with[observations.camera]:
+            self._pending = [*self._pending[1 - _PENDING:], observations]
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, None before its first."""

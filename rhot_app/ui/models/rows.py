@@ -227,6 +227,8 @@ def lens_figures(node: RigNode) -> Figures:
 
 def place_figures(node: RigNode) -> Figures:
     """Where a camera stands and where it looks."""
+    if not node.pose_known:
+        return {f"{node.name}: place": "not known", f"{node.name}: looks along": "not known"}
     x, y, z = (1e3 * metres for metres in node.pose.translation_m)
     axis = rotation_from_quaternion(np.array(node.pose.rotation_wxyz))[:, 2]
     return {f"{node.name}: place": f"{x:.1f}, {y:.1f}, {z:.1f} mm",

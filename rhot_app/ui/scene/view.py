@@ -285,9 +285,10 @@ class SceneView(GLViewWidget):
         self._add_lines(axes, colours, width=2.0, depth=-5)
 
     def _add_cameras(self, rig: Rig) -> None:
-        frusta = [frustum_lines(node.intrinsics, node.pose, _FRUSTUM_M, self._up) for node in rig.nodes]
+        nodes = [node for node in rig.nodes if node.pose_known]
+        frusta = [frustum_lines(node.intrinsics, node.pose, _FRUSTUM_M, self._up) for node in nodes]
         self._add_lines(np.concatenate(frusta), self._scheme.frustum, width=1.5, depth=-5)
-        self._cameras = [(node.name, lines[-2]) for node, lines in zip(rig.nodes, frusta, strict=True)]
+        self._cameras = [(node.name, lines[-2]) for node, lines in zip(nodes, frusta, strict=True)]
 
     def _paint_labels(self, painter: QPainter) -> None:
         matrix = self._projection()

@@ -320,7 +320,9 @@ def _rows(before: Rig, after: Rig, figures: StereoFigures) -> tuple[Row, ...]:
 
 
 def _distance(rig: Rig, pair: PairFigures) -> str:
-    places = {node.name: np.array(node.pose.translation_m) for node in rig.nodes}
+    places = {node.name: np.array(node.pose.translation_m) for node in rig.nodes if node.pose_known}
+    if not {pair.first, pair.second} <= places.keys():
+        return "not known"
     return f"{1e3 * np.linalg.norm(places[pair.second] - places[pair.first]):.2f} mm"
 
 
