@@ -34,7 +34,8 @@ from rhot_app.project import FilterSettings, Rig
 from rhot_app.simulator.film.film import TRUTH_NAME, film
 from rhot_app.simulator.film.shot import make_shot
 from rhot_app.simulator.film.truth import load_truth
-from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, make_scene, twin_defaults
+from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_defaults
+from rhot_app.sources.local_nodes import NodePorts
 from rhot_app.state import Knowledge
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker

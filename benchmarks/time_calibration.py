@@ -24,7 +24,8 @@ from rhot_app.progress import ProgressLine
 from rhot_app.project import Rig
 from rhot_app.simulator.film.shot import make_renderer, make_shot
 from rhot_app.simulator.render.exposure_samples import Shutter
-from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, make_scene, twin_defaults
+from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_defaults
+from rhot_app.sources.local_nodes import NodePorts
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_i420

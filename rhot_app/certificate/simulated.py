@@ -36,8 +36,9 @@ from rhot_app.simulator.film.scene_objects import MarkerPath, SceneObject
 from rhot_app.simulator.film.shot import Shot, make_renderer, make_shot
 from rhot_app.simulator.render.body import PALM_GROUP, POINT_M, SKIN
 from rhot_app.simulator.scene.rigid_target import BALL_RADIUS_M, STICK_RGB, RigidTarget
-from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, node_settings
+from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
 from rhot_app.simulator.scene.scene_description import MarkerShow
+from rhot_app.sources.local_nodes import NodePorts
 from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
 from rhot_node.wire.messages import MarkerObservation

@@ -67,6 +67,11 @@ class EngineDirectory:
         return self.path / "twin.log"
 
     @property
+    def cameras_log_file(self) -> Path:
+        """What the process of this computer's cameras said."""
+        return self.path / "cameras.log"
+
+    @property
     def activity_file(self) -> Path:
         """What the engine does, see `rhot_app.engine.activity`."""
         return self.path / "engine.json"

@@ -21,9 +21,9 @@ from rhot_app.project import Rig, save_rig
 from rhot_app.simulator.film.film import TRUTH_NAME, film
 from rhot_app.simulator.film.shot import make_shot, read_shot
 from rhot_app.simulator.film.truth import load_truth
-from rhot_app.simulator.nodes.nodes import TwinNodes
 from rhot_app.simulator.nodes.proxy import Impairment, UdpProxy
-from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, node_settings
+from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
+from rhot_app.sources.local_nodes import LocalNodes, NodePorts
 from rhot_app.state import HandState
 from rhot_node.files import write_atomically
 
@@ -59,7 +59,7 @@ def evaluation_run(frames: Path, scene: Scene, seconds: float, work: Path, *, lo
     settings = [node_settings(scene, index, detector=detector, trust=trust) for index in range(len(cameras))]
     engine_directory = work / "engine"
     with contextlib.ExitStack() as stack:
-        nodes = stack.enter_context(TwinNodes(work / "nodes", settings, cameras))
+        nodes = stack.enter_context(LocalNodes(work / "nodes", settings, cameras))
         ports = tuple(nodes.ports)
         if loss > 0.0:
             ports = tuple(_lossy(stack, index, port, loss, scene.seed) for index, port in enumerate(ports))

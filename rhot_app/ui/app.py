@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from rhot_app.engine.compilation import BackgroundCompilation
 from rhot_app.engine.directory import default_directory
-from rhot_app.errors import EngineError
+from rhot_app.errors import EngineError, SourceError
 from rhot_app.project import load_rig
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
@@ -27,9 +27,14 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot`` without a command."""
-    parser.add_argument("--rig", type=Path, metavar="FILE", help="open this rig file at once")
+    parser.add_argument("--rig", type=Path, metavar="FILE",
+                        help="open this rig file at once; with --cameras, take the cameras' lenses and places from it")
+    parser.add_argument("--cameras", nargs="*", metavar="SOURCE",
+                        help="open cameras of this computer: numbers that `rhot cameras` lists, films, folders of "
+                             "pictures, or addresses of network cameras (http://, rtsp://)")
+    parser.add_argument("--hand", choices=("right", "left"), help="with --cameras: which hand (default right)")
     add_window_arguments(parser)
-    add_examples(parser, "rhot", "rhot --rig desk.json")
+    add_examples(parser, "rhot --rig desk.json", "rhot --cameras left.mp4 right.mp4")
 
 
 def add_window_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,10 +47,20 @@ def add_window_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Open the window and return its exit code when it is closed. Raises RigError before there is a window."""
-    if args.rig is not None:
-        load_rig(args.rig)
-    return open_window(args, rig=args.rig, twin=None)
+    """Open the window and return its exit code when it is closed. Raises RigError and SourceError before there is a
+    window."""
+    rig = None if args.rig is None else load_rig(args.rig)
+    if args.cameras is None:
+        if args.hand is not None:
+            raise SourceError("--hand goes with --cameras; a rig file names its hand itself.")
+        return open_window(args, rig=args.rig, twin=None)
+    from rhot_app.sources.cameras.camera_set import prepare
+    from rhot_app.sources.cameras.camera_source import check_sources
+
+    prepared = prepare(check_sources(args.cameras), base=rig, side=args.hand)
+    for sentence in prepared.remarks:
+        print(f"rhot: {sentence}", file=sys.stderr)
+    return open_window(args, rig=prepared.rig_path, twin=None)
 
 
 def _require_settings_file(path: Path) -> None:

@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[2]
 MODULES = {"rhot": "rhot_app", "rhot-node": "rhot_node"}
 
 OPTIONS: dict[str, tuple[str, ...]] = {
-    "rhot": ("--version", "demo", "engine", "replay", "simulate", "evaluate"),
+    "rhot": ("--version", "--cameras", "demo", "engine", "replay", "simulate", "evaluate"),
     "rhot demo": ("--motion", "--seed"),
     "rhot engine": ("--rig", "--record", "--video", "--output", "--web"),
     "rhot replay": ("LOG", "--rig", "--keep", "--smooth"),
@@ -80,6 +80,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot mouse": ("--directory", "--simulated", "--seed", "--gain", "--height-gain", "--height-from", "--on-table",
                    "--osc", "--pointer", "--seconds", "--measure", "--pictures", "--json"),
     "rhot nodes": ("--seconds", "--json"),
+    "rhot cameras": ("--json",),
     "rhot pair": ("NODE", "--rig", "--port", "--code"),
     "rhot-node pair": ("--settings",),
     "rhot-node unpair": ("--settings",),

@@ -12,8 +12,9 @@ import pytest
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import load_rig, save_rig
-from rhot_app.simulator.scene.scene import NodePorts, build_rig, make_scene, node_settings, twin_defaults
+from rhot_app.simulator.scene.scene import build_rig, make_scene, node_settings, twin_defaults
 from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, scene_of
+from rhot_app.sources.local_nodes import NodePorts
 from rhot_node.files import resource_path
 
 PORTS = (NodePorts(1001, 1002, 1003), NodePorts(2001, 2002, 2003))

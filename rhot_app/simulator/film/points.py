@@ -28,8 +28,9 @@ from rhot_app.simulator.film.node_log import CABLE, NodeSender, write_node_log
 from rhot_app.simulator.film.shot import RIG_NAME, Shot, make_shot, save_shot
 from rhot_app.simulator.film.truth import FrameTruth, save_truth, true_object
 from rhot_app.simulator.render.sheet import Sheet
-from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig
+from rhot_app.simulator.scene.scene import Scene, build_rig
 from rhot_app.simulator.scene.scene_description import FARTHEST_M, NEAREST_M, MarkerShow
+from rhot_app.sources.local_nodes import NodePorts
 from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
 # -- rolling shutter ---------------------------------------------------------------------------------------------------

@@ -15,8 +15,9 @@ from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.painter import Image, Painter
 from rhot_app.simulator.render.render import Exposure, FrameRenderer, Optics
 from rhot_app.simulator.scene.background import background_image
-from rhot_app.simulator.scene.scene import NodePorts, Scene, TwinSettings, build_rig, make_scene, node_settings
+from rhot_app.simulator.scene.scene import Scene, TwinSettings, build_rig, make_scene, node_settings
 from rhot_app.simulator.scene.scene_description import HandShow, Show
+from rhot_app.sources.local_nodes import NodePorts
 from rhot_node.config import save_settings
 from rhot_node.files import read_document, write_document
 

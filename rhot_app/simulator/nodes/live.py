@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import fcntl
 import json
 import os
 import signal
@@ -28,13 +27,12 @@ from rhot_app.project import save_rig
 from rhot_app.simulator.film.scene_objects import with_start_pose, write_held
 from rhot_app.simulator.nodes.live_cameras import FrameSocket, LiveCameras, Pace
 from rhot_app.simulator.nodes.live_scene import LiveScene
-from rhot_app.simulator.nodes.nodes import READY_TIMEOUT_S, TwinNode, settings_path
 from rhot_app.simulator.nodes.remote import SERVER_NAME, Request, decode_request, refusal, server_address
-from rhot_app.simulator.scene.scene import NodePorts, Scene, build_rig, node_settings
+from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
 from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_arguments, scene_of, show_of
 from rhot_app.simulator.scene.scene_description import Show
-from rhot_node.config import load_settings
-from rhot_node.errors import NodeError, SettingsError
+from rhot_app.sources.local_nodes import READY_TIMEOUT_S, NodeSupervisor, Use
+from rhot_node.errors import NodeError
 from rhot_node.logs import cut_log, log_to_stderr
 from rhot_node.network.context import Context
 from rhot_node.threads import Worker
@@ -92,98 +90,9 @@ class TwinServer:
             return refusal(str(exc))
 
 
-# -- supervision of the node daemons -----------------------------------------------------------------------------------
-
-_RESTART_PAUSE_S = 0.5
-
-
-class Supervisor:
-    """Keeps one daemon per camera alive, on the ports it had first."""
-
-    def __init__(self, scene: Scene, directory: Path) -> None:
-        self._scene, self._directory = scene, directory
-        self._nodes = [self._start(index, None) for index in range(len(scene.names))]
-        self._ports: list[NodePorts] = []
-        self._died_s: dict[int, float] = {}
-
-    def _start(self, index: int, ports: NodePorts | None) -> TwinNode:
-        """A daemon; one that starts again keeps what its settings file says by now, as a real node does."""
-        name = self._scene.names[index]
-        settings = node_settings(self._scene, index, ports=ports)
-        if ports is not None:
-            with contextlib.suppress(SettingsError):
-                kept = load_settings(settings_path(self._directory, name))
-                settings = msgspec.structs.replace(kept, udp_port=ports.udp_port, control_port=ports.control_port,
-                                                   preview_port=ports.preview_port,
-                                                   pairing_port=ports.pairing_port)
-        return TwinNode(self._directory, settings, f"stream:{socket_path(self._directory, name)}")
-
-    def ports(self, deadline_s: float) -> list[NodePorts] | None:
-        """The daemons' ports, once all have said them; None before. Raises SimulatorError when one cannot start."""
-        while len(self._ports) < len(self._nodes):
-            node = self._nodes[len(self._ports)]
-            if not node.ready_waits and node.alive and time.monotonic() < deadline_s:
-                return None
-            self._ports.append(node.wait_ready(deadline_s))
-        return self._ports
-
-    def step(self) -> None:
-        """Start again what has died, a moment later."""
-        for index, node in enumerate(self._nodes):
-            cut_log(node.log_path)
-            if node.alive:
-                continue
-            died = self._died_s.setdefault(index, time.monotonic())
-            if time.monotonic() - died >= _RESTART_PAUSE_S:
-                node.close()
-                self._nodes[index] = self._start(index, self._ports[index])
-                del self._died_s[index]
-
-    def close(self) -> None:
-        """End every daemon."""
-        for node in self._nodes:
-            node.close()
-
-
 def socket_path(directory: Path, name: str) -> Path:
     """Where the frames of the camera `name` are offered."""
     return directory / f"{name}.frames"
-
-
-# -- whether somebody uses it -----------------------------------------------------------------------------------------
-
-UNUSED_S = 30.0
-"""As long as an engine without clients goes on; one that crashed has been started again by then."""
-
-_LOOK_S = 1.0
-
-
-class Use:
-    """Whether the program that started this one still runs, or an engine that has locked `lock_file`."""
-
-    def __init__(self, lock_file: Path, unused_s: float = UNUSED_S) -> None:
-        self._lock_file, self._unused_s = lock_file, unused_s
-        self._parent = os.getppid()
-        self._used_s = self._looked_s = time.monotonic()
-
-    def over(self) -> bool:
-        """Whether neither has run for `unused_s`; looks once a second."""
-        now_s = time.monotonic()
-        if now_s - self._looked_s >= _LOOK_S:
-            self._looked_s = now_s
-            if os.getppid() == self._parent or self._is_locked():
-                self._used_s = now_s
-        return now_s - self._used_s > self._unused_s
-
-    def _is_locked(self) -> bool:
-        try:
-            with self._lock_file.open("rb") as file:
-                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        except OSError:
-            return False
-        return False
 
 
 # -- the live twin -----------------------------------------------------------------------------------------------------
@@ -201,7 +110,9 @@ def run(scene: Scene, show: Show, directory: Path, rig_path: Path, over: Callabl
                    for name in scene.names]
         door = stack.enter_context(contextlib.closing(TwinServer(directory, stage.perform)))
         cameras = LiveCameras(scene, stage, sockets)
-        supervisor = stack.enter_context(contextlib.closing(Supervisor(scene, directory)))
+        supervisor = stack.enter_context(contextlib.closing(NodeSupervisor(
+            directory, [node_settings(scene, index) for index in range(len(scene.names))],
+            [f"stream:{socket_path(directory, name)}" for name in scene.names])))
         deadline = time.monotonic() + READY_TIMEOUT_S
         while (ports := supervisor.ports(deadline)) is None:
             cameras.step()

@@ -20,6 +20,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, RigNode, RigObject
 from rhot_app.simulator.render.camera_controls import Controls, Lamp
+from rhot_app.sources.local_nodes import NodePorts
 from rhot_node.config import CameraSettings, ClockSettings, NodeSettings
 from rhot_node.errors import SettingsError
 from rhot_node.files import read_document, resource_path
@@ -32,17 +33,6 @@ Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
 Level = Annotated[int, Meta(ge=0, le=255)]
 Background = Literal["cloth", "clutter", "skin"]
-
-
-@dataclass(frozen=True, slots=True)
-class NodePorts:
-    """The ports that a daemon said it listens on, and its public key if it is paired with this master."""
-
-    udp_port: int
-    control_port: int
-    preview_port: int
-    pairing_port: int = 0
-    public_key: str = ""
 
 
 class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

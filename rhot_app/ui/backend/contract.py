@@ -19,13 +19,15 @@ Report = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A rig that is open now. `ours` is False when somebody else started the engine: closing leaves it running."""
+    """A rig that is open now. `ours` is False when somebody else started the engine: closing leaves it running.
+    `begin`: its cameras are of this computer and were started with it, so that tracking may begin at once."""
 
     rig: Rig
     rig_path: str
     running: bool
     ours: bool
     simulated: bool
+    begin: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +92,7 @@ class Backend(Protocol):
         ...
 
     def open_rig(self, path: Path, report: Report) -> Opened:
-        """Start an engine on a rig file."""
+        """Start an engine on a rig file, and before it the cameras of this computer that belong to it."""
         ...
 
     def open_twin(self, choice: TwinChoice, report: Report) -> Opened:

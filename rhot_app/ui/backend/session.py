@@ -6,6 +6,7 @@ Every function that waits is meant for a worker thread; nothing here knows Qt.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import json
 import subprocess
 import sys
@@ -27,8 +28,9 @@ from rhot_app.engine.process import (
     running_engine,
     started_processes,
 )
-from rhot_app.errors import EngineError, RecordingError, SimulatorError
+from rhot_app.errors import EngineError, RecordingError, RhotError, SimulatorError, SourceError
 from rhot_app.project import load_rig, parse_rig, save_rig, with_tracker
+from rhot_app.sources.cameras.camera_set import camera_set_of
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
 from rhot_node.compiled import WINDOW
 from rhot_node.logs import before
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
 
 ENGINE_ROLE = "engine"
 TWIN_ROLE = "simulated nodes"
+CAMERAS_ROLE = "cameras"
 COMPILER_ROLE = "compiler"
 START_TIMEOUT_S = 360.0
 """A slow or busy machine takes long, above all where compiled code cannot be kept."""
@@ -52,6 +55,8 @@ HUNG_S = 0.5
 TWIN_COMMAND: tuple[str, ...] = (sys.executable, "-m", "rhot_app.simulator.nodes.live")
 TWIN_RIG = "simulated.rig.json"
 TWIN_OUTPUT = "twin.out"
+CAMERAS_COMMAND: tuple[str, ...] = (sys.executable, "-m", "rhot_app.sources.cameras.serve")
+CAMERAS_OUTPUT = "cameras.out"
 
 
 class Session:
@@ -98,12 +103,16 @@ class Session:
         return Opened(rig, path, bool(hello.get("running")), ours, simulated)
 
     def open_rig(self, path: Path, report: Report) -> Opened:
-        """End what the app ran before and start an engine on `path`; raises RigError or EngineError."""
+        """End what the app ran before and start an engine on `path`, and before it the cameras of this computer that
+        belong to that rig; raises RigError, SourceError or EngineError."""
         report("Reading the rig file …", 0.1)
-        rig = load_rig(path)
+        rig, cameras = load_rig(path), camera_set_of(path)
         self._clear(report)
         self._compile(part_of(rig), report)
-        return self._start_engine(path, report)
+        if cameras is None:
+            return self._start_engine(path, report)
+        self._start_cameras(path, len(cameras.cameras), report)
+        return dataclasses.replace(self._start_engine(path, report), begin=True)
 
     def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
         """Start the simulated nodes, then an engine on the rig that they write; raises SimulatorError, EngineError."""
@@ -220,40 +229,64 @@ class Session:
         return self.attach(lambda text, fraction: None)
 
     def _start_twin(self, choice: TwinChoice, report: Report) -> Path:
-        """Start the twin in the background; its ready line goes to a file, so that it outlives this process."""
+        """Start the twin in the background."""
         rig_path, output = self._place.path / TWIN_RIG, self._place.path / TWIN_OUTPUT
         errors = self._place.twin_log_file
         command = [*TWIN_COMMAND, "--motion", choice.motion,
                    "--seed", str(choice.seed), "--preset", choice.preset,
                    "--directory", str(self._place.path), "--rig", str(rig_path),
                    "--while-locked", str(self._place.lock_file)]
+        self._start_nodes(command, TWIN_ROLE, output, errors, _Words("simulated cameras", 2, SimulatorError), report)
+        self._twin_started = True
+        return rig_path
+
+    def _start_cameras(self, rig_path: Path, count: int, report: Report) -> None:
+        """Start the nodes of this computer's cameras in the background."""
+        errors = self._place.cameras_log_file
+        command = [*CAMERAS_COMMAND, "--rig", str(rig_path.absolute()), "--log", str(errors), "--while-locked",
+                   str(self._place.lock_file)]
+        self._start_nodes(command, CAMERAS_ROLE, self._place.path / CAMERAS_OUTPUT, errors,
+                          _Words("cameras", count, SourceError), report)
+
+    def _start_nodes(self, command: list[str], role: str, output: Path, errors: Path, words: _Words,
+                     report: Report) -> None:
+        """Start a process that runs nodes, and wait for its ready line, which goes to a file so that it outlives this
+        process."""
         with contextlib.suppress(OSError):
             errors.replace(before(errors))
         with output.open("wb") as out, errors.open("ab") as log:
             process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=log,
                                        start_new_session=True)
-        remember_process(self._place, process.pid, TWIN_ROLE)
-        self._twin_started = True
+        remember_process(self._place, process.pid, role)
         try:
-            self._await_ready(process, output, errors, report)
+            _await_ready(process, output, errors, words, report)
         except BaseException:
-            end_started(self._place, [TWIN_ROLE])
-            self._twin_started = False
+            end_started(self._place, [role])
             raise
-        return rig_path
 
-    def _await_ready(self, process: subprocess.Popen[bytes], output: Path, errors: Path, report: Report) -> None:
-        begin = time.monotonic()
-        while time.monotonic() - begin < START_TIMEOUT_S:
-            if _has_ready_line(output):
-                return
-            if process.poll() is not None:
-                words = errors.read_text(errors="replace").strip().splitlines()
-                raise SimulatorError("The simulated cameras did not start: "
-                                     f"{words[-1] if words else f'they said nothing; see {errors}'}")
-            report("Starting two simulated cameras …", 0.15 + 0.3 * min(1.0, (time.monotonic() - begin) / 15.0))
-            time.sleep(0.05)
-        raise SimulatorError(f"The simulated cameras were not ready within {START_TIMEOUT_S:.0f} s; see {errors}.")
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Words:
+    """How nodes are called that are being started, how many they are, and the error when they do not start."""
+
+    what: str
+    count: int
+    error: type[RhotError]
+
+
+def _await_ready(process: subprocess.Popen[bytes], output: Path, errors: Path, words: _Words, report: Report) -> None:
+    begin = time.monotonic()
+    while time.monotonic() - begin < START_TIMEOUT_S:
+        if _has_ready_line(output):
+            return
+        if process.poll() is not None:
+            lines = errors.read_text(errors="replace").strip().splitlines()
+            raise words.error(f"The {words.what} did not start: "
+                              f"{lines[-1] if lines else f'they said nothing; see {errors}'}")
+        report(f"Starting {words.count} {words.what if words.count > 1 else words.what.removesuffix('s')} …",
+               0.15 + 0.3 * min(1.0, (time.monotonic() - begin) / 15.0))
+        time.sleep(0.05)
+    raise words.error(f"The {words.what} were not ready within {START_TIMEOUT_S:.0f} s; see {errors}.")
 
 
 def show_named(what: str) -> Show:

@@ -170,7 +170,7 @@ class Controller(QObject):
         self.twin_gone = self._restarting = False
         self._was_running = opened.running
         self.rig_changed.emit()
-        if self._begin_after_opening and not opened.running:
+        if (self._begin_after_opening or opened.begin) and not opened.running:
             self.start()
         self._begin_after_opening = False
 
