@@ -1,4 +1,4 @@
-"""The first page: three ways to begin, and progress while one of them is under way."""
+"""The first page: the ways to begin, and progress while one of them is under way."""
 
 from __future__ import annotations
 
@@ -27,12 +27,13 @@ _CARD_WIDTH_PX = 300
 
 
 class WelcomePage(QWidget):
-    """Simulated rig, open a rig file, connect nodes; the last rig too when there is one."""
+    """Simulated rig, cameras of this computer, a rig file, nodes; the last rig too when there is one."""
 
     twin_asked = Signal(object)
     file_asked = Signal()
     last_asked = Signal()
     nodes_asked = Signal()
+    cameras_asked = Signal()
     cancel_asked = Signal()
 
     def __init__(self, motion: str, parent: QWidget | None = None) -> None:
@@ -58,8 +59,8 @@ class WelcomePage(QWidget):
         title = QLabel("How do you want to begin?")
         title.setFont(app_font(_TITLE_PT, bold=True))
         title.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        line = QLabel("RHOT tracks a hand that wears six colour markers with two cheap cameras. "
-                      "No camera at hand? The simulated rig shows everything.")
+        line = QLabel("RHOT tracks a hand with cheap cameras: a bare hand with one, a hand that wears six colour "
+                      "markers with two. No camera at hand? The simulated rig shows everything.")
         line.setWordWrap(True)
         line.setProperty("muted", True)
         line.setAlignment(Qt.AlignmentFlag.AlignHCenter)
@@ -79,15 +80,19 @@ class WelcomePage(QWidget):
         self.last_button.clicked.connect(self.last_asked)
         self.nodes_button = QPushButton("Connect nodes …")
         self.nodes_button.clicked.connect(self.nodes_asked)
+        self.cameras_button = QPushButton("Choose cameras …")
+        self.cameras_button.clicked.connect(self.cameras_asked)
         self.show_last("")
         cards = QGridLayout()
         cards.setSpacing(16)
         cards.addWidget(_card("Simulated rig", "Two simulated cameras look at a simulated hand, through real node "
                               "programs and the real network path.", self.motion_box, self.twin_button), 0, 0)
-        cards.addWidget(_card("Rig file", "A rig that was set up before: its cameras, lenses, marker set and hand.",
-                              self.last_button, self.file_button), 0, 1)
+        cards.addWidget(_card("Cameras of this computer", "A webcam or two, films, or a network camera such as a "
+                              "phone. One is enough to begin with a bare hand.", self.cameras_button), 0, 1)
         cards.addWidget(_card("Two nodes", "Enter the addresses of two Raspberry Pis that run rhot-node, see whether "
-                              "they answer, and write a first rig file.", self.nodes_button), 0, 2)
+                              "they answer, and write a first rig file.", self.nodes_button), 1, 0)
+        cards.addWidget(_card("Rig file", "A rig that was set up before: its cameras, lenses, marker set and hand.",
+                              self.last_button, self.file_button), 1, 1)
         page = QWidget()
         layout = QVBoxLayout(page)
         layout.setSpacing(16)

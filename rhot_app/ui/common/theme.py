@@ -128,6 +128,10 @@ def style_sheet(s: Scheme) -> str:
     QRadioButton::indicator:disabled {{ border-color: {s.border}; }}
     QRadioButton::indicator:checked {{ border-color: {s.accent}; background: qradialgradient(cx: 0.5, cy: 0.5,
         radius: 0.5, fx: 0.5, fy: 0.5, stop: 0 {s.accent}, stop: 0.6 {s.accent}, stop: 0.7 {s.panel}); }}
+    QCheckBox::indicator, QListView::indicator {{ width: 12px; height: 12px; border: 2px solid {s.muted};
+        border-radius: 3px; background: {s.panel}; }}
+    QCheckBox::indicator:disabled {{ border-color: {s.border}; }}
+    QCheckBox::indicator:checked, QListView::indicator:checked {{ border-color: {s.text}; background: {s.text}; }}
     QProgressBar {{ border: 1px solid {s.border}; border-radius: 4px; background: {s.panel}; height: 8px; }}
     QProgressBar::chunk {{ background: {s.accent}; border-radius: 3px; }}
     """

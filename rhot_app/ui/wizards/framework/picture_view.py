@@ -115,7 +115,8 @@ class PictureView(QWidget):
         if not self._image.isNull():
             painter.drawImage(place.target, self._image)
             paint_overlay(painter, self._without_words() if self.small else self._overlay, place, self._scheme)
-        paint_tag(painter, place.target.topLeft() + QPointF(6, 6), self.name, bold=True)
+        if self.name:
+            paint_tag(painter, place.target.topLeft() + QPointF(6, 6), self.name, bold=True)
         if self._image.isNull() or self._problem:
             painter.setPen(QColor(self._scheme.text))
             painter.drawText(place.target.adjusted(24, 24, -24, -24),

@@ -1,0 +1,131 @@
+"""A camera that somebody looks at before it is chosen: its newest picture, the rate that it reaches, and its faults."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.sources.cameras.camera_set import CameraSource, camera_controls
+from rhot_node.capture.camera import Camera, EndOfRecording, Rewindable
+from rhot_node.capture.open import open_camera
+from rhot_node.clock import NodeClock
+from rhot_node.config import CameraSettings
+from rhot_node.detect.image import YuvImage, to_bgr
+from rhot_node.errors import CameraError
+from rhot_node.health.checks import is_black
+
+Picture = NDArray[np.uint8]
+
+WINDOW_S: Final = 2.0
+"""s: over which the rate is measured."""
+
+PICTURE_S: Final = 1.0 / 15.0
+"""s: from one picture for the screen to the next."""
+
+SHORT: Final = 0.75
+"""Of the rate that was asked for: less is said. A webcam in the dark halves its rate."""
+
+ONE_COLOUR: Final = 1.5
+"""Grey levels: standard deviation of luma and chroma below which a picture shows nothing. A sensor's noise has more."""
+
+_READ_S = 0.1
+_STEP_PX = 8
+
+
+class CameraPreview:
+    """Reads a source in a thread of its own until `stop`. The rest may be asked by any thread."""
+
+    def __init__(self, source: CameraSource, after: CameraPreview | None = None,
+                 open_source: Callable[[str, CameraSettings, NodeClock], Camera] = open_camera) -> None:
+        """`after`: one that was stopped, whose camera may be the same; it is waited for."""
+        self.source = source
+        self.picture: Picture | None = None
+        """(H, W, 3) BGR, the newest one."""
+        self.problem = ""
+        """Why there is no picture, a sentence."""
+        self._after, self._open = after, open_source
+        self._times: deque[float] = deque()
+        self._fault = ""
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"preview of {source.title}", daemon=True)
+        self._thread.start()
+
+    @property
+    def rate_hz(self) -> float | None:
+        """Frames/s that come; None until that is measured."""
+        times = self._times.copy()
+        if len(times) < 2 or times[-1] - times[0] < 0.5 * WINDOW_S:
+            return None
+        return (len(times) - 1) / (times[-1] - times[0])
+
+    @property
+    def remark(self) -> str:
+        """What is wrong with the pictures that come, a sentence; "" for nothing."""
+        rate_hz = self.rate_hz
+        if self._fault or self.problem:
+            return self._fault
+        if rate_hz is not None and rate_hz < SHORT * self.source.fps:
+            return (f"{rate_hz:.0f} frames/s come instead of {self.source.fps:.0f}. In the dark a webcam exposes "
+                    "longer: give it more light. Two cameras on one USB hub halve each other's rate.")
+        return ""
+
+    def stop(self) -> None:
+        """Let go of the source soon; `wait` says when."""
+        self._ending.set()
+
+    def wait(self, timeout_s: float = 5.0) -> bool:
+        """Whether the source was let go of in time."""
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        if self._after is not None:
+            self._after.wait()
+            self._after = None
+        if self._ending.is_set():
+            return
+        try:
+            camera = self._open(self.source.spec, camera_controls(self.source), NodeClock())
+        except CameraError as exc:
+            self.problem = str(exc)
+            return
+        shown_s = 0.0
+        try:
+            while not self._ending.is_set():
+                try:
+                    frame = camera.read(_READ_S)
+                except EndOfRecording:
+                    if isinstance(camera, Rewindable):
+                        camera.rewind()
+                    continue
+                if frame is None:
+                    continue
+                now_s = time.monotonic()
+                self._times.append(now_s)
+                while now_s - self._times[0] > WINDOW_S:
+                    self._times.popleft()
+                if now_s - shown_s >= PICTURE_S:
+                    shown_s = now_s
+                    self._fault = fault_of(frame.image)
+                    self.picture = to_bgr(frame.image)
+        except CameraError as exc:
+            self.problem = str(exc)
+        finally:
+            camera.close()
+
+
+def fault_of(image: YuvImage) -> str:
+    """What a picture alone says against its camera; "" for nothing."""
+    if is_black(image.y):
+        return "The picture is black. Is the lens covered, or a shutter closed?"
+    spread = max(float(np.std(plane[::_STEP_PX, ::_STEP_PX])) for plane in (image.y, image.u, image.v))
+    if spread < ONE_COLOUR:
+        return ("The picture has one colour only: the camera sends nothing useful. Choose another size, or plug it in "
+                "again.")
+    return ""
