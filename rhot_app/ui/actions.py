@@ -38,6 +38,8 @@ class Actions(QObject):
         self.caps = QMenu("Cover a simulated camera", parent)
         self.caps.setToolTipsVisible(True)
         self.open = self._make("Open rig file …", "Ctrl+O", "Open a rig that was set up before.")
+        self.own_cameras = self._make("Cameras of this computer …", "", "Choose webcams, films or network cameras, "
+                                      "look at them, and track with them.")
         self.nodes = self._make("Connect nodes …", "", "Enter the addresses of two nodes, see whether they answer, and "
                                 "write a rig file for them.")
         self.export = self._make("Export recording …", "Ctrl+E", "Write a recording's hand as a file for other "
@@ -58,6 +60,7 @@ class Actions(QObject):
                                    "kept beside it.")
         self.close_rig = self._make("Close rig", "Ctrl+W", "End what the app started and go back to the first page.")
         self.quit = self._make("Quit", "Ctrl+Q", "End what the app started and close it.")
+        self.next_steps = self._make("What to do next …", "", "Say what you have, and see the steps that are missing.")
         self.wizards = [self._make(f"{wizard.title} …", "", wizard.meaning) for wizard in WIZARDS]
         self.fit = self._make("Fit the hand to pictures …", "", "Drag joints in the cameras' pictures, move sliders, "
                               "and let edges finish it: the hand's lengths and pose.")
@@ -161,12 +164,12 @@ class MainToolBar(QToolBar):
         self.controls.addSeparator()
         a = actions
         self.rig_button, self.rig_menu = self._add_menu("Rig", [
-            a.twin, a.open, a.nodes, None, a.open_recording, a.recordings, a.video, a.bookmark, a.export, None,
-            a.add_object, a.objects.menuAction(), None,
+            a.twin, a.own_cameras, a.open, a.nodes, None, a.open_recording, a.recordings, a.video, a.bookmark, a.export,
+            None, a.add_object, a.objects.menuAction(), None,
             a.outputs, a.mouse, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig,
             a.close_rig, None, a.quit])
         self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [
-            *a.wizards, a.fit, None, a.earlier, None, a.tracker, a.networks, None, a.files])
+            a.next_steps, None, *a.wizards, a.fit, None, a.earlier, None, a.tracker, a.networks, None, a.files])
         self.view_button, self.view_menu = self._add_menu("View", [
             *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, a.layers, None,
             a.dark, a.light, None, a.reset])

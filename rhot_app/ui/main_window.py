@@ -13,6 +13,8 @@ from PySide6.QtWidgets import (
     QStackedWidget,
 )
 
+from rhot_app.errors import RhotError
+from rhot_app.sources.cameras.camera_set import camera_set_of, change_observed
 from rhot_app.ui.actions import Actions, MainToolBar
 from rhot_app.ui.appearance import Appearance, DisplayPrediction
 from rhot_app.ui.backend.contract import TwinChoice
@@ -23,8 +25,9 @@ from rhot_app.ui.common.keys import bind_space
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import show_overflow
 from rhot_app.ui.common.theme import scheme_named
-from rhot_app.ui.dialogs.dialogs import Dialogs
+from rhot_app.ui.dialogs.dialogs import NEXT_STEPS, Dialogs
 from rhot_app.ui.dialogs.recordings import SHOW_FOLDER, Recordings
+from rhot_app.ui.models.next_steps import NETWORKS, TRACKER
 from rhot_app.ui.models.notice import Notice, TransientNotices
 from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of
 from rhot_app.ui.replay.windows import ReplayWindows
@@ -55,6 +58,7 @@ class MainWindow(QMainWindow):
         self.settings = settings
         self._buttons_shown: tuple[bool, bool] | None = None
         self._next_behind = 0.0
+        self._offered = ""  # the rig whose steps were shown by themselves
         self.passing = TransientNotices()
         self.dialogs = Dialogs(self)
         self.recordings = Recordings(controller, self.tell)
@@ -117,6 +121,7 @@ class MainWindow(QMainWindow):
         a.twin.triggered.connect(lambda: self.open_twin(TwinChoice(motion=self.welcome.motion)))
         a.open.triggered.connect(self.choose_rig)
         a.nodes.triggered.connect(self.connect_nodes)
+        a.own_cameras.triggered.connect(self.choose_cameras)
         a.export.triggered.connect(lambda: self.dialogs.export_recording())
         a.open_recording.triggered.connect(self.replays.choose)
         a.recordings.triggered.connect(self.replays.list)
@@ -143,12 +148,14 @@ class MainWindow(QMainWindow):
         w.file_asked.connect(self.choose_rig)
         w.last_asked.connect(lambda: self.open_rig(Path(self.settings.last_rig)))
         w.nodes_asked.connect(self.connect_nodes)
+        w.cameras_asked.connect(self.choose_cameras)
         w.cancel_asked.connect(c.cancel)
         self.screen_parts.scene.start_button.clicked.connect(c.start)
         self.advice.acted.connect(self._act)
         for plot in self.screen_parts.all_plots:
             plot.copied.connect(lambda sentence: self.tell(Notice("info", sentence)))
         c.rig_changed.connect(self._show_rig)
+        c.rig_changed.connect(self._offer_steps)
         c.busy_changed.connect(self._show_busy)
         c.failed.connect(self._show_failure)
         self.appearance.scheme_changed.connect(self._recolour_buttons)
@@ -162,6 +169,8 @@ class MainWindow(QMainWindow):
         self.actions_.earlier.triggered.connect(self.wizards.open_versions)
         self.actions_.fit.triggered.connect(self.wizards.open_fit)
         self.toolbar.calibrate_menu.aboutToShow.connect(self._show_ages)
+        self.actions_.next_steps.triggered.connect(self.show_next_steps)
+        self.wizards.closed.connect(self._continue_steps)
         self.wizards.rig_used.connect(self.rig_watch.look_soon)
         self.wizards.failed.connect(self._show_failure)
 
@@ -201,6 +210,52 @@ class MainWindow(QMainWindow):
         path = self.dialogs.connect_nodes(self.appearance.scheme)
         if path is not None:
             self.open_rig(path)
+
+    def choose_cameras(self) -> None:
+        """Choose cameras of this computer and open them."""
+        prepared = self.dialogs.choose_cameras(self.appearance.scheme)
+        if prepared is not None:
+            self.open_rig(prepared.rig_path)
+            for remark in prepared.remarks:
+                self.tell(Notice("info", remark))
+
+    def show_next_steps(self) -> None:
+        """What the rig still needs, as a list with ticks."""
+        if self.controller.opened is None:
+            return
+        steps = self.dialogs.show_next_steps(self.controller, self.appearance.scheme, self.wizards, self.settings)
+        if steps is not None:
+            steps.asked.connect(self._do_step)
+
+    def _do_step(self, action: str) -> None:
+        """Open what a step asks for; the list steps aside for a wizard, and comes back."""
+        wizard = wizard_named(action)
+        if wizard is not None:
+            self.dialogs.hide_next_steps()
+            self.wizards.open(wizard)
+        elif action == TRACKER:
+            self._change_observed()
+        elif action == NETWORKS:
+            self.dialogs.show_networks()
+        else:
+            self.choose_cameras()
+
+    def _change_observed(self) -> None:
+        """Cameras of this computer are opened again with what they are to observe; for others the tracker is asked."""
+        opened, steps = self.controller.opened, self.dialogs.next_steps
+        path = Path(opened.rig_path) if opened is not None and opened.rig_path else None
+        if path is None or steps is None or camera_set_of(path) is None:
+            self.dialogs.choose_tracker(self.controller, self.rig_watch.look_soon)
+            return
+        try:
+            change_observed(path, bare=steps.answers.wear != "paint")
+        except (RhotError, OSError) as exc:
+            self.tell(Notice("error", str(exc)))
+            return
+        self.open_rig(path)
+
+    def _continue_steps(self) -> None:
+        self.dialogs.continue_next_steps()
 
     def show_rig_file(self, page: str) -> None:
         """What the rig file says, to read."""
@@ -288,6 +343,14 @@ class MainWindow(QMainWindow):
         last = Path(self.settings.last_rig)
         self.welcome.show_last(last.name if self.settings.last_rig and last.exists() else "")
 
+    def _offer_steps(self) -> None:
+        """Show the steps once for cameras of this computer, unless somebody has had enough of them."""
+        opened = self.controller.opened
+        path = opened.rig_path if opened is not None and opened.begin else ""
+        if path and path != self._offered and self.settings.flag(NEXT_STEPS):
+            self.show_next_steps()
+        self._offered = path
+
     def _show_rig_name(self) -> None:
         opened, edited = self.controller.opened, self.rig_watch.edited
         self.toolbar.show_rig(opened.rig.name if opened is not None else "",
@@ -296,7 +359,7 @@ class MainWindow(QMainWindow):
 
     def _rig_actions(self) -> list[QAction]:
         a = self.actions_
-        return [*a.wizards, a.earlier, a.fit, a.tracker, a.outputs, a.add_object, a.close_rig,
+        return [a.next_steps, *a.wizards, a.earlier, a.fit, a.tracker, a.outputs, a.add_object, a.close_rig,
                 a.properties.menuAction(), a.frame, a.home, a.names, a.clouds, a.now, a.layers]
 
     def _show_busy(self) -> None:

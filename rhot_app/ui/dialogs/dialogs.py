@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,11 +25,15 @@ from PySide6.QtWidgets import (
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig, RigNode
+from rhot_app.sources.cameras.camera_set import Prepared
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.disposal import dispose, release_style
 from rhot_app.ui.common.guide import GuideViewer
+from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.dialogs.cameras_dialog import CamerasDialog
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
 from rhot_app.ui.dialogs.networks_dialog import NetworksDialog
+from rhot_app.ui.dialogs.next_steps import NextSteps
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
 from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
 from rhot_app.ui.dialogs.recordings import recordings_folder
@@ -37,8 +41,12 @@ from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
 from rhot_app.ui.models.palette import Scheme, hex_of
 from rhot_app.ui.mouse.window import MouseWindow
 
-if TYPE_CHECKING:  # it brings numerical code, which waits until it is wanted
+if TYPE_CHECKING:  # they bring numerical code, which waits until it is wanted
     from rhot_app.ui.dialogs.layers_dialog import LayersDialog
+    from rhot_app.ui.wizards.launcher import Launcher
+
+NEXT_STEPS = "next steps"
+"""The setting: whether the steps are shown by themselves."""
 
 
 class Dialogs:
@@ -53,6 +61,7 @@ class Dialogs:
         self.mouse: MouseWindow | None = None
         self.layers: LayersDialog | None = None
         self.export: ExportDialog | None = None
+        self.next_steps: NextSteps | None = None
 
     def _hold(self, name: str, dialog: QDialog) -> None:
         """Hold a dialog until it is closed, then let go of it."""
@@ -77,6 +86,13 @@ class Dialogs:
         dialog.finished.connect(lambda: release_style(dialog))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         return dialog.rig_path if dialog.exec() else None
+
+    def choose_cameras(self, scheme: Scheme) -> Prepared | None:
+        """The rig written for cameras of this computer; None when the person thought better of it."""
+        dialog = CamerasDialog(scheme, self._parent)
+        dialog.finished.connect(lambda: release_style(dialog))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        return dialog.prepared if dialog.exec() else None
 
     def export_recording(self, log: Path | None = None) -> None:
         """What to write of a recording, beside the window; `log` None is asked for."""
@@ -109,6 +125,33 @@ class Dialogs:
             self._hold("networks", NetworksDialog(self._parent))
         _bring_forward(self.networks)
 
+    def show_next_steps(self, controller: Controller, scheme: Scheme, wizards: Launcher,
+                        settings: Settings) -> NextSteps | None:
+        """What the rig still needs, beside the window; the dialog if it is a new one."""
+        def reasons() -> Collection[str]:
+            opened = controller.opened
+            return wizards.in_force("" if opened is None else opened.rig_path).keys()
+
+        new = self.next_steps is None
+        if new:
+            dialog = NextSteps(scheme, lambda: controller.rig, reasons, settings, self._parent)
+            dialog.never.setChecked(not settings.flag(NEXT_STEPS))
+            dialog.never.toggled.connect(lambda never: settings.set_flag(NEXT_STEPS, not never))
+            self._hold("next_steps", dialog)
+        _bring_forward(self.next_steps)
+        return self.next_steps if new else None
+
+    def hide_next_steps(self) -> None:
+        """Put the steps aside while one is done."""
+        if self.next_steps is not None:
+            self.next_steps.hide()
+
+    def continue_next_steps(self) -> None:
+        """Show the steps again that were put aside."""
+        if self.next_steps is not None:
+            self.next_steps.look()
+            _bring_forward(self.next_steps)
+
     def show_outputs(self, controller: Controller, scheme: Callable[[], Scheme], actions: Sequence[QAction],
                      rig_used: Callable[[], None]) -> None:
         """The live streams to other programs, beside the window; the keys of `actions` work there too."""
@@ -131,6 +174,8 @@ class Dialogs:
             else:
                 path = controller.opened.rig_path
                 self.tracker.follow(controller.opened.rig, Path(path) if path else None)
+        if self.next_steps is not None and controller.opened is None:
+            self.next_steps.reject()
         if self.outputs is not None:
             if controller.opened is None:
                 self.outputs.close()
@@ -174,7 +219,8 @@ class Dialogs:
 
     def close(self) -> None:
         """Close what stands beside the window."""
-        for window in (self.guide, self.tracker, self.networks, self.outputs, self.mouse, self.layers, self.export):
+        for window in (self.guide, self.tracker, self.networks, self.outputs, self.mouse, self.layers, self.export,
+                       self.next_steps):
             if window is not None:
                 window.close()
 
@@ -216,6 +262,8 @@ def baseline_text(rig: Rig) -> str:
     """Distance of the first two cameras in words."""
     if len(rig.nodes) < 2:
         return "The rig has one camera; depth needs two."
+    if not all(rig.tracked_with[:2]):
+        return f"Where {rig.nodes[0].name} and {rig.nodes[1].name} stand to each other is not known."
     first, second = (np.array(node.pose.translation_m) for node in rig.nodes[:2])
     return f"{rig.nodes[0].name} and {rig.nodes[1].name} stand {1e3 * np.linalg.norm(second - first):.1f} mm apart."
 

@@ -48,10 +48,12 @@ class RigNow:
 
 
 class Launcher(QObject):
-    """`rig_used` after a wizard or a restore has changed the rig; `failed` with a sentence when none could open."""
+    """`rig_used` after a wizard or a restore has changed the rig; `failed` with a sentence when none could open;
+    `closed` after a wizard was closed."""
 
     rig_used = Signal()
     failed = Signal(str)
+    closed = Signal()
 
     def __init__(self, connect: Callable[[], Asker], listen: Callable[[], Listener], scheme: Callable[[], Scheme],
                  memory: Memory, window: QWidget, make_solver: Callable[[], Solver] = Solver) -> None:
@@ -77,13 +79,17 @@ class Launcher(QObject):
                 action.setIcon(QIcon())
                 action.setText(f"{wizard.title} …")
             return
-        when = {**self._noted(path), **in_force(Path(path))}
+        when = self.in_force(path)
         scheme, ratio = self._scheme(), self._window.devicePixelRatioF()
         for action, wizard in zip(actions, WIZARDS, strict=True):
             done = max((at for reason, at in when.items() if reason.startswith(wizard.reason)), default=None)
             shape, tone = ("tick", scheme.good) if done is not None else ("ring", scheme.neutral)
             action.setIcon(shape_icon(shape, tone, ratio))
             action.setText(f"{wizard.title} …\t{age_text(done) if done is not None else 'not yet'}")
+
+    def in_force(self, path: str) -> dict[str, datetime]:
+        """When each thing of the rig at `path` was made that is in force, by its reason."""
+        return {**self._noted(path), **in_force(Path(path))} if path else {}
 
     def open(self, wizard: Wizard) -> None:
         """Ask engine and nodes how things stand, then show the wizard."""
@@ -146,6 +152,7 @@ class Launcher(QObject):
         if self.wizard is not None:
             dispose(self.wizard)
             self.wizard = None
+        self.closed.emit()
 
     def _show_versions(self, now: RigNow) -> None:
         self._job = None

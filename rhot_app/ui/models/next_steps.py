@@ -1,0 +1,91 @@
+"""What a rig still needs, in order, by what its owner has: the steps of the page "What do you have?". No Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Literal
+
+from rhot_app.calibration.check.camera_calibration import calibration_finding
+from rhot_app.hand.anatomy import load_hand
+from rhot_app.project import Rig
+from rhot_node.files import resource_path
+
+Wear = Literal["paint", "bare", "landmarks"]
+"""What shows the hand: painted or taped markers; a bare hand, by the networks; landmarks or nodes of one's own."""
+
+CAMERAS, TRACKER, NETWORKS, BOARD = "cameras", "tracker", "networks", "board"
+"""Actions that are no wizard; the others are the modules of `wizards.framework.plan.WIZARDS`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What somebody has."""
+
+    wear: Wear
+    cameras: Literal[1, 2]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step: whether the rig shows that it is `done`, and what opens it (`action`)."""
+
+    title: str
+    meaning: str
+    done: bool
+    action: str
+
+
+def answers_of(rig: Rig) -> Answers:
+    """What the rig as it is would be answered."""
+    return Answers("paint" if rig.painted else "bare", 1 if len(rig.nodes) == 1 else 2)
+
+
+def next_steps(answers: Answers, rig: Rig, *, networks: bool, printed: bool, reasons: Collection[str]) -> list[Step]:
+    """All steps in order. `networks`: whether the hand networks are installed here; `printed`: whether a board was;
+    `reasons`: of what is in force, as the rig's history and the wizards note them."""
+    two = answers.cameras == 2
+    measured = [node.name for node in rig.nodes if not node.intrinsics.nominal]
+    missing = [node.name for node in rig.nodes if node.intrinsics.nominal]
+    exact = rig.calibration is not None and rig.calibration.method == "exact"
+    steps = []
+    if two and len(rig.nodes) < 2:
+        steps.append(Step("Choose two cameras", "Both see the hand; 10 to 50 cm apart.", False, CAMERAS))
+    if answers.wear == "bare":
+        steps.append(Step("Install the hand networks", "They find the joints of a bare hand (36 MB).", networks,
+                          NETWORKS))
+    steps.append(_observed(answers.wear, rig))
+    steps.append(Step("Print the board", "A chessboard on A4 at 100 %, glued to something flat.",
+                      printed or exact or bool(measured), BOARD))
+    steps.append(Step("Calibrate each lens", "Until then distances are a guess." if len(missing) == len(rig.nodes) else
+                      f"Missing: {', '.join(missing)}." if missing else "All lenses are known.",
+                      exact or not missing, "lens"))
+    if two:
+        steps.append(Step("Put the cameras together", "Where they stand to each other, from the board before both.",
+                          _together(rig), "stereo"))
+    if answers.wear == "paint":
+        steps.append(Step("Teach the colours", "Which colour each marker has in this light.",
+                          exact or _noted(reasons, "colour calibration"), "colours"))
+    if answers.wear == "paint" or two:
+        own = rig.hand != load_hand(resource_path("hands", f"{rig.hand.side}.json"))
+        steps.append(Step("Measure your hand", "How long its bones are, from a minute of movement.",
+                          own or _noted(reasons, "bones", "hand adapted"), "bones" if answers.wear == "paint"
+                          else "measured"))
+    return steps
+
+
+def _observed(wear: Wear, rig: Rig) -> Step:
+    if wear == "paint":
+        return Step("Track painted markers", "Six colours: five fingertips and the wrist.", rig.painted, TRACKER)
+    return Step("Track landmarks", "The joints of a bare hand, as networks find them.",
+                not rig.painted or rig.tracker.landmarks, TRACKER)
+
+
+def _together(rig: Rig) -> bool:
+    found = calibration_finding(rig)
+    return (len(rig.nodes) > 1 and all(rig.tracked_with)
+            and (found is None or found.finding.code == "lengths_unproven"))
+
+
+def _noted(reasons: Collection[str], *beginnings: str) -> bool:
+    return any(reason.startswith(beginnings) for reason in reasons)
