@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import signal
@@ -15,11 +14,10 @@ from typing import Any
 
 import pytest
 import zmq
-from patience import PATIENCE_MS, PATIENCE_S, eventually, settled
+from patience import PATIENCE_MS, PATIENCE_S, eventually
 
 from rhot_app.keys import load_master_keys
 from rhot_app.project import load_rig
-from rhot_app.simulator.nodes import live
 from rhot_app.simulator.nodes.remote import TwinRemote
 from rhot_app.simulator.scene.scene_description import BoardShow
 from rhot_node.keys import connect_with
@@ -111,19 +109,6 @@ def test_live_twin_obeys_heals_a_killed_node_and_ends_with_its_nodes(
     assert process.wait(PATIENCE_S) == 0
     assert not any(Path(f"/proc/{pid}").exists() for pid in healed)
     assert not [*rig_path.parent.glob("*.frames"), *rig_path.parent.glob("*.ipc")], "no socket is left behind"
-
-
-def test_a_twin_is_used_while_an_engine_runs_or_the_program_that_started_it(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(live, "_LOOK_S", 0.0)
-    lock = tmp_path / "engine.lock"
-    use = live.Use(lock, unused_s=0.05)
-    assert settled(lambda: not use.over(), 0.15)
-    monkeypatch.setattr(os, "getppid", lambda: 1)
-    with lock.open("wb") as engine:
-        fcntl.flock(engine, fcntl.LOCK_EX)
-        assert settled(lambda: not use.over(), 0.15)
-    eventually(use.over)
 
 
 def test_unknown_motion_ends_with_a_sentence(tmp_path: Path) -> None:

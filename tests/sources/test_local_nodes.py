@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import fcntl
 import itertools
+import os
 import time
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from patience import eventually, settled
 
 from rhot_app.errors import SourceError
 from rhot_app.simulator.scene.scene import make_scene, node_settings, twin_defaults
@@ -65,3 +68,16 @@ def test_a_node_that_cannot_start_is_tried_again_ever_more_seldom_and_said_once(
     pauses = [later - earlier for earlier, later in itertools.pairwise(started)]
     assert pauses[0] < 1.0 and pauses[-1] == pytest.approx(8.1, abs=0.25) and sorted(pauses) == pauses
     assert caplog.text.count("no such camera") == 1
+
+
+def test_nodes_are_used_while_an_engine_runs_or_the_program_that_started_it(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local_nodes, "_LOOK_S", 0.0)
+    lock = tmp_path / "engine.lock"
+    use = local_nodes.Use(lock, unused_s=0.05)
+    assert settled(lambda: not use.over(), 0.15)
+    monkeypatch.setattr(os, "getppid", lambda: 1)
+    with lock.open("wb") as engine:
+        fcntl.flock(engine, fcntl.LOCK_EX)
+        assert settled(lambda: not use.over(), 0.15)
+    eventually(use.over)
