@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, SQUARE_MM
 from rhot_app.calibration.verdict import Verdict
-from rhot_app.errors import positive_number
+from rhot_app.errors import CalibrationError, input_file, positive_number
 
 if TYPE_CHECKING:
     from rhot_app.calibration.board.boards import Board
@@ -42,7 +42,6 @@ def rig_of(args: argparse.Namespace) -> Path:
 
 def require_folder(out: Path | None) -> None:
     """Raise CalibrationError unless a file can be written there: before the work, not after."""
-    from rhot_app.errors import CalibrationError
     from rhot_node.files import require_replaceable
 
     if out is not None and not out.parent.is_dir():
@@ -112,8 +111,8 @@ def add_board_arguments(parser: argparse.ArgumentParser) -> None:
     board = parser.add_argument_group("board")
     board.add_argument("--board", metavar="COLSxROWS",
                        help=f"inner corners of the chessboard (default {BOARD}); with --marker-mm squares of a ChArUco "
-                       f"board (default {CHARUCO})")
-    board.add_argument("--square-mm", type=positive_number, default=SQUARE_MM, metavar="S",
+                       f"board (default {CHARUCO}); or a board's file of Kalibr (.yaml) or caliscope (.toml)")
+    board.add_argument("--square-mm", type=positive_number, metavar="S",
                        help=f"side of a square, as measured (default {SQUARE_MM:g}, as rhot target draws it; printers "
                        "scale)")
     board.add_argument("--marker-mm", type=positive_number, metavar="M",
@@ -125,9 +124,16 @@ def add_board_arguments(parser: argparse.ArgumentParser) -> None:
 def board_of(args: argparse.Namespace) -> Board:
     """The board; raises CalibrationError for an impossible one."""
     from rhot_app.calibration.board.boards import DEFAULT_DICTIONARY, CharucoBoard, Chessboard, parse_size
+    from rhot_app.calibration.exchange.boards import SUFFIXES, read_board
 
+    if args.board is not None and args.board.lower().endswith(SUFFIXES):
+        if args.square_mm is not None or args.marker_mm is not None:
+            raise CalibrationError(f"{args.board} says how large the board is; leave --square-mm and --marker-mm out, "
+                                   "or give the size by numbers.")
+        return read_board(input_file(args.board))
+    square_m = 1e-3 * (args.square_mm or SQUARE_MM)
     cols, rows = parse_size(args.board or (BOARD if args.marker_mm is None else CHARUCO))
     if args.marker_mm is None:
-        return Chessboard(cols, rows, args.square_mm * 1e-3)
-    return CharucoBoard(cols, rows, args.square_mm * 1e-3, args.marker_mm * 1e-3,
+        return Chessboard(cols, rows, square_m)
+    return CharucoBoard(cols, rows, square_m, args.marker_mm * 1e-3,
                         args.dictionary or DEFAULT_DICTIONARY, args.legacy_pattern)
