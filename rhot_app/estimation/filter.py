@@ -9,7 +9,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numba import njit
@@ -210,6 +210,15 @@ JITTER = 1e-9
 """Of the variances, added before a factorisation: the rounding errors of a filtered covariance are smaller."""
 
 
+@runtime_checkable
+class Following(Process, Protocol):
+    """A process whose noise follows the motion of its state."""
+
+    def moving_as(self, *states: Array) -> Process:
+        """The process with the noise of the greatest motion in these states, whatever state is predicted."""
+        ...
+
+
 @dataclass(slots=True)
 class FilteredState:
     """One instant, s: a state with its covariance (n, n).
@@ -217,7 +226,7 @@ class FilteredState:
     `process`: leads on from here. `label`: the caller's own. `inflated` (n, n): the covariance with which it led on, if
     that was larger than the update's. What is added is noise of this instant: a later estimate corrects what follows
     it, and what came before by no more than its own covariance allows. `contradicted`: smoothing has led farther from
-    it than is possible, so it is as it was filtered, and the pass has begun anew from it.
+    it than is possible, so it is as it was filtered, and the pass has begun anew from it. `residuals`: of this instant.
     """
 
     t_s: float
@@ -227,24 +236,59 @@ class FilteredState:
     label: Any = None
     inflated: Array | None = None
     contradicted: bool = False
+    residuals: Sequence[Residual] = ()
+
+    @property
+    def begun(self) -> Array:
+        """The covariance with which it leads on."""
+        return self.covariance if self.inflated is None else self.inflated
 
 
 def smooth(filtered: Sequence[FilteredState], count: int | None = None) -> list[FilteredState]:
-    """The first `count` (None: all) of the filtered estimates, in ascending time, by all the observations."""
-    count = len(filtered) if count is None else count
+    """The first `count` (None: all) of the filtered estimates, in ascending time, by all the observations.
+
+    Where a process follows the motion, a filter knows a sudden motion only afterwards, and the pass back believes its
+    noise. So what has been smoothed is filtered and smoothed again, with the noise of the smoothed motion.
+    """
+    found = _back(filtered)
+    if len(filtered) > 1 and all(isinstance(one.process, Following) and one.residuals for one in filtered):
+        found = _back(_again(filtered, found))
+    return found[:count]
+
+
+def _again(filtered: Sequence[FilteredState], smoothed: Sequence[FilteredState]) -> Sequence[FilteredState]:
+    """The estimates filtered again from the first of them, each step with the noise of the smoothed motion at both
+    its ends; as they were if the filter contradicts itself."""
+    found = [filtered[0]]
+    for number in range(1, len(filtered)):
+        before, here = found[-1], filtered[number]
+        assert isinstance(before.process, Following)
+        process = before.process.moving_as(smoothed[number - 1].state, smoothed[number].state)
+        found[-1] = before = replace(before, process=process)
+        prior = process.predict(before.state, before.begun, here.t_s - before.t_s)
+        try:
+            knot = update(process, here.t_s, prior, here.residuals)
+        except np.linalg.LinAlgError:
+            return filtered
+        inflated = None if here.inflated is None else knot.covariance + here.inflated - here.covariance
+        found.append(replace(here, state=knot.state, covariance=knot.covariance, inflated=inflated))
+    return found
+
+
+def _back(filtered: Sequence[FilteredState]) -> list[FilteredState]:
+    """One pass back."""
     found: list[FilteredState] = []
     state, covariance = np.empty(0), np.empty((0, 0))
     for number in range(len(filtered) - 1, -1, -1):
         here = filtered[number]
         if number == len(filtered) - 1:
-            state, covariance = here.state, here.covariance if here.inflated is None else here.inflated
+            state, covariance = here.state, here.begun
         else:
             state, covariance = _step_back(here, filtered[number + 1], state, covariance)
         contradicted = _deviations(here, state) > CONTRADICTION
         if contradicted:
-            state, covariance = here.state, here.covariance if here.inflated is None else here.inflated
-        if number < count:
-            found.append(replace(here, state=state, covariance=covariance, contradicted=contradicted))
+            state, covariance = here.state, here.begun
+        found.append(replace(here, state=state, covariance=covariance, contradicted=contradicted))
         if here.inflated is not None:
             state, covariance = _before_inflation(here, here.inflated, state, covariance)
     return found[::-1]
@@ -266,8 +310,7 @@ def _deviations(here: FilteredState, state: Array) -> float:
     step = here.process.difference(state, here.state)
     if not np.isfinite(step).all():
         return np.inf
-    covariance = here.covariance if here.inflated is None else here.inflated
-    return float(np.sqrt(max(_divide(step[None], covariance)[0] @ step, 0.0) / len(step)))
+    return float(np.sqrt(max(_divide(step[None], here.begun)[0] @ step, 0.0) / len(step)))
 
 
 def _step_back(here: FilteredState, after: FilteredState, state: Array, covariance: Array) -> tuple[Array, Array]:
@@ -277,7 +320,7 @@ def _step_back(here: FilteredState, after: FilteredState, state: Array, covarian
     covariances, so that going back over many steps is stable.
     """
     process, dt_s = here.process, after.t_s - here.t_s
-    begun = here.covariance if here.inflated is None else here.inflated
+    begun = here.begun
     if dt_s <= 0.0:  # two frames of one instant: the same state
         return state, covariance
     predicted, predicted_covariance = process.predict(here.state, begun, dt_s)

@@ -195,7 +195,7 @@ class RecordingEstimator(Estimator):
             instant.filtered, instant.t_ns = knot, self._time_ns(knot.t_s)
         self._conclude(self._smoother.add(FilteredState(
             knot.t_s, knot.state, knot.covariance, _copied(self._process) if process is None else process, instant,
-            inflated)))
+            inflated, residuals=knot.residuals)))
 
     def _smooth_buffered(self, inflated: Array | None = None) -> None:
         for knot in self._buffered:
@@ -205,7 +205,7 @@ class RecordingEstimator(Estimator):
     def _conclude(self, estimates: list[FilteredState]) -> None:
         for estimate in estimates:
             if isinstance(estimate.label, Instant):
-                estimate.label.estimate = replace(estimate, label=None)
+                estimate.label.estimate = replace(estimate, label=None, residuals=())
                 if estimate.contradicted:
                     self.diagnostics.warn(CONTRADICTED)
                 self._final.append(estimate.label)

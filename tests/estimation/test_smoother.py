@@ -1,5 +1,7 @@
 """The smoother: the textbook's on a linear process, the same in chunks, and nearer to the truth where markers hide."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linear_motion import ConstantVelocity, kalman_update, place
@@ -218,6 +220,35 @@ def test_a_pass_that_contradicts_its_filter_falls_back_to_it():
     np.testing.assert_array_equal(found[12].covariance, knots[12].covariance)
     for got, (state, _) in zip(found[:12], textbook(knots[:13]), strict=False):
         np.testing.assert_allclose(got.state, state, atol=1e-6)
+
+
+class Restless(ConstantVelocity):
+    """Driven the harder, the faster it is estimated to move."""
+
+    def __init__(self, speed=None):
+        self.speed = speed
+
+    def predict(self, state, covariance, dt_s):
+        self.density = 1e-4 + 100.0 * min((state[1] if self.speed is None else self.speed) ** 2, 4.0)
+        return super().predict(state, covariance, dt_s)
+
+    def moving_as(self, *states):
+        return Restless(max(abs(state[1]) for state in states))
+
+
+def test_a_sudden_motion_is_smoothed_with_the_noise_of_a_motion():
+    """At its first instant the filter still takes the process to rest, and so would one pass back."""
+    rng, process, times = np.random.default_rng(1), Restless(), 0.0125 * np.arange(1, 1000)
+    truth = 0.8 * np.clip(np.sin(3.0 * times), 0.0, 0.7) ** 2
+    estimate, found = IteratedFilter(process, 2), []
+    estimate.start(0.0, np.zeros(2), np.diag([1.0, 0.01]))
+    for t, value in zip(times, truth, strict=True):
+        residuals = [place(value + rng.normal(0.0, 0.003), 9e-6)]
+        knot = estimate.add(t, residuals)
+        found.append(FilteredState(t, knot.state, knot.covariance, process, residuals=residuals))
+    once = smooth([replace(one, residuals=()) for one in found])
+    off, better = (np.abs([one.state[0] for one in some] - truth) for some in (once, smooth(found)))
+    assert better.max() < 0.7 * off.max() and rms(better) < 0.8 * rms(off)
 
 
 @pytest.mark.parametrize("motion", MOTIONS)

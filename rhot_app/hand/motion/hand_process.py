@@ -10,6 +10,7 @@ pose prior (`null_space`).
 
 from __future__ import annotations
 
+import copy
 import math
 
 import numpy as np
@@ -61,7 +62,7 @@ class HandProcess:
                  fastest: float, bias: Array, bias_s: float | Array) -> None:
         self.dh, self._limits, self.mean = dh, limits, mean
         self._angles, self._information = covariance, np.linalg.inv(covariance)
-        self._spread, self._slowest, self._fastest = spread, slowest, fastest
+        self._spread, self._slowest, self._fastest = spread, slowest, np.full(3, fastest)
         self._bias_s = np.full(len(bias), bias_s, dtype=np.float64)
         self._marked = len(dh.point_row) > 0
         self.size = MOTION + 3 * len(bias)
@@ -151,6 +152,12 @@ class HandProcess:
         _rates(state, self._information, self._spread, self._slowest, self._fastest, out)
         return out
 
+    def moving_as(self, *states: Array) -> HandProcess:
+        """The same process at the greatest rates of these states, whatever state is predicted."""
+        out = copy.copy(self)
+        out._slowest = out._fastest = np.max([self.rates(state) for state in states], axis=0)
+        return out
+
 
 @njit(cache=True)
 def _retract(state, step):
@@ -188,14 +195,14 @@ def _rates(state, information, spread, slowest, fastest, out):
             speed += state[VELOCITY + 3 * group + i] ** 2
             acceleration += state[ACCELERATION + 3 * group + i] ** 2
         total = speed / spread[group] ** 2 + math.sqrt(acceleration / 3.0) / spread[group]
-        out[group] = min(math.sqrt(slowest[group] ** 2 + total), fastest)
+        out[group] = min(math.sqrt(slowest[group] ** 2 + total), fastest[group])
     speed = acceleration = 0.0
     for i in range(21):
         for j in range(21):
             speed += state[VELOCITY + 6 + i] * information[i, j] * state[VELOCITY + 6 + j]
             acceleration += state[ACCELERATION + 6 + i] * information[i, j] * state[ACCELERATION + 6 + j]
     total = 3.0 * speed / 21.0 + math.sqrt(max(acceleration, 0.0) / 21.0)
-    out[2] = min(math.sqrt(slowest[2] ** 2 + total), fastest)
+    out[2] = min(math.sqrt(slowest[2] ** 2 + total), fastest[2])
 
 
 @njit(cache=True)
