@@ -58,6 +58,12 @@ class _Track:
         extent = float(np.ptp(points[np.isfinite(points[:, 0])], axis=0).max())
         return float(off[shared].mean()) / max(extent, 1.0)
 
+    def covers(self, points: Array, t_ns: int) -> bool:
+        """Whether its box overlaps that of landmarks (21, 2) px."""
+        there = self.points + self.velocity * (t_ns - self.t_ns)
+        return bool(np.all((np.nanmin(there, axis=0) < np.nanmax(points, axis=0))
+                           & (np.nanmin(points, axis=0) < np.nanmax(there, axis=0))))
+
     def follow(self, points: Array, right: float, t_ns: int) -> None:
         """Take what a later frame shows of the hand."""
         since_ns = t_ns - self.t_ns
@@ -113,13 +119,17 @@ class LandmarkMarkers:
 
     def _assigned(self, found: Sequence[LandmarkedHand], t_ns: int) -> list[LandmarkedHand | None]:
         """Which hand of a frame is which of the rig's: the likeliest by their sides, and by what they were before.
-        None: rather none of them."""
+        None: rather none of them. Where two hands lie on each other, one of which the networks say that it is of the
+        other side than before is none: they take parts of the one before it for it."""
         tracks = self._followed(found, t_ns)
+        mistaken = {k for k, (one, track) in enumerate(zip(found, tracks, strict=True))
+                    if _log_odds(one.right) * math.copysign(1.0, track.right) < -HYSTERESIS
+                    and any(other is not track and other.covers(track.points, t_ns) for other in self._tracks)}
         best: tuple[int | None, ...] = (None,) * len(self._hands)
         most = 0.0
         for choice in product((None, *range(len(found))), repeat=len(self._hands)):
             chosen = [k for k in choice if k is not None]
-            if len(set(chosen)) < len(chosen):
+            if len(set(chosen)) < len(chosen) or mistaken.intersection(chosen):
                 continue
             gain = 0.0
             for number, k in enumerate(choice):
@@ -129,7 +139,8 @@ class LandmarkMarkers:
             if gain > most:
                 most, best = gain, choice
         for k, track in enumerate(tracks):
-            track.hand = best.index(k) if k in best else None
+            if k not in mistaken:
+                track.hand = best.index(k) if k in best else None
         return [None if k is None else found[k] for k in best]
 
     def _followed(self, found: Sequence[LandmarkedHand], t_ns: int) -> list[_Track]:
@@ -139,8 +150,7 @@ class LandmarkMarkers:
         for one in found:
             points = np.array(one.points)
             points[points[:, 2] <= 0.0] = np.nan
-            odds = min(max(one.right, 1.0 - PROBABILITY_MAX), PROBABILITY_MAX)
-            hands.append((points[:, :2], math.log(odds / (1.0 - odds))))
+            hands.append((points[:, :2], _log_odds(one.right)))
         pairs = sorted((track.distance(points, t_ns), k, number) for number, track in enumerate(self._tracks)
                        for k, (points, _) in enumerate(hands))
         of_hand: dict[int, _Track] = {}
@@ -154,3 +164,8 @@ class LandmarkMarkers:
                 of_hand[k] = _Track(t_ns, points, np.zeros(2), right)
                 self._tracks.append(of_hand[k])
         return [of_hand[k] for k in range(len(found))]
+
+
+def _log_odds(right: float) -> float:
+    odds = min(max(right, 1.0 - PROBABILITY_MAX), PROBABILITY_MAX)
+    return math.log(odds / (1.0 - odds))

@@ -140,6 +140,17 @@ def test_hands_that_cross_keep_their_names_though_one_is_hidden_and_the_sides_ar
     assert there.sum() == 34
 
 
+@pytest.mark.parametrize(("apart", "side", "taken"), [(10.0, 0.1, False), (10.0, 0.9, True), (300.0, 0.1, True)])
+def test_what_lies_on_another_hand_and_looks_like_that_is_not_the_hand_behind_it(apart, side, taken) -> None:
+    """The networks find the left hand twice: in its own region, and in that of the right hand behind it."""
+    whole = [hand(100.0, 0.02), hand(100.0 + apart, 0.98)]
+    frames = [whole] * 20 + [[whole[0], hand(100.0 + apart, side)]] * 2 + [whole] * 5
+    found = followed(two_handed_rig(), frames)
+    assert np.isfinite(found[20:22, 0]).all() == taken and np.isfinite(found[20:22, 0]).any() == taken
+    np.testing.assert_array_equal(np.delete(found, [20, 21], axis=0), np.full((25, 2), [100.0 + apart, 100.0]))
+    assert (found[:, 1] == 100.0).all()
+
+
 def test_of_two_hands_of_the_rigs_side_the_one_that_was_there_stays() -> None:
     rig = msgspec.structs.replace(landmark_rig(), markers=LANDMARKS21)
     frames = [[hand(100.0, 0.9)]] * 5 + [[hand(400.0, 0.95), hand(100.0, 0.9)]] * 30

@@ -149,6 +149,19 @@ def test_one_camera_keeps_the_hand_and_says_that_it_knows_the_distance_less():
     assert np.abs(errors @ along).max() < 0.15 * DISTANCE_M
 
 
+@pytest.mark.parametrize("hidden", [range(21), range(12)])
+def test_a_hand_that_the_newest_frames_do_not_show_is_not_called_tracking(hidden):
+    """Most of it at least: its motion is only predicted then."""
+    end_ns, frames = EPOCH_NS + 10**9, []
+    for frame in detected_landmarks(RIG, hand(), 1):
+        lost = (np.arange(21)[:, None] == hidden).any(axis=1) & (frame.t_row0_master_ns > end_ns)
+        frames.append(replace(frame, pixels=np.where(lost[:, None], np.nan, frame.pixels),
+                              flags=np.where(lost, int(MarkerFlag.LOST), 0).astype(np.uint16)))
+    after = [state.condition for state in states_of(RIG, frames) if state.t_master_ns > end_ns]
+    assert Condition.TRACKING not in after[4:] and Condition.PARTIAL in after[:4]
+    assert after[2:4] == [Condition.PARTIAL] * 2, "from their second frames on"
+
+
 def test_one_wrong_landmark_does_not_take_another_ones_place():
     """The index fingertip reported where the middle one is: a detector errs so, and no painted marker is confused."""
     truth, frames = hand("rest"), []

@@ -177,7 +177,9 @@ class EstimatorStates:
         locate_all(aligned, observations.covariances, fresh & (np.count_nonzero(fresh, axis=0) > 1), rig.intrinsics,
                    rig.cameras, self._shapes, raw, raw_covariances, errors)
         palm = _conclude(covariance, covariances, shown, m.finger, markers, joints, angles, angle_sd)
-        in_sight = (np.count_nonzero(age <= 2 * observations.fresh_ns[:, None], axis=0) > 1).all()
+        # two frames may be missing, but not of most markers: without any, a fast hand is centimetres off
+        in_sight = ((np.count_nonzero(age <= 2 * observations.fresh_ns[:, None], axis=0) > 1).all()
+                    and np.mean(np.count_nonzero(fresh, axis=0) > 1) > 0.5)
         world, deviation = np.eye(4), np.sqrt(np.maximum(np.diag(covariance), 0.0))
         world[:3] = state[:ANGLES].reshape(3, 4)
         return HandState(
