@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 from bench import START_S, TEST_S, node_status, wait_until
+from network_pictures import sending
 from patience import eventually
 
 from rhot_app.engine.client import EngineClient
@@ -78,6 +79,23 @@ def test_two_films_are_seen_and_a_dead_node_is_started_again(session: Session, t
                    "both films again")
     again = Session(session.directory)
     assert again.attach(quiet).begin is False, "an attached window leaves the tracking as it is"
+
+
+@pytest.mark.timeout(TEST_S)
+def test_a_network_camera_that_goes_and_comes_again_is_tracked_with_again(session: Session) -> None:
+    with EngineClient(session.directory) as client:
+        def is_in(state: str, *words: str) -> bool:
+            status = node_status(client, "camera 1")
+            return status is not None and status.state == state and all(word in status.message for word in words)
+
+        with sending() as (address, _):
+            session.open_rig(prepare(check_sources([f"{address}/video"])).rig_path, quiet)
+            client.command("start")
+            wait_until(client, lambda: is_in("streaming"), START_S, "pictures")
+        wait_until(client, lambda: is_in("fault", "program that sends them"), START_S, "why there are none")
+        with sending(int(address.rpartition(":")[2])):
+            wait_until(client, lambda: is_in("streaming"), START_S, "pictures again")
+            session.close()
 
 
 @pytest.mark.timeout(TEST_S)

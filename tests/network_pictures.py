@@ -39,9 +39,9 @@ class Sender(BaseHTTPRequestHandler):
 
 
 @contextlib.contextmanager
-def sending() -> Iterator[tuple[str, threading.Event]]:
-    """The server's address, and what ends its pictures."""
-    with ThreadingHTTPServer(("127.0.0.1", 0), Sender) as server:
+def sending(port: int = 0) -> Iterator[tuple[str, threading.Event]]:
+    """The server's address, and what ends its pictures. `port` 0: any free one."""
+    with ThreadingHTTPServer(("127.0.0.1", port), Sender) as server:
         server.daemon_threads = True
         server.ending = threading.Event()  # type: ignore[attr-defined]
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
