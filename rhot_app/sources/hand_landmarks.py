@@ -41,13 +41,15 @@ HYSTERESIS: Final = 1.0
 @dataclass(slots=True, eq=False)
 class _Track:
     """One hand in the frames of a camera. `points` (21, 2) px at `t_ns`, NaN where there is none; `velocity` (2,)
-    px/ns; `right`: mean log odds that it is a right one; `hand`: which of the rig's it was last, None: none."""
+    px/ns; `right`: mean log odds that it is a right one; `hand`: which of the rig's it was last, None: none;
+    `mistaken`: the last frame showed another hand in its place."""
 
     t_ns: int
     points: Array
     velocity: Array
     right: float
     hand: int | None = None
+    mistaken: bool = False
 
     def distance(self, points: Array, t_ns: int) -> float:
         """Mean distance of landmarks (21, 2) px from where they are expected, as a part of their extent."""
@@ -122,9 +124,14 @@ class LandmarkMarkers:
         None: rather none of them. Where two hands lie on each other, one of which the networks say that it is of the
         other side than before is none: they take parts of the one before it for it."""
         tracks = self._followed(found, t_ns)
-        mistaken = {k for k, (one, track) in enumerate(zip(found, tracks, strict=True))
-                    if _log_odds(one.right) * math.copysign(1.0, track.right) < -HYSTERESIS
-                    and any(other is not track and other.covers(track.points, t_ns) for other in self._tracks)}
+        mistaken = set()
+        for k, (one, track) in enumerate(zip(found, tracks, strict=True)):
+            doubt = HYSTERESIS if track.mistaken else -HYSTERESIS
+            track.mistaken = (_log_odds(one.right) * math.copysign(1.0, track.right) < doubt
+                              and any(other is not track and other.covers(track.points, t_ns)
+                                      for other in self._tracks))
+            if track.mistaken:
+                mistaken.add(k)
         best: tuple[int | None, ...] = (None,) * len(self._hands)
         most = 0.0
         for choice in product((None, *range(len(found))), repeat=len(self._hands)):

@@ -7,6 +7,7 @@ across it, in front of it, so that the right one is hidden in the middle.
 
 from __future__ import annotations
 
+import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -140,6 +141,9 @@ def test_a_film_beside_its_mirrored_copy_is_two_hands_that_cross(tmp_path: Path)
         times, places = table_of(tmp_path / "hands.csv", prefix)
         frames = np.round(times * FPS).astype(int)
         off, wrong = (np.median(np.linalg.norm(places - hand[frames], axis=2), axis=1) for hand in (own, other))
+        with (tmp_path / "hands.csv").open() as file:
+            sure = np.array([row[f"{prefix}condition"] == "TRACKING" for row in csv.DictReader(file)])
+        assert sure.sum() > 5 and np.nanmax(off[sure]) < 0.05, "what is not seen is not called so"
         before = (frames >= FOUND) & (wanted[frames] > APART_PX)
         after = wanted[frames] < -APART_PX
         later = after & (frames >= np.flatnonzero(wanted < -APART_PX)[0] + 0.5 * FPS)
