@@ -121,6 +121,16 @@ class Recording:
         return 1e3 * float(np.sqrt(np.mean(np.diff(self.joints(hand, smooth)[JUDGED], 3, axis=0)**2) / 20.0))
 
 
+def recorded_states(hand) -> list:
+    """The last state of each of the frames from WHOLE on, tracked by both cameras' landmarks with `hand`."""
+    one, found = recording(), {}
+    rig = msgspec.structs.replace(one.rig, hand=hand)
+    first_s = min(table.times_s[0] for table in one.tables)
+    for first_ns, state in _states(rig, one.tables, False):
+        found[round((1e-9 * (state.t_master_ns - first_ns) + first_s) * FPS)] = state
+    return [found[WHOLE + k] for k in range(len(one.places))]
+
+
 @cache
 def recording() -> Recording:
     """The one."""
