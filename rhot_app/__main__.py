@@ -36,6 +36,7 @@ SUBCOMMANDS = {
     "bare-hand": Subcommand("rhot_app.export.track_command", "the former name of track, for one release"),
     "recover": Subcommand("rhot_app.recording.raw_log", "write a damaged log's sound records to a clean one"),
     "export": Subcommand("rhot_app.export.export_command", "write a raw log's hand as a file for other programs"),
+    "trim": Subcommand("rhot_app.export.trim_command", "take a part of a recording as a recording of its own"),
     "batch": Subcommand("rhot_app.export.batch_command", "track or export many raw logs"),
     "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
     "calibrate": Subcommand("rhot_app.calibration.calibrate_command", "calibrate from images and tables"),

@@ -85,10 +85,11 @@ class Recording:
 
     def export(self, out: str | Path, *, format: str | None = None, tracker: Tracker | None = None,
                rate_hz: float | None = None, frame: Frame = "rig", units: Units | None = None, hand: Hand = "hand",
-               smooth: bool = False, again: bool = False, progress: Progress = silent) -> Exported:
+               smooth: bool = False, fill_s: float | None = None, again: bool = False,
+               progress: Progress = silent) -> Exported:
         """Write the tracked log as a file for other programs; see `export`."""
         done = export(self.path, out, rig=self.rig, format=format, tracker=tracker, rate_hz=rate_hz, frame=frame,
-                      units=units, hand=hand, smooth=smooth, again=again, progress=progress)
+                      units=units, hand=hand, smooth=smooth, fill_s=fill_s, again=again, progress=progress)
         self.losses = done.losses
         return done
 
@@ -104,15 +105,15 @@ def open_recording(path: str | Path, rig: Rig | str | Path | None = None) -> Rec
 
 def export(log: str | Path, out: str | Path, *, rig: Rig | None = None, format: str | None = None,
            tracker: Tracker | None = None, rate_hz: float | None = None, frame: Frame = "rig",
-           units: Units | None = None, hand: Hand = "hand", smooth: bool = False, again: bool = False,
-           progress: Progress = silent) -> Exported:
+           units: Units | None = None, hand: Hand = "hand", smooth: bool = False, fill_s: float | None = None,
+           again: bool = False, progress: Progress = silent) -> Exported:
     """Track a raw log and write it as csv, trc, c3d, bvh, gltf, npz, parquet or mcap: `format`, or the ending of `out`.
 
     The other arguments are those of ``rhot export`` (docs/export.md). `out` appears only when it is whole; an existing
     file is written over only `again`. Raises ExportError, RecordingError or RigError.
     """
     return export_log(Path(log), Path(out), format_name=format, rig=rig, again=again, progress=progress,
-                      options=ExportOptions(tracker, rate_hz, frame, units, hand, smooth))
+                      options=ExportOptions(tracker, rate_hz, frame, units, hand, smooth, fill_s))
 
 
 def load_rig(path: str | Path) -> Rig:

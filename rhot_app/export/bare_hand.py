@@ -160,10 +160,10 @@ def lost_intervals(spent: Sequence[tuple[int, bool]]) -> tuple[tuple[float, floa
 # -- What is written --------------------------------------------------------------------------------------------------
 
 def check_outputs(videos: Sequence[CameraVideo], out: Path | None, pictures: Path | None, again: bool,
-                  hand_file: Path | None) -> None:
+                  hand_file: Path | None, kept: Path | None = None) -> None:
     """Refuse what cannot be written, before anything is tracked. Raises ExportError, RigError."""
-    named = [(option, path.resolve()) for option, path in (("--out", out), ("--overlay", pictures),
-                                                           ("--adapt", hand_file)) if path is not None]
+    named = [(option, path.resolve()) for option, path in (
+        ("--out", out), ("--overlay", pictures), ("--adapt", hand_file), ("--log", kept)) if path is not None]
     for k, (option, path) in enumerate(named):
         other = next((earlier for earlier, place in named[:k] if place == path), None)
         if other is not None:
@@ -176,6 +176,8 @@ def check_outputs(videos: Sequence[CameraVideo], out: Path | None, pictures: Pat
             check_place(video.path, out, again)
         if pictures is not None:
             check_pictures(video.path, pictures, again)
+        if kept is not None:
+            check_place(video.path, kept, again, "--log")
     if hand_file is not None:
         require_hand_place(hand_file)
 

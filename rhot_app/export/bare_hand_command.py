@@ -179,4 +179,4 @@ def closing_sentences(document: dict[str, Any]) -> list[str]:
     out = [f"Computed: {document['computed_per_s']:.1f} frame sets a second overall, with reading and drawing."]
     if document["lost_s"] and document["tracked"]:
         out.append("No hand at " + ", ".join(f"{a:.2f} to {b:.2f}" for a, b in document["lost_s"]) + " s.")
-    return [*out, *(f"Written: {document[key]}" for key in ("out", "overlay", "hand_file") if document[key])]
+    return [*out, *(f"Written: {document[key]}" for key in ("out", "overlay", "log", "hand_file") if document.get(key))]

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rhot_app.errors import ExportError, refuse_existing
+from rhot_app.export.gaps import FilledGap, GapFiller, checked_fill
 from rhot_app.export.plan import ExportOptions, Plan, Units, Writer, in_frame
 from rhot_app.export.recording import RATE_AFTER_S, TrackedLog
 from rhot_app.export.resample import Resampler, checked_rate
@@ -18,29 +19,33 @@ from rhot_app.export.states import HandStates
 from rhot_app.progress import Progress, silent, within
 from rhot_app.project import Rig
 from rhot_app.tracking.smoothing import NOT_SMOOTHED
+from rhot_node.files import replacing
 
 
 @dataclass(frozen=True, slots=True)
 class Format:
     """A format: its writer as module:class, the endings of its files (the first one is given to new ones), the unit of
-    length by default, whether another can be chosen, and whether it has a rate instead of times."""
+    length by default, whether another can be chosen, whether it has a rate instead of times, and whether it says how
+    every value is known."""
 
     writer: str
     endings: tuple[str, ...]
     units: Units
     units_free: bool = True
     uniform: bool = False
+    says_knowledge: bool = False
 
 
 FORMATS: dict[str, Format] = {
-    "csv": Format("rhot_app.export.tables:CsvWriter", (".csv",), "mm"),
+    "csv": Format("rhot_app.export.tables:CsvWriter", (".csv",), "mm", says_knowledge=True),
     "trc": Format("rhot_app.export.formats.points:TrcWriter", (".trc",), "mm", uniform=True),
     "c3d": Format("rhot_app.export.formats.points:C3dWriter", (".c3d",), "mm", uniform=True),
     "bvh": Format("rhot_app.export.formats.bvh:BvhWriter", (".bvh",), "m", uniform=True),
     "gltf": Format("rhot_app.export.formats.gltf:GltfWriter", (".glb", ".gltf"), "m", units_free=False),
-    "npz": Format("rhot_app.export.tables:NpzWriter", (".npz",), "m"),
-    "parquet": Format("rhot_app.export.tables:ParquetWriter", (".parquet",), "mm"),
-    "mcap": Format("rhot_app.export.formats.mcap_file:McapWriter", (".mcap",), "m", units_free=False),
+    "npz": Format("rhot_app.export.tables:NpzWriter", (".npz",), "m", says_knowledge=True),
+    "parquet": Format("rhot_app.export.tables:ParquetWriter", (".parquet",), "mm", says_knowledge=True),
+    "mcap": Format("rhot_app.export.formats.mcap_file:McapWriter", (".mcap",), "m", units_free=False,
+                   says_knowledge=True),
     "ros2": Format("rhot_app.export.formats.ros2_file:Ros2Writer", (".mcap",), "m", units_free=False),
 }
 
@@ -86,6 +91,8 @@ def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig
     name = format_of(format_name, out)
     check_options(name, options)
     check_place(log, out, again)
+    if options.fill_s is not None and not FORMATS[name].says_knowledge:
+        check_place(log, gaps_path(out), again)
     with TrackedLog(log, rig, options.tracker, within(progress, 0.0, 0.98), smooth=options.smooth) as tracked:
         notes = _write(tracked, name, options, out, lambda: progress(f"writing {out.name}", 0.99))
         if not tracked.tracked:
@@ -101,6 +108,8 @@ def check_options(name: str | None, options: ExportOptions) -> None:
         raise ExportError(NOT_SMOOTHED)
     if options.rate_hz is not None:
         checked_rate(options.rate_hz)
+    if options.fill_s is not None:
+        checked_fill(options.fill_s)
     chosen = None if name is None else FORMATS[name]
     if chosen is not None and options.units not in (None, chosen.units) and not chosen.units_free:
         raise ExportError(f"{name} files are in {chosen.units}, as their readers expect; leave --units out.")
@@ -119,11 +128,27 @@ def check_place(log: Path, out: Path, again: bool, option: str = "--out") -> Non
     refuse_existing(out, ExportError, option, force=again)
 
 
+def gaps_path(out: Path) -> Path:
+    """Where the gaps are listed that were filled in a file which cannot say how its values are known."""
+    return out.with_name(f"{out.name}.filled.csv")
+
+
 def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path, ready: Callable[[], None]) -> list[str]:
-    with whole_file(out, ready) as path:
-        writer: Writer | None = None
+    filler = None if options.fill_s is None else GapFiller(options.fill_s)
+    writer: Writer | None = None
+    plan: Plan | None = None
+
+    def end() -> None:
+        """Beside the file, the table of its gaps, where the file itself cannot mark them."""
+        ready()
+        if not FORMATS[name].says_knowledge:
+            gaps_path(out).unlink(missing_ok=True)  # of a file that is written over
+            if filler is not None and filler.filled and plan is not None:
+                _list_gaps(gaps_path(out), filler.filled, plan)
+
+    with whole_file(out, end) as path:
         try:
-            for plan, states in _prepared(tracked, name, options, path):
+            for plan, states in _prepared(tracked, name, options, path, filler):
                 writer = writer or make_writer(name, plan)
                 writer.add(in_frame(states, options.frame))
             assert writer is not None  # else there were no states, and that is an error
@@ -132,12 +157,30 @@ def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path, re
             if writer is not None:
                 with contextlib.suppress(OSError):  # a full disk has been reported already
                     writer.close()
+    if filler is not None and filler.filled:
+        writer.notes.append(_filled_note(filler.filled, None if FORMATS[name].says_knowledge else gaps_path(out)))
     return writer.notes
 
 
-def _prepared(tracked: TrackedLog, name: str, options: ExportOptions,
-              path: Path) -> Iterator[tuple[Plan, HandStates]]:
-    """The states as the format has them, at their own times or at a rate, each with the plan of the file."""
+def _filled_note(filled: list[FilledGap], beside: Path | None) -> str:
+    hand = sum(one.last - one.first + 1 for one in filled if not one.what.startswith("marker_"))
+    where = "the columns of knowledge mark them" if beside is None else f"{beside.name} lists them"
+    return f"{len(filled)} gaps were filled, those of the hand in {hand} states; {where}"
+
+
+def _list_gaps(path: Path, filled: list[FilledGap], plan: Plan) -> None:
+    """The table of what was filled in: frames count from 1, as in the file itself; s since its first state."""
+    with replacing(path) as file:
+        file.write(b"what,first_frame,last_frame,begin_s,end_s\n")
+        for one in sorted(filled, key=lambda gap: (gap.first, gap.what)):
+            begin_s, end_s = (1e-9 * (t_ns - plan.first_ns) for t_ns in (one.begin_ns, one.end_ns))
+            file.write(f"{one.what},{one.first + 1},{one.last + 1},{begin_s:.6f},{end_s:.6f}\n".encode())
+
+
+def _prepared(tracked: TrackedLog, name: str, options: ExportOptions, path: Path,
+              filler: GapFiller | None) -> Iterator[tuple[Plan, HandStates]]:
+    """The states as the format has them, at their own times or at a rate, with their gaps filled, each with the plan
+    of the file."""
     held: list[HandStates] = []  # until the cameras' rate is known
     resampler: Resampler | None = None
     plan: Plan | None = None
@@ -158,8 +201,12 @@ def _prepared(tracked: TrackedLog, name: str, options: ExportOptions,
                         tracked.wall_clock_offset_ns)
         for states in held:
             for given in [states] if resampler is None else resampler.take(states):
-                yield plan, given
+                for filled in [given] if filler is None else filler.take(given):
+                    yield plan, filled
         held = []
+    if filler is not None and plan is not None:
+        for filled in filler.finish():
+            yield plan, filled
 
 
 def _ended(blocks: Iterator[HandStates]) -> Iterator[HandStates | None]:

@@ -46,6 +46,9 @@ def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -
                         help="unit of length (default: what the format's readers expect)")
     parser.add_argument("--hand", choices=("hand", "other_hand"), default="hand",
                         help="which of a rig's two hands a bvh file gets (default hand)")
+    parser.add_argument("--fill", type=positive_number, default=None, metavar="S",
+                        help="fill gaps of up to so many seconds by interpolation; what is filled is marked (default: "
+                             "gaps stay)")
     parser.add_argument("--smooth", action="store_true",
                         help="let every state use what came after it as well (estimator)")
 
@@ -76,4 +79,4 @@ def options_of(args: argparse.Namespace) -> ExportOptions:
     from rhot_app.export.plan import ExportOptions
 
     return ExportOptions(tracker=args.tracker, rate_hz=args.rate, frame=args.frame, units=args.units, hand=args.hand,
-                         smooth=args.smooth)
+                         smooth=args.smooth, fill_s=args.fill)

@@ -32,6 +32,7 @@ from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.landmarks import ANATOMY_SD_M, NOISE_M
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, landmark_markers
+from rhot_app.recording.films import FILMS, NamedFilm
 from rhot_app.recording.landmark_log import FIRST_NS, HandFilm, landmark_order, write_hand_log
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.rig_history import accept_hand
@@ -155,8 +156,8 @@ def _measured_hand(rig: Rig, times_s: NDArray[np.float64], positions: NDArray[np
 
 def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: bool = False, measure: bool = True,
                     unknown_size: bool = False, smooth: bool = False, out: Path | None = None,
-                    pictures: Path | None = None, again: bool = False, hand_file: Path | None = None,
-                    progress: Progress = silent) -> LandmarkSummary:
+                    pictures: Path | None = None, kept: Path | None = None, again: bool = False,
+                    hand_file: Path | None = None, progress: Progress = silent) -> LandmarkSummary:
     """Track the hands of `rig`, whose nodes are the videos' cameras in their order.
 
     `either_side`: the hand is a shipped one of the side that the networks find more often. `measure`: measure the
@@ -164,10 +165,11 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: boo
     measured, estimate the hands' size. `out`: a table of the states (docs/export.md), one of every frame set, whose
     times are the film's. `pictures`: an .avi or .mp4 file, or a folder of PNG files, with the landmarks and the hands.
     `hand_file`: where the rig's hand is written with its measured bones; what was there is kept beside it, and a loss
-    is noted where they were not measured (`errors.note_loss`). Files appear when they are whole. Raises KeypointError
-    without networks, RecordingError, ExportError, RigError.
+    is noted where they were not measured (`errors.note_loss`). `kept`: a raw log of what the networks found, with the
+    rig that was tracked and the names of the films, which is replayed and exported as any other. Files appear when they
+    are whole. Raises KeypointError without networks, RecordingError, ExportError, RigError.
     """
-    check_outputs(videos, out, pictures, again, hand_file)
+    check_outputs(videos, out, pictures, again, hand_file, kept)
     begun, share, base = time.perf_counter(), 0.9 / len(videos), rig
     films = []
     for number, video in enumerate(videos):
@@ -190,6 +192,8 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: boo
                 bones += " They are of one picture: their spread says nothing."
         if unknown_size and rig.hand == base.hand:
             rig = msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, float_scale=True))
+        if kept is not None:
+            write_hand_log(kept, rig, films, {FILMS: _names(videos, films, first_s)})
         progress("tracking", 0.92)
         seen = _seen(rig, log)
         states = list(_one_of_each_instant(states_of_log(rig, log, smooth), round(1e9 * half_s)))
@@ -228,6 +232,13 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: boo
         figures=figures,
         adapted=hand_file is not None and _adapted(
             hand_file, rig.hand, rig.hand != base.hand and not still, bones))
+
+
+def _names(videos: Sequence[CameraVideo], films: Sequence[HandFilm], first_s: float) -> Any:
+    """What a log's header says of the films that it was made of; `first_s`: of the first picture of all."""
+    return msgspec.to_builtins({video.camera: NamedFilm(
+        str(video.path.absolute()), FIRST_NS + round(1e9 * (float(film.times_s[0]) - first_s)),
+        None if video.stamped else 1e9 / video.period_ns) for video, film in zip(videos, films, strict=True)})
 
 
 def _side_of(films: Sequence[HandFilm]) -> str:

@@ -79,7 +79,8 @@ class ExportOptions:
     """How a recording is exported. None leaves a choice to the rig (`tracker`) or to the format (`rate_hz`, `units`).
 
     `hand`: which of the rig's hands a format gets that holds a single one (BVH). `smooth`: every state uses the whole
-    recording, not only what came before it; the estimator alone can.
+    recording, not only what came before it; the estimator alone can. `fill_s`: gaps up to this length are filled
+    (`rhot_app.export.gaps`); None: none is.
     """
 
     tracker: Tracker | None = None
@@ -88,6 +89,7 @@ class ExportOptions:
     units: Units | None = None
     hand: Hand = "hand"
     smooth: bool = False
+    fill_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,25 +12,28 @@ from pathlib import Path
 
 from rhot_app.errors import ExportError, RhotError
 from rhot_app.export.export import Exported, check_options, export_log
+from rhot_app.export.gaps import GapFiller
 from rhot_app.export.plan import ExportOptions, in_frame
 from rhot_app.export.recording import TrackedLog
 from rhot_app.export.resample import Resampler
-from rhot_app.export.states import HandStates
+from rhot_app.export.states import HandStates, joined
 from rhot_app.progress import Progress, silent
+from rhot_app.project import Rig
 
 _LOOK_S = 0.1
 _END_S = 10.0
 
 
 def export_apart(log: Path, out: Path, format_name: str, options: ExportOptions,
-                 progress: Progress = silent) -> Exported:
-    """`export_log` in another process; an existing `out` is written over. Raises ExportError with its sentence.
+                 progress: Progress = silent, rig: Rig | None = None) -> Exported:
+    """`export_log` in another process; `rig` None is the log's own. An existing `out` is written over. Raises
+    ExportError with its sentence.
 
     An exception raised from `progress`, which is asked ten times a second, ends the export; nothing is left of it.
     """
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
-    child = context.Process(target=_export, args=(there, log, out, format_name, options), daemon=True)
+    child = context.Process(target=_export, args=(there, log, out, format_name, options, rig), daemon=True)
     child.start()
     there.close()
     last = ("starting", 0.0)
@@ -60,7 +63,8 @@ def export_apart(log: Path, out: Path, format_name: str, options: ExportOptions,
         here.close()
 
 
-def _export(there: Connection, log: Path, out: Path, format_name: str, options: ExportOptions) -> None:
+def _export(there: Connection, log: Path, out: Path, format_name: str, options: ExportOptions,
+            rig: Rig | None) -> None:
     """The other process."""
     def report(text: str, fraction: float) -> None:
         try:
@@ -70,18 +74,24 @@ def _export(there: Connection, log: Path, out: Path, format_name: str, options: 
 
     with contextlib.suppress(BrokenPipeError, KeyboardInterrupt):
         try:
-            exported = export_log(log, out, format_name=format_name, options=options, again=True, progress=report)
+            exported = export_log(log, out, format_name=format_name, rig=rig, options=options, again=True,
+                                  progress=report)
             there.send(("done", exported))
         except (RhotError, OSError) as exc:
             there.send(("failed", str(exc)))
 
 
-def first_states(log: Path, format_name: str, options: ExportOptions, count: int) -> HandStates:
-    """The first `count` states or fewer as they would be exported. Raises as `export_log` does."""
+def first_states(log: Path, format_name: str, options: ExportOptions, count: int,
+                 rig: Rig | None = None) -> HandStates:
+    """The first `count` states or fewer as they would be exported; `rig` None is the log's own. Raises as `export_log`
+    does."""
     check_options(format_name, options)
-    with TrackedLog(log, None, options.tracker, smooth=options.smooth) as tracked:
+    with TrackedLog(log, rig, options.tracker, smooth=options.smooth) as tracked:
         (block, *_) = itertools.islice(tracked.blocks(), 1)
         if options.rate_hz is not None:
             resampler = Resampler(options.rate_hz, 1.0 / (tracked.camera_rate_hz or options.rate_hz))
             block = next(resampler.take(block), block)
+        if options.fill_s is not None:
+            filler = GapFiller(options.fill_s)
+            block = joined([*filler.take(block), *filler.finish()])
         return in_frame(block.where(slice(count)), options.frame)

@@ -106,7 +106,8 @@ def _forward(times: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 def _mixed(first: HandStates, second: HandStates, weight: NDArray[np.float64]) -> HandStates:
     """Between two states each; `weight` (N,) 0..1 is the second one's."""
-    changed: dict[str, Any] = {name: _linear(getattr(first, name), getattr(second, name), weight) for name in _LINEAR}
+    changed: dict[str, Any] = {name: interpolated(getattr(first, name), getattr(second, name), weight)
+                               for name in _LINEAR}
     for name in ARRAYS:
         if name.endswith("knowledge"):
             part = weight.reshape(-1, *[1] * (getattr(first, name).ndim - 1))
@@ -115,7 +116,8 @@ def _mixed(first: HandStates, second: HandStates, weight: NDArray[np.float64]) -
     worse = (_SEVERITY[second.condition] > _SEVERITY[first.condition]) & (weight > 0.0)
     other = None if first.other is None or second.other is None else _mixed(first.other, second.other, weight)
     return replace(first, **changed, condition=np.where(worse, second.condition, first.condition),
-                   world_from_palm=_moved(first.world_from_palm, second.world_from_palm, weight), other=other,
+                   world_from_palm=interpolated_poses(first.world_from_palm, second.world_from_palm, weight),
+                   other=other,
                    objects=tuple(_mixed_object(*pair, weight)
                                  for pair in zip(first.objects, second.objects, strict=True)))
 
@@ -124,23 +126,25 @@ def _mixed_object(first: ObjectStates, second: ObjectStates, weight: NDArray[np.
     """Between two states each; the less certain validity of the two, and contacts that both have."""
     later = weight > 0.0
     worse = (_UNSURE[second.validity] > _UNSURE[first.validity]) & later
-    changed: dict[str, Any] = {name: _linear(getattr(first, name), getattr(second, name), weight)
+    changed: dict[str, Any] = {name: interpolated(getattr(first, name), getattr(second, name), weight)
                                for name in ("covariance", "velocity", "distances", "distance_sd")}
     return replace(first, **changed, validity=np.where(worse, second.validity, first.validity),
-                   world_from_object=_moved(first.world_from_object, second.world_from_object, weight),
+                   world_from_object=interpolated_poses(first.world_from_object, second.world_from_object, weight),
                    contacts=np.where(later[:, None], first.contacts & second.contacts, first.contacts))
 
 
-def _linear(first: NDArray[Any], second: NDArray[Any], weight: NDArray[np.float64]) -> NDArray[Any]:
+def interpolated(first: NDArray[Any], second: NDArray[Any], weight: NDArray[np.float64]) -> NDArray[Any]:
+    """(N, ...) between two rows each; `weight` (N,) 0..1 is the second one's."""
     part = weight.reshape(-1, *[1] * (first.ndim - 1))
     return np.where(part > 0.0, first + part * (second - first), first)
 
 
-def _moved(first: NDArray[Any], second: NDArray[Any], weight: NDArray[np.float64]) -> NDArray[Any]:
-    """Rigid transforms (N, 4, 4) between two each: the turn along its own axis, at a part of its angle."""
+def interpolated_poses(first: NDArray[Any], second: NDArray[Any], weight: NDArray[np.float64]) -> NDArray[Any]:
+    """Rigid transforms (N, 4, 4) between two each: the turn along its own axis, at a part of its angle. `weight` (N,)
+    0..1 is the second one's."""
     from scipy.spatial.transform import Rotation
 
-    out = _linear(first, second, weight)
+    out = interpolated(first, second, weight)
     turning = (weight > 0.0) & np.isfinite(first[:, 0, 0]) & np.isfinite(second[:, 0, 0])
     if turning.any():
         begin = Rotation.from_matrix(first[turning, :3, :3])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.objects.state import Validity
-from rhot_app.state import Condition, HandState
+from rhot_app.state import Condition, HandState, Knowledge
 
 if TYPE_CHECKING:
     import pandas
@@ -24,6 +24,9 @@ CONDITIONS: tuple[Condition, ...] = tuple(Condition)
 
 VALIDITIES: tuple[Validity, ...] = tuple(Validity)
 """Likewise of a validity's code."""
+
+FILLED = max(Knowledge) + 1
+"""Beside the codes of `Knowledge`: lies between values that are known, filled in by `rhot_app.export.gaps`."""
 
 BLOCK = 256
 """States that travel together through an export: some 2 MB."""
@@ -69,7 +72,7 @@ class HandStates:
     marker_positions: Array  # (N, M, 3) m
     marker_raw_positions: Array  # (N, M, 3) m
     marker_covariances: Array  # (N, M, 3, 3) m^2
-    marker_knowledge: Codes  # (N, M) Knowledge
+    marker_knowledge: Codes  # (N, M) Knowledge or FILLED
     epipolar_error_px: Array  # (N, M)
     joint_positions: Array  # (N, 21, 3) m
     joint_covariances: Array  # (N, 21, 3, 3) m^2
@@ -104,6 +107,11 @@ class HandStates:
     def tracked(self) -> Mask:
         """(N,) whether the hand is TRACKING or PARTIAL."""
         return np.asarray(_TRACKED[self.condition])
+
+    @property
+    def present(self) -> Mask:
+        """(N,) whether there is a hand: tracked, or filled in."""
+        return np.asarray(self.tracked | (self.palm_knowledge == FILLED))
 
     def map(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> HandStates:
         """The states with every array changed, those of the other hand too."""
@@ -187,6 +195,6 @@ def in_blocks(states: Iterable[HandState], size: int = BLOCK) -> Iterator[HandSt
 
 
 def hidden_where_lost(positions: Array, states: HandStates) -> Array:
-    """Positions (N, P, 3) with NaN where the hand is not tracked: for formats that cannot say how a point is known."""
-    return np.where(states.tracked[:, None, None], positions, np.nan)
+    """Positions (N, P, 3) with NaN where there is no hand: for formats that cannot say how a point is known."""
+    return np.where(states.present[:, None, None], positions, np.nan)
 

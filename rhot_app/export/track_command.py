@@ -27,6 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--bones", choices=("measured", "rig"), default="measured",
                         help="the hand's bones: measured from the landmarks of two cameras (default), or as the rig "
                              "has them")
+    parser.add_argument("--log", type=Path, metavar="FILE",
+                        help="write the landmarks as a raw log, too, which the app replays beside the films' pictures")
     parser.add_argument("--smooth", action="store_true", help="every state uses what came after it as well")
     name = parser.prog
     add_examples(parser, f"{name} left=left.mp4 right=right.mp4 --rig desk.json --out hand.csv --overlay hand.mp4",
@@ -43,6 +45,8 @@ def run(args: argparse.Namespace) -> int:
         return _by_landmarks(args, rig)
     if rig is None:
         raise RecordingError("--observe contours needs a calibrated rig; give it with --rig.")
+    if args.log is not None:
+        raise RecordingError("--log: only landmarks are kept; take --observe landmarks, or leave --log out.")
     if args.smooth:
         raise RecordingError("--smooth: only landmarks are smoothed; take --observe landmarks, or leave --smooth out.")
     args.video = with_names(args, rig)
@@ -92,11 +96,13 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
     line = ProgressLine("tracking")
     summary = track_landmarks(rig, videos, either_side=args.rig is None, measure=args.bones == "measured",
                               unknown_size=args.unknown_size, smooth=args.smooth, out=args.out,
-                              pictures=args.overlay, again=args.force, hand_file=args.adapt, progress=line.report)
+                              pictures=args.overlay, kept=args.log, again=args.force, hand_file=args.adapt,
+                              progress=line.report)
     line.finish()
     if args.rig is None:
         said.append(f"The networks find mostly {summary.side} hands, so a {summary.side} hand is tracked.")
     document = summary.document() | {"out": args.out and str(args.out), "overlay": args.overlay and str(args.overlay),
+                                     "log": args.log and str(args.log),
                                      "hand_file": str(args.adapt) if summary.adapted else None,
                                      "notes": said}
     print(json.dumps(document) if args.json else "\n".join([*said, *sentences(document)]))

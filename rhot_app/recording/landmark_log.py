@@ -11,10 +11,10 @@ import csv
 import io
 import math
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,9 +150,9 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable]) ->
                   lambda c, times_ns: frames(rig.nodes[c], tables[c], times_ns))
 
 
-def write_hand_log(path: Path, rig: Rig, films: Sequence[HandFilm]) -> int:
-    """Write what networks find in one film per node as their nodes would send it; returns the number of frames. Raises
-    RecordingError when the file cannot be written."""
+def write_hand_log(path: Path, rig: Rig, films: Sequence[HandFilm], about: Mapping[str, Any] | None = None) -> int:
+    """Write what networks find in one film per node as their nodes would send it; returns the number of frames.
+    `about`: what the header says beside. Raises RecordingError when the file cannot be written."""
     def frames(node: RigNode, film: HandFilm, times_ns: Times) -> Iterator[Record]:
         lens = node.intrinsics
         for number, t_ns in enumerate(times_ns.tolist()):
@@ -162,10 +162,11 @@ def write_hand_log(path: Path, rig: Rig, films: Sequence[HandFilm]) -> int:
                 frame_number=number, hands=film.hands[number])))
 
     return _write(path, rig, [film.times_s for film in films],
-                  lambda c, times_ns: frames(rig.nodes[c], films[c], times_ns))
+                  lambda c, times_ns: frames(rig.nodes[c], films[c], times_ns), about)
 
 
-def _write(path: Path, rig: Rig, times_s: Sequence[Array], frames: Callable[[int, Times], Iterator[Record]]) -> int:
+def _write(path: Path, rig: Rig, times_s: Sequence[Array], frames: Callable[[int, Times], Iterator[Record]],
+           about: Mapping[str, Any] | None = None) -> int:
     """A log of the `frames` of each camera, which are called for with its number and their master times."""
     first_s = min(float(times[0]) for times in times_s)
     times_ns = [FIRST_NS + np.rint(1e9 * (times - first_s)).astype(np.int64) for times in times_s]
@@ -179,7 +180,7 @@ def _write(path: Path, rig: Rig, times_s: Sequence[Array], frames: Callable[[int
         stated += frames(c, times_ns[c])
     try:
         with replacing(path) as file:
-            file.writelines(encode_log(rig, begun_now(_BEGIN_NS),
+            file.writelines(encode_log(rig, {**begun_now(_BEGIN_NS), **(about or {})},
                                        sorted(stated, key=lambda record: record.t_master_ns)))
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be written ({exc.strerror}). Choose another --out.") from exc

@@ -124,7 +124,7 @@ def _collect(channel: _Channel, name: str, target: Path, keep: bool, progress: P
                                  "or choose another folder.")
     else:
         _fetch(channel, info, target, progress)
-    _write_times(target)
+    write_times(target)
     if not keep:
         channel.ask({"request": "video_delete", "name": name})
     progress(f"video of {node}", 1.0)
@@ -162,7 +162,7 @@ def _fetch(channel: _Channel, info: VideoInfo, target: Path, progress: Progress)
         part.rename(target)
 
 
-def _write_times(video: Path) -> None:
+def write_times(video: Path) -> None:
     """The numbers and times of a video's frames as a table beside it. Raises NodeError, OSError."""
     stamps = read_stamps(video)
     with replacing(video.with_suffix(".csv")) as file:

@@ -48,6 +48,8 @@ class Actions(QObject):
                                          "window of its own.")
         self.recordings = self._make("Recordings …", "", "All recordings: how long and how well tracked; open, rename, "
                                      "delete.")
+        self.films = self._make("Track films …", "", "Track a bare hand in films that you have already, and replay it "
+                                "beside their pictures.")
         self.outputs = self._make("Outputs …", "", "Live streams to other programs: OSC, VMC, WebSocket, web view and "
                                   "others; which run, and how they go.")
         self.mouse = self._make("3-D mouse …", "", "Work a cursor in three dimensions with the hand: pick balls, "
@@ -164,8 +166,8 @@ class MainToolBar(QToolBar):
         self.controls.addSeparator()
         a = actions
         self.rig_button, self.rig_menu = self._add_menu("Rig", [
-            a.twin, a.own_cameras, a.open, a.nodes, None, a.open_recording, a.recordings, a.video, a.bookmark, a.export,
-            None, a.add_object, a.objects.menuAction(), None,
+            a.twin, a.own_cameras, a.open, a.nodes, None, a.open_recording, a.recordings, a.films, a.video, a.bookmark,
+            a.export, None, a.add_object, a.objects.menuAction(), None,
             a.outputs, a.mouse, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig,
             a.close_rig, None, a.quit])
         self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [

@@ -125,6 +125,7 @@ class MainWindow(QMainWindow):
         a.export.triggered.connect(lambda: self.dialogs.export_recording())
         a.open_recording.triggered.connect(self.replays.choose)
         a.recordings.triggered.connect(self.replays.list)
+        a.films.triggered.connect(self.replays.track_films)
         a.outputs.triggered.connect(lambda: self.dialogs.show_outputs(
             c, lambda: self.appearance.scheme, [a.save_rig, a.guide], self.rig_watch.look_soon))
         a.mouse.triggered.connect(lambda: self.dialogs.show_mouse(c, self.appearance.scheme))

@@ -176,7 +176,7 @@ class Docks:
         """Put `widget` into a dock; without a title it can only be moved from the View menu."""
         dock = QDockWidget(name, self._window)
         dock.setObjectName(f"dock {name}")
-        dock.setWidget(_scrolled(widget) if scroll else widget)
+        dock.setWidget(scrolled(widget) if scroll else widget)
         if not title:
             dock.setTitleBarWidget(QWidget())
         self.docks.append(dock)
@@ -251,7 +251,8 @@ class Docks:
         QTimer.singleShot(0, self.set_sizes)
 
 
-def _scrolled(widget: QWidget) -> QScrollArea:
+def scrolled(widget: QWidget) -> QScrollArea:
+    """A widget that scrolls up and down where there is no room for all of it."""
     frame = QScrollArea()
     frame.setWidgetResizable(True)
     frame.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)

@@ -74,7 +74,7 @@ def append_picture(file: BinaryIO, jpeg: bytes) -> None:
 
 def pictures_of(file: BinaryIO) -> Iterator[StoredPicture]:
     """All whole pictures of a video, also of one that was never finished. Raises VideoError for another file."""
-    _read_size(file)
+    video_size(file)
     end = file.seek(0, os.SEEK_END)
     at = _HEADER.size
     while at + _CHUNK.size <= end:
@@ -95,7 +95,7 @@ def finish_video(file: BinaryIO) -> int:
 
     Raises VideoError when it is no such video, OSError when it cannot be written.
     """
-    width, height = _read_size(file)
+    width, height = video_size(file)
     movi_at, end = _HEADER.size - 4, _HEADER.size
     index = bytearray()
     first_ns = last_ns = 0
@@ -139,8 +139,8 @@ def _header(width: int, height: int, count: int, end: int, total: int, period_us
         b"LIST", movi, b"movi")
 
 
-def _read_size(file: BinaryIO) -> tuple[int, int]:
-    """(width, height), px, from a video's header."""
+def video_size(file: BinaryIO) -> tuple[int, int]:
+    """(width, height), px, from a video's header. Raises VideoError for another file."""
     file.seek(0)
     head = file.read(_HEADER.size)
     if len(head) < _HEADER.size or head[:4] != b"RIFF" or head[8:12] != b"AVI " or head[-4:] != b"movi":

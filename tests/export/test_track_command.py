@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 from pathlib import Path
@@ -10,15 +11,18 @@ import cv2
 import msgspec
 import numpy as np
 import pytest
+from drawn_films import RATE, StandIn, seen_by, use_networks, video
 from recorded_landmarks import FOLDER, FPS, JUDGED, WHOLE, needs_recording, recording
 
 from rhot_app.__main__ import main
 from rhot_app.export import bare_hand_command, landmark_track
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.export.landmark_track import states_of_log
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.project import TrackerSettings, landmark_markers, load_rig, save_rig
+from rhot_app.recording.films import recorded_films
 from rhot_app.recording.landmark_log import write_landmark_log
+from rhot_app.recording.raw_log import LogReader
 from rhot_app.rig_history import versions
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
 from rhot_app.state import Condition
@@ -28,54 +32,13 @@ from rhot_node.errors import KeypointError
 from rhot_node.files import resource_path
 from rhot_node.landmarks import networks
 from rhot_node.landmarks.install import installed_folder
-from rhot_node.landmarks.networks import DetectedHand, Region
 from rhot_node.pictures import open_video
 from rhot_node.video.avi import Stamp, append_picture, begin_video, encode_picture, finish_video
 
 needs_networks = pytest.mark.skipif(installed_folder() is None, reason="`rhot landmarks install` has not been run")
-SECONDS, RATE = 3.0, 20.0
+SECONDS = 3.0
 RIG = landmark_rig()
 LEFT = load_hand(resource_path("hands", "left.json"))
-
-
-def video(path: Path, lens, count: int) -> Path:
-    """Black pictures of the lens's size."""
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), RATE, (lens.width, lens.height))
-    for _ in range(count):
-        writer.write(np.zeros((lens.height, lens.width, 3), np.uint8))
-    writer.release()
-    return path
-
-
-class StandIn:
-    """Finds in the pictures of a camera, one after the other, what that camera would see of drawn hands (H, T, 21, 2)
-    px, NaN where it sees none; `right` (H, T) or of each hand: what it says of their sides."""
-
-    def __init__(self, hands, right, hidden: range = range(0)) -> None:
-        self._hands, self._hidden, self._count = np.asarray(hands), hidden, -1
-        self._right = np.broadcast_to(np.reshape(right, (len(self._hands), -1)), self._hands.shape[:2])
-
-    def find(self, picture):
-        self._count += 1
-        if self._count in self._hidden:
-            return ()
-        return tuple(DetectedHand(landmarks, np.zeros((21, 3)), 0.9, float(right),
-                                  Region(landmarks.mean(axis=0), 200.0, 0.0))
-                     for landmarks, right in zip(self._hands[:, self._count], self._right[:, self._count], strict=True)
-                     if np.isfinite(landmarks).all())
-
-
-def seen_by(rig, joints):
-    """(C, T, 21, 2) px of joints (T, 21, 3) m."""
-    cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
-    return np.array([[camera.project(one) for one in joints] for camera in cameras])
-
-
-def use_networks(monkeypatch, stand_ins) -> None:
-    """From now on the networks of one film after the other are these; the command first asks whether there are any."""
-    waiting = iter(stand_ins)
-    monkeypatch.setattr(networks, "open_hand_networks", lambda: None)
-    monkeypatch.setattr(landmark_track, "open_hand_networks", lambda: next(waiting))
 
 
 @pytest.fixture
@@ -120,6 +83,25 @@ def test_a_hand_is_tracked_with_its_own_bones_and_the_films_times(drawn, capsys)
     assert 1e3 * np.median(off) < 3.0
     film = cv2.VideoCapture(str(folder / "film.avi"))
     assert int(film.get(cv2.CAP_PROP_FRAME_COUNT)) == len(times)
+
+
+def test_the_log_that_is_kept_is_replayed_beside_the_films(drawn):
+    """Tracked again, it gives what the table has; a moment finds its picture."""
+    use, words, folder = drawn
+    use()
+    assert main([*words, "--out", str(folder / "hand.csv"), "--log", str(folder / "hand.rhotlog")]) == 0
+    _, places = table_of(folder / "hand.csv")
+    with contextlib.closing(LogReader(folder / "hand.rhotlog")) as reader:
+        rig = reader.rig
+    films = recorded_films(folder / "hand.rhotlog", rig)
+    assert [film.camera for film in films] == [0, 1] and rig.hand != RIG.hand, "its bones are measured"
+    use()
+    states = {state.t_master_ns: state for state in states_of_log(rig, folder / "hand.rhotlog")}
+    for number in (0, 31, 55):
+        t_ns = int(films[0].video.times_ns[number])
+        assert films[1].number_at(t_ns) == number
+        np.testing.assert_allclose(states[t_ns].joint_positions, places[number], atol=1e-6)
+    assert main([*words, "--log", str(folder / "hand.rhotlog")]) == 2, "nothing is written over unasked"
 
 
 def test_a_hand_of_the_other_side_is_none_and_is_said_to_be(drawn, capsys):

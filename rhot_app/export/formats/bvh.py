@@ -41,7 +41,7 @@ class BvhWriter:
     def add(self, states: HandStates) -> None:
         """Keep these poses: (N, 51) root position (m) and 16 times three angles (degrees); NaN without a hand."""
         hand = states if self._plan.hand == "hand" or states.other is None else states.other
-        palm = np.where(hand.tracked[:, None, None], hand.world_from_palm, np.nan)
+        palm = np.where(hand.present[:, None, None], hand.world_from_palm, np.nan)
         known = np.flatnonzero(np.isfinite(palm[:, 0, 0]) & np.isfinite(hand.angles).all(axis=1))
         out = np.full((len(hand), 3 + 3 * len(TURNING)), np.nan)
         if len(known):

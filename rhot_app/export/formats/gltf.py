@@ -84,7 +84,7 @@ class _Hand:
     def add(self, states: HandStates) -> None:
         """Keep the poses in which the hand is tracked."""
         palm = states.world_from_palm
-        known = states.tracked & np.isfinite(palm[:, 0, 0]) & np.isfinite(states.angles).all(axis=1)
+        known = states.present & np.isfinite(palm[:, 0, 0]) & np.isfinite(states.angles).all(axis=1)
         if not known.any():
             return
         turn, palm = self._turn, palm[known]

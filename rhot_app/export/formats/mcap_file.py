@@ -26,7 +26,7 @@ _BONES: Final = [pair for finger in range(len(FINGERS)) for first in (1 + 4 * fi
 _ORIGIN: Final[Message] = {"position": {"x": 0.0, "y": 0.0, "z": 0.0},
                            "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
 _JOINT_COLOR, _MARKER_COLOR = (0.85, 0.85, 0.9), (1.0, 0.55, 0.1)
-_OPACITY: Final = (1.0, 0.6, 0.3, 0.0)  # by knowledge, as in the app's scene
+_OPACITY: Final = (1.0, 0.6, 0.3, 0.0, 0.3)  # by knowledge, as in the app's scene; the last: filled in
 _JOINT_M, _MARKER_M, _LINE_M = 0.008, 0.014, 0.004
 _MATCHING_ID, _LINE_LIST = 0, 2
 
@@ -140,13 +140,14 @@ class McapWriter:
         object_tables: list[dict[str, list[Any]]] = [
             {"name": [one.name] * len(states), **{name: getattr(one, name).tolist() for name in OBJECT_ARRAYS},
              "validity": list(one.validities)} for one in states.objects]
+        there_is = [hand.present for _, hand in hands]
         tables = [_rows(states, with_markers=True)] + [_rows(hand) for _, hand in hands[1:]]
         for number, t_master_ns in enumerate(states.t_master_ns.tolist()):
             t_ns = t_master_ns + self._offset_ns
             rows = [{name: column[number] for name, column in table.items()} for table in tables]
             self._send("/hand/state", t_ns, rows[0] | ({"other": rows[1]} if len(rows) > 1 else {}))
-            shown = [hand.tracked[number] and row["joint_positions"][0][0] == row["joint_positions"][0][0]
-                     for (_, hand), row in zip(hands, rows, strict=True)]
+            shown = [present[number] and row["joint_positions"][0][0] == row["joint_positions"][0][0]
+                     for present, row in zip(there_is, rows, strict=True)]
             names = [f"{prefix}hand" for prefix, _ in hands]
             self._send("/hand/scene", t_ns, {
                 "deletions": [{"timestamp": _time(t_ns), "type": _MATCHING_ID, "id": name}

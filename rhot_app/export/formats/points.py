@@ -71,7 +71,7 @@ class _Points:
         self._positions.append((positions @ self._turn.T).astype(np.float32))
         self._deviations.append((self._plan.scale * deviations).astype(np.float32))
         self._angles.append(np.degrees(np.concatenate(
-            [np.where(hand.tracked[:, None], hand.angles, np.nan) for hand in _hands(states).values()],
+            [np.where(hand.present[:, None], hand.angles, np.nan) for hand in _hands(states).values()],
             axis=1)).astype(np.float32))
 
     def close(self) -> None:

@@ -65,7 +65,7 @@ class Ros2Writer:
         for number, t_master_ns in enumerate(states.t_master_ns.tolist()):
             t_ns, frames = t_master_ns + self._offset_ns, []
             for prefix, hand in hands:
-                if not (hand.tracked[number] and np.isfinite(hand.joint_positions[number]).all()):
+                if not (hand.present[number] and np.isfinite(hand.joint_positions[number]).all()):
                     continue
                 header = {"stamp": _time(t_ns), "frame_id": self._frame_id}
                 self._send(f"/{prefix}hand/joint_states", "sensor_msgs/msg/JointState", t_ns, {

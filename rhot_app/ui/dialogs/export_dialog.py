@@ -25,12 +25,14 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.export.export import FORMATS, Exported
+from rhot_app.export.gaps import LONGEST_S
 from rhot_app.export.plan import ExportOptions, Units
 from rhot_app.export.process import export_apart, first_states
 from rhot_app.export.resample import MOST_HZ
 from rhot_app.export.states import HandStates
 from rhot_app.export.tables import columns
 from rhot_app.hand.skeleton import FINGERS
+from rhot_app.project import Rig
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import newest_recording
@@ -39,7 +41,7 @@ ROWS = 8
 LOOK_MS = 300  # a choice is looked at when it has stood for a while
 
 _SIZE, _BUTTON_PX = (860, 600), 120
-_OWN_RATE = "as recorded"
+_OWN_RATE, _NO_FILL = "as recorded", "leave gaps"
 _FORMATS = {"csv": "CSV: a table", "parquet": "Parquet: a table for analysis", "npz": "NPZ: NumPy's arrays",
             "trc": "TRC: points, for OpenSim", "c3d": "C3D: points, motion capture", "bvh": "BVH: a moving skeleton",
             "gltf": "glTF: an animated hand", "mcap": "MCAP: for Foxglove"}
@@ -51,12 +53,15 @@ _UNITS: tuple[tuple[str, Units], ...] = (("mm", "mm"), ("m", "m"))
 class ExportDialog(QDialog):
     """`log` is the recording, the newest one in `folder` unless another is given; None while there is none."""
 
-    def __init__(self, log: Path | None, folder: Path, parent: QWidget | None = None) -> None:
+    def __init__(self, log: Path | None, folder: Path, parent: QWidget | None = None, *, rig: Rig | None = None,
+                 smooth: bool = False) -> None:
+        """`rig`: what `log` is tracked with; None: as it was recorded. `smooth`: begin with that."""
         super().__init__(parent)
         self.setWindowTitle("Export recording")
         self.setProperty("guide", "recording")
         self.resize(*_SIZE)
         self.log = log
+        self._rig = rig
         self._folder = folder
         self._job: Job | None = None
         self._look: Job | None = None
@@ -68,6 +73,7 @@ class ExportDialog(QDialog):
         self.frame_box = _box(_FRAMES, "Where positions are told: in the rig frame, or relative to the wrist joint.")
         self.units_box = _box(_UNITS, "Unit of length, where the format leaves a choice.")
         self.smooth_box = QCheckBox("Smooth")
+        self.smooth_box.setChecked(smooth)
         self.smooth_box.setToolTip("Every state uses what came after it as well. Only the estimator can.")
         self.rate_box = QDoubleSpinBox()
         self.rate_box.setRange(0.0, MOST_HZ)
@@ -77,6 +83,15 @@ class ExportDialog(QDialog):
         self.rate_box.setMinimumHeight(30)
         self.rate_box.setToolTip("States at equal intervals. As recorded each keeps its own time, and formats that "
                                  "have a rate get the cameras'.")
+        self.fill_box = QDoubleSpinBox()
+        self.fill_box.setRange(0.0, LONGEST_S)
+        self.fill_box.setDecimals(2)
+        self.fill_box.setSingleStep(0.1)
+        self.fill_box.setSuffix(" s")
+        self.fill_box.setSpecialValueText(_NO_FILL)
+        self.fill_box.setMinimumHeight(30)
+        self.fill_box.setToolTip("Gaps up to this length are interpolated. What is filled in is marked: by its "
+                                 "knowledge, or in a table beside the file where the format has none.")
         self.table = QTableWidget(0, 0)
         self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
         self.table.setToolTip("The first fingertips as they would be written; the file holds much more.")
@@ -104,7 +119,8 @@ class ExportDialog(QDialog):
         form = QFormLayout()
         form.setSpacing(8)
         for words, part in (("Recording", source), ("Format", self.format_box), ("Tracker", self.tracker_box),
-                            ("", self.smooth_box), ("Rate", self.rate_box), ("Positions in", self.frame_box),
+                            ("", self.smooth_box), ("Rate", self.rate_box), ("Fill gaps up to", self.fill_box),
+                            ("Positions in", self.frame_box),
                             ("Lengths in", self.units_box)):
             form.addRow(words, part)
         buttons = QHBoxLayout()
@@ -125,7 +141,8 @@ class ExportDialog(QDialog):
         self.format_box.currentIndexChanged.connect(self._show_format)
         for box in (self.format_box, self.tracker_box, self.frame_box, self.units_box):
             box.currentIndexChanged.connect(self._timer.start)
-        self.rate_box.valueChanged.connect(self._timer.start)
+        for number in (self.rate_box, self.fill_box):
+            number.valueChanged.connect(self._timer.start)
         self.smooth_box.toggled.connect(self._timer.start)
         self._timer.timeout.connect(self._preview)
         self.export_button.clicked.connect(self._export_or_cancel)
@@ -143,12 +160,13 @@ class ExportDialog(QDialog):
         rate = self.rate_box.value()
         units: Units | None = self.units_box.currentData() if FORMATS[self.format].units_free else None
         return ExportOptions(self.tracker_box.currentData(), rate or None, self.frame_box.currentData(), units,
-                             smooth=self.smooth_box.isChecked())
+                             smooth=self.smooth_box.isChecked(), fill_s=self.fill_box.value() or None)
 
     def show_log(self, log: Path | None) -> None:
         """Export another recording."""
         self.log = log
-        self.log_label.setText("Choose a recording." if log is None else str(log))
+        tracked = "" if self._rig is None else ", tracked as shown"
+        self.log_label.setText("Choose a recording." if log is None else f"{log}{tracked}")
         self.export_button.setEnabled(log is not None)
         self.rate_box.setSpecialValueText(_OWN_RATE)
         if log is not None:
@@ -159,6 +177,7 @@ class ExportDialog(QDialog):
         name, _ = QFileDialog.getOpenFileName(self, "Choose a recording", str(start),
                                               "Recordings (*.rhotlog *.log);;All files (*)")
         if name:
+            self._rig = None
             self.show_log(Path(name))
 
     def _show_format(self) -> None:
@@ -172,13 +191,13 @@ class ExportDialog(QDialog):
     def _preview(self) -> None:
         if self._look is not None:
             self._look.cancel()
-        log, name, options = self.log, self.format, self.options()
+        log, name, options, rig = self.log, self.format, self.options(), self._rig
         if log is None or self._job is not None:
             return
         units = options.units or FORMATS[name].units
 
         def look(progress: Any) -> HandStates:
-            return first_states(log, name, options, ROWS)
+            return first_states(log, name, options, ROWS, rig)
 
         self._look = Job(look, lambda states: self._show_rows(states, units), self._say, None, self).start()
 
@@ -219,10 +238,11 @@ class ExportDialog(QDialog):
 
     def export(self, out: Path) -> None:
         """Write `out`; what stands there is written over, as the person was asked when choosing it."""
-        log, name, options = self.log, self.format, self.options()
+        log, name, options, rig = self.log, self.format, self.options(), self._rig
         if log is None:
             return
-        self._job = Job(lambda progress: export_apart(log, out, name, options, progress.report), self._show_done,
+        self._job = Job(lambda progress: export_apart(log, out, name, options, progress.report,
+                                                           rig), self._show_done,
                         self._end, self._show_progress, self).start()
         self.export_button.setText("Cancel")
         self.bar.setValue(0)

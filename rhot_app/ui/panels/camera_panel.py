@@ -12,20 +12,21 @@ from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
 
 from rhot_app.engine.status import Preview
 from rhot_app.project import Rig
-from rhot_app.state import SeenContour
+from rhot_app.state import Knowledge, SeenContour
 from rhot_app.ui.backend.live import Live
 from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.label_layout import place_at_sides
 from rhot_app.ui.models.palette import Scheme, hex_of, visible_on
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.panels.empty_state import EmptyState
+from rhot_app.ui.scene.hand_mesh import BONES
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
 
 OUTLINE_COLOUR, INNER_COLOUR, SLICE_COLOUR = "#28e650", "#3c8cff", "#60808080"
-HAND_COLOUR, OTHER_COLOUR, SHOWN_COLOUR = "#ff2828", "#ffdc00", "#ffffff"
+HAND_COLOUR, OTHER_COLOUR, SHOWN_COLOUR, BONE_COLOUR = "#ff2828", "#ffdc00", "#ffffff", "#ffffff"
 """As in `barehand.overlay`: the contour before the background and within the hand, slices; edges, the hand's and
 others; and a pose that the hand is to take."""
 
@@ -45,6 +46,14 @@ class Mark:
     whole: bool
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Skeleton:
+    """A tracked hand in the picture: `joints` (21, 2) px of the full frame and their `knowledge` (21,)."""
+
+    joints: Array
+    knowledge: NDArray[np.uint8]
+
+
 class CameraView(QWidget):
     """One camera's preview, as large as fits, with name, marks and labels."""
 
@@ -56,6 +65,7 @@ class CameraView(QWidget):
         self._frame = (4, 3)
         self.marks: list[Mark] = []
         self.contours: list[SeenContour] = []
+        self.skeletons: list[Skeleton] = []
         self.hands = "the hand"
         self._pointed_at = False
         self.setMinimumSize(120, 90)
@@ -83,6 +93,18 @@ class CameraView(QWidget):
                                visible_on(hex_of(marker.display_rgb), "#000000", 3.0), not int(flag) & doubtful)
                           for (x, y), flag, marker in zip(preview.pixels, preview.flags, markers.markers, strict=True)
                           if np.isfinite(x) and np.isfinite(y)]
+        self.update()
+
+    def show_picture(self, image: QImage) -> None:
+        """Another picture without marks; a null one for none."""
+        self._image, self.marks, self.contours, self.skeletons = image, [], [], []
+        if not image.isNull():
+            self._frame = image.width(), image.height()
+        self.update()
+
+    def show_skeletons(self, skeletons: list[Skeleton]) -> None:
+        """The hands that were tracked when this picture was taken."""
+        self.skeletons = skeletons
         self.update()
 
     def show_contours(self, seen: list[SeenContour]) -> None:
@@ -133,6 +155,8 @@ class CameraView(QWidget):
         places = [(mark.place + QPointF(0.5, 0.5)) * scale for mark in self.marks]
         for contour in self.contours:
             paint_contour(painter, contour, scale)
+        for skeleton in self.skeletons:
+            paint_skeleton(painter, skeleton, scale)
         if any(contour.shown for contour in self.contours):
             self._paint_request(painter, target.size())
         self._paint_rings(painter, places, target.width())
@@ -189,6 +213,21 @@ def paint_contour(painter: QPainter, seen: SeenContour, scale: float) -> None:
     dots(seen.contour[~seen.outline], SHOWN_COLOUR if seen.shown else INNER_COLOUR, 1.5 if seen.shown else 5.0)
     dots(seen.edges[~seen.of_hand], OTHER_COLOUR, 2.0)
     dots(seen.edges[seen.of_hand], HAND_COLOUR, 2.0)
+
+
+def paint_skeleton(painter: QPainter, skeleton: Skeleton, scale: float) -> None:
+    """The bones of a hand, `scale` px of the screen for one of the frame: solid where both ends are known well, dotted
+    where one is guessed."""
+    places = (skeleton.joints + 0.5) * scale
+    for near, far in (*((0, 1 + 4 * finger) for finger in range(5)), *BONES):
+        known = int(max(skeleton.knowledge[near], skeleton.knowledge[far]))
+        if known >= Knowledge.UNKNOWN or not np.isfinite(places[[near, far]]).all():
+            continue
+        style = Qt.PenStyle.DotLine if known == Knowledge.GUESSED else Qt.PenStyle.SolidLine
+        line = QLineF(*(float(value) for value in places[[near, far]].ravel()))
+        for colour, width in (("#000000", 4.0), (BONE_COLOUR, 2.0)):
+            painter.setPen(QPen(QColor(colour), width, style, Qt.PenCapStyle.RoundCap))
+            painter.drawLine(line)
 
 
 class CameraPanel(QWidget):

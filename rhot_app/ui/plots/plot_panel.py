@@ -9,7 +9,7 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetricsF, QGuiApplication, QPainter, QPen, QResizeEvent
+from PySide6.QtGui import QColor, QFontMetricsF, QGuiApplication, QPainter, QPen, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QPushButton, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 from rhot_app.ui.common.disposal import plot_widget
@@ -64,6 +64,7 @@ class OverflowMarks:
 # -- Legend: line sample, name and newest value ------------------------------------------------------------------------
 
 _SAMPLE_PX = 18
+_LEAST_STEP = 0.85  # of a line's height, from row to row: closer, and letters touch
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +88,7 @@ class Legend(QWidget):
         self._widest = widest_value
         self.entries: list[LegendEntry] = []
         self.values: list[tuple[str, ...]] = []
+        self._first = 0  # of the rows that are shown, where not all have room
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
 
     def set_scheme(self, scheme: Scheme) -> None:
@@ -119,26 +121,40 @@ class Legend(QWidget):
         return QSize(round(_SAMPLE_PX + 6 + name + 4 + value * len(self._heads) + 4), 60)
 
     def paintEvent(self, event: object) -> None:  # noqa: N802
-        """Heads, then one line per row; rows move closer together when there is little room."""
+        """Heads, then one line per row; rows move closer together when there is little room, and the last ones wait for
+        the wheel where they could not be read."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         metrics, value_width = self._small_font_metrics()
         rows = len(self.entries) + (1 if any(self._heads) else 0)
         if not self.entries:
             return
-        step = min(metrics.height() + 2, self.height() / rows)
+        step = min(metrics.height() + 2, max(self.height() / rows, _LEAST_STEP * metrics.height()))
+        fit = int(self.height() / step) - (1 if any(self._heads) else 0)
+        more = len(self.entries) - fit
+        shown = slice(None) if more <= 0 else slice(min(self._first, more + 1), min(self._first, more + 1) + fit - 1)
         y = 0.0
         if any(self._heads):
             painter.setPen(QColor(self._scheme.muted))
             self._paint_values(painter, self._heads, y, step, value_width)
             y += step
-        for entry, values in zip(self.entries, self.values, strict=True):
+        for entry, values in zip(self.entries[shown], self.values[shown], strict=True):
             self._paint_sample(painter, entry, y + step / 2)
             painter.setPen(QColor(self._scheme.text))
             painter.drawText(QRectF(_SAMPLE_PX + 6, y, self.width(), step), Qt.AlignmentFlag.AlignVCenter, entry.name)
             self._paint_values(painter, values, y, step, value_width)
             y += step
+        if more > 0:
+            painter.setPen(QColor(self._scheme.muted))
+            place = QRectF(0.0, y, self.width(), step)
+            painter.drawText(place, Qt.AlignmentFlag.AlignVCenter, f"{more + 1} more: scroll")
         painter.end()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802
+        """The rows that have no room."""
+        self._first = min(max(self._first - (1 if event.angleDelta().y() > 0 else -1), 0), len(self.entries))
+        self.update()
+        event.accept()
 
     def _paint_values(self, painter: QPainter, values: tuple[str, ...], y: float, step: float, width: float) -> None:
         left = self.width() - width * len(values) - 4

@@ -27,6 +27,7 @@ from rhot_app.errors import RecordingError
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.recording.bookmarks import Bookmark, bookmarks_of
+from rhot_app.recording.films import RecordedFilm, recorded_films
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition, HandState
@@ -67,6 +68,7 @@ class Tracked:
     jitter: Array  # (K, M) mm
     note: str = ""
     bookmarks: tuple[Bookmark, ...] = ()  # of the log, by time
+    films: tuple[RecordedFilm, ...] = ()  # the videos beside the log
 
 
 def track_log(log: Path, rig: Rig, out: Path, smooth: bool = False, *, progress: Progress = silent) -> Tracked:
@@ -92,7 +94,12 @@ def track_log(log: Path, rig: Rig, out: Path, smooth: bool = False, *, progress:
                 _write(file, collected.take(state), out)
         if not collected.times_ns:
             raise RecordingError(f"{log}: {_why_nothing(records)}")
-        return collected.tracked(records.note, tuple(bookmarks_of(records.marked)))
+        note, films = records.note, tuple[RecordedFilm, ...]()
+        try:
+            films = recorded_films(log, rig)
+        except RecordingError as exc:
+            note = f"{note} {exc}".lstrip()
+        return collected.tracked(note, tuple(bookmarks_of(records.marked)), films)
     except BaseException:
         out.unlink(missing_ok=True)
         raise
@@ -206,11 +213,12 @@ class _Collected:
             self._jitter_rows.append(1e3 * self._jitter.rms(t_ns))
         return data
 
-    def tracked(self, note: str, bookmarks: tuple[Bookmark, ...]) -> Tracked:
+    def tracked(self, note: str, bookmarks: tuple[Bookmark, ...], films: tuple[RecordedFilm, ...]) -> Tracked:
         """All that was noted."""
         return Tracked(self._rig, np.array(self.times_ns, np.int64), np.array(self._offsets, np.int64),
                        np.array(self._conditions, np.int8), np.array(self._fingertips),
-                       np.array(self._jitter_times, np.int64), np.array(self._jitter_rows), note, bookmarks)
+                       np.array(self._jitter_times, np.int64), np.array(self._jitter_rows), note, bookmarks,
+                       films)
 
 
 def _without_measured_times(state: HandState) -> HandState:

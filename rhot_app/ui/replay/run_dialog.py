@@ -34,12 +34,14 @@ _WIDTH_PX = 480
 class FileChoice(QWidget):
     """A file, or what the recording has itself."""
 
-    def __init__(self, title: str, own: str, parent: QWidget | None = None) -> None:
+    changed = Signal()
+
+    def __init__(self, title: str, own: str, without: str = "As recorded", parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._title, self._own = title, own
         self.path: Path | None = None
         self.label = QLabel(own)
-        self.choose_button, self.forget_button = QPushButton("Choose …"), QPushButton("As recorded")
+        self.choose_button, self.forget_button = QPushButton("Choose …"), QPushButton(without)
         self.choose_button.clicked.connect(self.choose)
         self.forget_button.clicked.connect(lambda: self.show_path(None))
         row = QHBoxLayout(self)
@@ -62,6 +64,7 @@ class FileChoice(QWidget):
         self.label.setText(path.name if path is not None else self._own)
         self.label.setToolTip(str(path or ""))
         self.forget_button.setVisible(path is not None)
+        self.changed.emit()
 
 
 class RunDialog(QDialog):

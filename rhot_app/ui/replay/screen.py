@@ -21,13 +21,15 @@ from rhot_app.ui.panels.hand_panel import HandPanel
 from rhot_app.ui.panels.markers_panel import MarkersPanel
 from rhot_app.ui.plots.live_plots import JitterPlot
 from rhot_app.ui.plots.plot_panel import DASHES, LegendEntry, Line, PlotPanel, newest, number
+from rhot_app.ui.replay.film_panel import FilmPanel
 from rhot_app.ui.replay.session import SPEEDS, Comparison, Replay
 from rhot_app.ui.replay.timeline import Timeline
 from rhot_app.ui.scene.view import SceneView
+from rhot_app.ui.screen import scrolled
 
 PANEL_S = 0.1
 PLOT_S = 0.25
-_SIDE_PX, _PLOTS_PX = 440, 180
+_FILMS_PX, _SIDE_PX, _HAND_PX, _PLOTS_PX = 300, 440, 220, 180
 _SIZE = (1280, 800)
 
 
@@ -40,6 +42,8 @@ class ReplayScreen(QWidget):
         self.scene.show_names(settings.flag("names"))
         if not settings.flag("clouds"):
             self.scene.show_ellipsoids(None)
+        self.films = FilmPanel(scheme)
+        self.wants_films = settings.flag("films")
         self.markers, self.hand = MarkersPanel(scheme), HandPanel(scheme)
         self.jitter, self.difference = JitterPlot(scheme), DifferencePlot(scheme)
         self.plots: tuple[PlotPanel, ...] = (self.jitter, self.difference)
@@ -58,12 +62,13 @@ class ReplayScreen(QWidget):
     def _lay_out(self) -> None:
         side, middle = QSplitter(Qt.Orientation.Vertical), QSplitter(Qt.Orientation.Horizontal)
         plots, whole = QSplitter(Qt.Orientation.Horizontal), QSplitter(Qt.Orientation.Vertical)
-        for splitter, parts in ((side, (self.hand, self.markers)), (middle, (self.scene, side)), (plots, self.plots),
-                                (whole, (middle, plots))):
+        for splitter, parts in ((side, (self.hand, scrolled(self.markers))), (middle, (self.films, self.scene, side)),
+                                (plots, self.plots), (whole, (middle, plots))):
             for part in parts:
                 splitter.addWidget(part)
             splitter.setChildrenCollapsible(False)
-        middle.setSizes([_SIZE[0] - _SIDE_PX, _SIDE_PX])
+        side.setSizes([_HAND_PX, _SIZE[1] - _PLOTS_PX - _HAND_PX])
+        middle.setSizes([_FILMS_PX, _SIZE[0] - _FILMS_PX - _SIDE_PX, _SIDE_PX])
         whole.setSizes([_SIZE[1] - _PLOTS_PX, _PLOTS_PX])
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -74,7 +79,7 @@ class ReplayScreen(QWidget):
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours."""
-        for part in (self.scene, self.markers, self.hand, self.timeline, self.transport):
+        for part in (self.films, self.scene, self.markers, self.hand, self.timeline, self.transport):
             part.set_scheme(scheme)
         for plot in self.plots:
             plot.set_scheme(scheme)
@@ -91,6 +96,8 @@ class ReplayScreen(QWidget):
         rig = replay.run.rig if replay is not None else None
         for part in (self.scene, self.markers, self.hand, self.jitter):
             part.show_rig(rig)
+        self.films.show_run(replay)
+        self.show_films(self.wants_films)
         self.scene.show_second_rig(replay.second.rig if replay is not None and replay.second is not None else None)
         comparison = replay.comparison if replay is not None else None
         if comparison is not None:
@@ -98,6 +105,12 @@ class ReplayScreen(QWidget):
         self.difference.setVisible(comparison is not None)
         self.timeline.show_replay(replay)
         self.transport.setEnabled(replay is not None)
+        self.look_again()
+
+    def show_films(self, wanted: bool) -> None:
+        """Pictures beside the scene, where there are any; before somebody asks for them, no word of their lack."""
+        self.wants_films = wanted
+        self.films.setVisible(wanted and bool(self.films.films))
         self.look_again()
 
     def look_again(self) -> None:
@@ -136,6 +149,8 @@ class ReplayScreen(QWidget):
         self.pacer.begin(now_s)
         state, second = replay.shown()
         self.scene.show_state(state, second)
+        if self.films.isVisible():
+            self.films.show_moment(replay.position_ns, state)
         if not self._framed and state is not None and state.condition is Condition.TRACKING:
             self._framed = True
             self.scene.frame_first()
@@ -223,7 +238,7 @@ class Transport(QWidget):
         self.loop_clear_button = self._word("No loop", "Repeat nothing.")
         self.bookmark_button = self._word("Bookmark", "Write a few words about this moment into the recording (B).")
         self.place = QLabel("")
-        widest = "00:00.00 of 00:00.00, state 00000 of 00000"
+        widest = "00:00.00 of 00:00.00"  # the number of the state is cut off in a narrow window
         self.place.setMinimumWidth(self.place.fontMetrics().horizontalAdvance(widest))
         self._lay_out()
         self._connect()
@@ -245,7 +260,7 @@ class Transport(QWidget):
     def _lay_out(self) -> None:
         row = QHBoxLayout(self)
         row.setContentsMargins(10, 0, 10, 8)
-        row.setSpacing(6)
+        row.setSpacing(4)
         for button, _ in self._signs:
             row.addWidget(button)
         row.addWidget(self.speed_box)

@@ -33,6 +33,10 @@ class ReplayToolBar(QToolBar):
         self.again = self._action("Track again …", "Track the recording with another tracker, rig or hand.")
         self.compare = self._action("Compare …", "Track it in another way too, and show both hands together.")
         self.alone = self._action("End comparison", "Show one run alone again.")
+        self.export = self._action("Export …", "Write these states as a file for other programs (Ctrl+E).")
+        self.trim = self._action("Trim …", "Save the repeated range as a recording of its own.")
+        self.pictures = self._action("Pictures", "What the cameras saw, with the hand drawn over it (P).")
+        self.pictures.setCheckable(True)
         self.remove = self._action("Remove the bookmark here", "Remove the bookmark at which the recording stands.")
         self.bookmarks_button, self.menu = QToolButton(), QMenu(self)
         self.bookmarks_button.setText("Bookmarks")
@@ -43,7 +47,7 @@ class ReplayToolBar(QToolBar):
         self.addWidget(self.word)
         self.addWidget(self.name)
         self.addSeparator()
-        self.addActions([self.open, self.again, self.compare, self.alone])
+        self.addActions([self.open, self.again, self.compare, self.alone, self.export, self.trim, self.pictures])
         self.addWidget(self.bookmarks_button)
         spacer = QWidget()
         spacer.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
@@ -68,7 +72,7 @@ class ReplayToolBar(QToolBar):
         name = replay.path.name if replay is not None else "no recording"
         self.name.setText(f" {self.fontMetrics().elidedText(name, Qt.TextElideMode.ElideMiddle, _NAME_PX)}  ")
         self.name.setToolTip(str(replay.path) if replay is not None else "")
-        for action in (self.again, self.compare):
+        for action in (self.again, self.compare, self.export, self.trim, self.pictures):
             action.setEnabled(replay is not None)
         self.alone.setVisible(replay is not None and replay.second is not None)
         self.bookmarks_button.setEnabled(replay is not None)

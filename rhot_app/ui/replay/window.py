@@ -17,11 +17,15 @@ from PySide6.QtWidgets import (
 
 from rhot_app.engine.observer import condition_of
 from rhot_app.engine.status import Level
+from rhot_app.export.trim import Trimmed, trim_log
 from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.ui.backend.solver import Solver
+from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.guide import GuideViewer
+from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.keys import bind_space
 from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.dialogs.export_dialog import ExportDialog
 from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording, recordings_folder
 from rhot_app.ui.models.notice import Notice, TransientNotices
 from rhot_app.ui.models.palette import Scheme
@@ -58,7 +62,10 @@ class ReplayWindow(QMainWindow):
         self.resize(*_SIZE)
         self.replay: Replay | None = None
         self.work = TrackingWork(make_solver(), states, self)
+        self._settings = settings
         self.dialog: RunDialog | None = None
+        self.exporting: ExportDialog | None = None
+        self.trimming: Job | None = None
         self.bookmarks = BookmarkWriter(self)
         self.guide: GuideViewer | None = None
         self.passing = TransientNotices()
@@ -66,6 +73,7 @@ class ReplayWindow(QMainWindow):
         self.strip = WorkStrip()
         self.parts = ReplayScreen(settings, scheme)
         self.advice = AdviceBar(scheme)
+        self.toolbar.pictures.setChecked(settings.flag("films"))
         self._lay_out()
         self._connect()
         self._show_run()
@@ -94,6 +102,9 @@ class ReplayWindow(QMainWindow):
         bar.again.triggered.connect(lambda: self.ask_for_run(beside=False))
         bar.compare.triggered.connect(lambda: self.ask_for_run(beside=True))
         bar.alone.triggered.connect(self.stop_comparing)
+        bar.export.triggered.connect(self.export)
+        bar.trim.triggered.connect(self.ask_for_trim)
+        bar.pictures.triggered.connect(self.show_pictures)
         bar.remove.triggered.connect(self.remove_bookmark)
         bar.bookmark_chosen.connect(self.seek)
         self.strip.cancel_asked.connect(self.work.cancel)
@@ -119,7 +130,8 @@ class ReplayWindow(QMainWindow):
                             ("Right", lambda: self.step(1)), ("Home", lambda: self.seek(0.0)),
                             ("End", self.go_to_end), ("B", self.ask_for_bookmark), ("[", lambda: self._loop("begin")),
                             ("]", lambda: self._loop("end")), ("F", self.parts.scene.frame_hand),
-                            ("Ctrl+O", self.choose), ("F1", self.open_guide)):
+                            ("Ctrl+O", self.choose), ("Ctrl+E", self.export), ("P", bar.pictures.trigger),
+                            ("F1", self.open_guide)):
             QShortcut(QKeySequence(key), self).activated.connect(action)
 
     def set_scheme(self, scheme: Scheme) -> None:
@@ -190,6 +202,64 @@ class ReplayWindow(QMainWindow):
         self.parts.show_run(self.replay)
         self._show_name()
 
+    # -- pictures, a part, a file -----------------------------------------------------------------------------------
+
+    def show_pictures(self, wanted: bool) -> None:
+        """Show the cameras' pictures beside the scene, or not."""
+        self._settings.set_flag("films", wanted)
+        self.parts.show_films(wanted)
+        if wanted and self.replay is not None and not self.parts.films.films:
+            self.tell("info", "No video of this recording is on this computer. Rig, Recordings, Collect video fetches "
+                              "what the nodes recorded.")
+
+    def export(self) -> None:
+        """Ask what to write of the states that are shown."""
+        if self.replay is None or self.exporting is not None:
+            return
+        replay = self.replay
+        rig = None if replay.choice == TrackerChoice() else replay.run.rig
+        self.exporting = ExportDialog(replay.path, replay.path.parent, self, rig=rig, smooth=replay.choice.smooth)
+        self.exporting.finished.connect(self._forget_export)
+        self.exporting.open()
+
+    def _forget_export(self) -> None:
+        if self.exporting is not None:
+            dispose(self.exporting)
+            self.exporting = None
+
+    def ask_for_trim(self) -> None:
+        """Ask where to save the repeated range."""
+        if self.replay is None:
+            return
+        loop = self.replay.player.loop
+        if loop is None:
+            self.tell("info", "Choose the part first: [ and ] set where the repeated range begins and ends.")
+            return
+        log = self.replay.path
+        start = str(log.with_stem(f"{log.stem}-part"))
+        name, _ = QFileDialog.getSaveFileName(self, "Save the repeated range as", start, LOG_FILTER)
+        if name:
+            self.trim(Path(name), *loop)
+
+    def trim(self, out: Path, begin_s: float, end_s: float) -> None:
+        """Save a range of positions as a recording of its own, in a worker; what stands there is written over."""
+        if self.replay is None or self.trimming is not None:
+            return
+        log, first_ns = self.replay.path, int(self.replay.run.tracked.times_ns[0])
+        begin_ns, end_ns = (first_ns + round(1e9 * s) for s in (begin_s, end_s))
+        self.tell("info", f"Saving {out.name} …")
+        self.trimming = Job(lambda progress: trim_log(log, out, begin_ns, end_ns, again=True, progress=progress.report),
+                            self._show_trimmed, self._trim_failed, None, self).start()
+
+    def _show_trimmed(self, done: Trimmed) -> None:
+        self.trimming = None
+        films = f" and {len(done.videos)} videos" if done.videos else ""
+        self.tell("info", f"Saved {done.path}{films}. Open it with Ctrl+O.")
+
+    def _trim_failed(self, sentence: str) -> None:
+        self.trimming = None
+        self.tell("error", sentence)
+
     # -- moving about ----------------------------------------------------------------------------------------------
 
     def toggle(self) -> None:
@@ -253,6 +323,8 @@ class ReplayWindow(QMainWindow):
         if self.replay is None:
             return
         self.replay.player.advance(now)
+        if self.parts.films.failure:
+            self.tell("error", self.parts.films.failure)
         if self.parts.refresh(self.replay, now):
             self.toolbar.remove.setEnabled(self._bookmark_here() is not None)
         state = self.parts.state
@@ -273,6 +345,10 @@ class ReplayWindow(QMainWindow):
         """Free the states and end the process that tracks."""
         self._timer.stop()
         self.work.close()
+        if self.trimming is not None:
+            self.trimming.cancel()
+        if self.exporting is not None:
+            self.exporting.close()
         if self.replay is not None:
             self.replay.close()
             self.replay = None

@@ -1,4 +1,4 @@
-"""What the main window knows of recordings: one window that replays, one page that lists, opened and closed here."""
+"""What the main window knows of recordings: a window that replays, a page that lists, a dialog that tracks films."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording, recordings_folder
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.replay.films_dialog import FilmsDialog
 from rhot_app.ui.replay.library_window import LibraryWindow
 from rhot_app.ui.replay.window import ReplayWindow
 
@@ -27,6 +28,7 @@ class ReplayWindows:
         self._rig, self._make_solver = rig, make_solver
         self.window: ReplayWindow | None = None
         self.library: LibraryWindow | None = None
+        self.films: FilmsDialog | None = None
 
     def choose(self) -> None:
         """Ask for a recording and replay it."""
@@ -55,6 +57,14 @@ class ReplayWindows:
             self.library.refresh()
         _bring_forward(self.library)
 
+    def track_films(self) -> None:
+        """Ask for films of a hand, track them and replay what was found."""
+        if self.films is None:
+            self.films = FilmsDialog(self._make_solver, self._parent)
+            self.films.tracked.connect(self.open)
+            self.films.finished.connect(self._forget_films)
+        _bring_forward(self.films)
+
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours."""
         for part in (self.window, self.library):
@@ -63,7 +73,7 @@ class ReplayWindows:
 
     def close(self) -> None:
         """Close both."""
-        for part in (self.window, self.library):
+        for part in (self.window, self.library, self.films):
             if part is not None:
                 part.close()
 
@@ -76,6 +86,11 @@ class ReplayWindows:
         if self.window is not None:
             dispose(self.window)
             self.window = None
+
+    def _forget_films(self) -> None:
+        if self.films is not None:
+            dispose(self.films)
+            self.films = None
 
     def _forget_library(self) -> None:
         if self.library is not None:

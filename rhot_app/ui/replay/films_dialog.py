@@ -1,0 +1,301 @@
+"""Films of a hand that somebody has already: which camera took which, the rig, when they began; then they are tracked
+and replayed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDialog,
+    QDoubleSpinBox,
+    QFileDialog,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from rhot_app.errors import RhotError
+from rhot_app.export.film_log import ChosenFilm, describe_film, log_films
+from rhot_app.project import Rig, load_rig
+from rhot_app.ui.backend.solver import Solver, StoppedError
+from rhot_app.ui.common.job import CancelledError, Job, Progress
+from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.dialogs.recordings import LOG_FILTER
+from rhot_app.ui.replay.run_dialog import FileChoice
+
+ENDINGS = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpg", ".mts", ".webm")
+"""What a folder's films are known by; a file that is chosen by itself may have another."""
+
+_SIZE, _LINES = (820, 460), 8
+_LATEST_S = 3600.0
+_MEANING = ("Films of a bare hand by one camera, or by several at the same time. The hand networks find its landmarks; "
+            "the tracked hand is then shown beside the pictures. Several films need the rig file that says where their "
+            "cameras stand; one film is tracked without, at a distance that is a guess.")
+
+
+class FilmsDialog(QDialog):
+    """`tracked` gives the log that was written. `make_solver`: what the work is done in."""
+
+    tracked = Signal(object)
+
+    def __init__(self, make_solver: Callable[[], Solver] = Solver, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Track films")
+        self.setProperty("guide", "recording")
+        self.resize(*_SIZE)
+        self._solver = make_solver()
+        self._rig: Rig | None = None
+        self._looks: list[Job] = []
+        self._job: Job | None = None
+        self.problem = ""  # of the rig file
+        meaning = QLabel(_MEANING)
+        meaning.setWordWrap(True)
+        meaning.setProperty("muted", True)
+        self.rig_choice = FileChoice("The rig of the films' cameras", "none: one film, its lens assumed", "No rig")
+        self.table = QTableWidget(0, 4)
+        self.table.setHorizontalHeaderLabels(["Camera", "Film", "", "Begins later by"])
+        self.table.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
+        self.table.setSelectionBehavior(QTableWidget.SelectionBehavior.SelectRows)
+        self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
+        self.table.verticalHeader().hide()
+        self.add_button, self.folder_button = QPushButton("Add films …"), QPushButton("Add a folder …")
+        self.folder_button.setToolTip("All films in a folder, in the order of their names.")
+        self.remove_button = QPushButton("Remove")
+        self.remove_button.setToolTip("Take the chosen film off the list (Delete); the file stays.")
+        self.sentence = Sentence(_LINES)
+        self.bar = QProgressBar()
+        self.bar.setRange(0, 1000)
+        self.bar.setTextVisible(False)
+        self.track_button, self.close_button = QPushButton("Track …"), QPushButton("Close")
+        self.track_button.setToolTip("Choose where the recording is written; it opens when it is whole.")
+        self._lay_out(meaning)
+        self.add_button.clicked.connect(self._choose_films)
+        self.folder_button.clicked.connect(self._choose_folder)
+        self.remove_button.clicked.connect(self.remove)
+        self.table.itemSelectionChanged.connect(self._show_state)
+        self.rig_choice.changed.connect(self._take_rig)
+        self.track_button.clicked.connect(self._track_or_cancel)
+        self.close_button.clicked.connect(self.reject)
+        self._show_state()
+
+    def _lay_out(self, meaning: QLabel) -> None:
+        rig, films, buttons = QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
+        rig.addWidget(QLabel("Rig"))
+        rig.addWidget(self.rig_choice, 1)
+        for button in (self.add_button, self.folder_button, self.remove_button):
+            button.setAutoDefault(False)
+            films.addWidget(button)
+        films.addStretch(1)
+        buttons.addWidget(self.bar, 1)
+        buttons.addWidget(self.close_button)
+        buttons.addWidget(self.track_button)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(12)
+        layout.addWidget(meaning)
+        layout.addLayout(rig)
+        layout.addWidget(self.table, 1)
+        layout.addLayout(films)
+        layout.addWidget(self.sentence)
+        layout.addLayout(buttons)
+
+    # -- what is asked for -----------------------------------------------------------------------------------------
+
+    @property
+    def films(self) -> list[ChosenFilm]:
+        """The films on the list."""
+        found = []
+        for row in range(self.table.rowCount()):
+            camera, later = self.table.cellWidget(row, 0), self.table.cellWidget(row, 3)
+            assert isinstance(camera, QComboBox) and isinstance(later, QDoubleSpinBox)
+            found.append(ChosenFilm(camera.currentText(), self._path(row), later.value()))
+        return found
+
+    def _path(self, row: int) -> Path:
+        item = self.table.item(row, 1)
+        assert item is not None
+        return Path(item.data(Qt.ItemDataRole.UserRole))
+
+    def add(self, paths: list[Path]) -> None:
+        """Put films on the list; each takes the next camera of the rig."""
+        known = {film.path for film in self.films}
+        for path in paths:
+            if path in known:
+                continue
+            known.add(path)
+            row = self.table.rowCount()
+            with QSignalBlocker(self.table):  # a row without its parts is not looked at
+                self.table.insertRow(row)
+                name, what, later = QTableWidgetItem(path.name), QTableWidgetItem("…"), QDoubleSpinBox()
+                name.setData(Qt.ItemDataRole.UserRole, str(path))
+                name.setToolTip(str(path))
+                later.setRange(-_LATEST_S, _LATEST_S)
+                later.setDecimals(3)
+                later.setSuffix(" s")
+                later.setToolTip("By how much this film began after the others.")
+                self.table.setCellWidget(row, 0, QComboBox())
+                self.table.setItem(row, 1, name)
+                self.table.setItem(row, 2, what)
+                self.table.setCellWidget(row, 3, later)
+            self._name_cameras()
+            self._looks.append(Job(partial(_describe, path), partial(self._show_what, path, wrong=False),
+                                   partial(self._show_what, path, wrong=True), None, self).start())
+        self._show_state()
+
+    def remove(self) -> None:
+        """Take the chosen films off the list."""
+        with QSignalBlocker(self.table):
+            for row in sorted({index.row() for index in self.table.selectedIndexes()}, reverse=True):
+                self.table.removeRow(row)
+        self._show_state()
+
+    def _choose_films(self) -> None:
+        names, _ = QFileDialog.getOpenFileNames(
+            self, "Films", str(self._folder()), f"Films ({' '.join(f'*{one}' for one in ENDINGS)});;All files (*)")
+        self.add([Path(name) for name in names])
+
+    def _choose_folder(self) -> None:
+        name = QFileDialog.getExistingDirectory(self, "A folder of films", str(self._folder()))
+        if name:
+            found = sorted(path for path in Path(name).iterdir() if path.suffix.lower() in ENDINGS)
+            self.add(found)
+            if not found:
+                self.sentence.setText(f"{name} holds no films ({', '.join(ENDINGS)}).")
+
+    def _folder(self) -> Path:
+        return self.films[-1].path.parent if self.table.rowCount() else Path.home()
+
+    def _take_rig(self) -> None:
+        self._rig, self.problem = None, ""
+        if self.rig_choice.path is not None:
+            try:
+                self._rig = load_rig(self.rig_choice.path)
+            except RhotError as exc:
+                self.problem = str(exc)
+        self._name_cameras()
+        self._show_state()
+
+    def _name_cameras(self) -> None:
+        """Offer the rig's cameras; a film whose name begins with a camera's gets that one."""
+        names = [node.name for node in self._rig.nodes] if self._rig is not None else ["camera"]
+        for row in range(self.table.rowCount()):
+            box = self.table.cellWidget(row, 0)
+            assert isinstance(box, QComboBox)
+            if [box.itemText(k) for k in range(box.count())] != names:
+                alike = [k for k, name in enumerate(names) if self._path(row).stem.lower().startswith(name.lower())]
+                box.clear()
+                box.addItems(names)
+                box.setCurrentIndex(alike[0] if alike else min(row, len(names) - 1))
+                box.currentIndexChanged.connect(self._show_state)
+
+    def _show_what(self, path: Path, text: str, *, wrong: bool) -> None:
+        for row in range(self.table.rowCount()):
+            item = self.table.item(row, 2)
+            if item is not None and self._path(row) == path:
+                item.setText("no film" if wrong else text)
+                item.setToolTip(text)
+                item.setData(Qt.ItemDataRole.UserRole, wrong)
+        self.table.resizeColumnToContents(2)
+        self._show_state()
+
+    def _wanting(self) -> str:
+        """What is missing before the films can be tracked, "" for nothing."""
+        films = self.films
+        if self.problem:
+            return self.problem
+        if not films:
+            return "Add the film of a hand, or those of several cameras."
+        for row in range(len(films)):
+            item = self.table.item(row, 2)
+            if item is not None and item.data(Qt.ItemDataRole.UserRole):
+                return item.toolTip()
+        if self._rig is None and len(films) > 1:
+            return "Several films need the rig of their cameras: choose its file, or remove all films but one."
+        cameras = [film.camera for film in films]
+        twice = next((name for name in cameras if cameras.count(name) > 1), None)
+        return f"Camera {twice} has two films: choose another camera for one of them." if twice else ""
+
+    def _show_state(self) -> None:
+        busy, wanting = self._job is not None, self._wanting()
+        for part in (self.add_button, self.folder_button, self.rig_choice, self.table):
+            part.setEnabled(not busy)
+        self.remove_button.setEnabled(not busy and bool(self.table.selectedIndexes()))
+        self.track_button.setText("Cancel" if busy else "Track …")
+        self.track_button.setEnabled(busy or not wanting)
+        if not busy:
+            self.sentence.setText(wanting or "Ready. Looking for hands takes about as long as the films.")
+
+    # -- tracking --------------------------------------------------------------------------------------------------
+
+    def _track_or_cancel(self) -> None:
+        if self._job is not None:
+            self.cancel()
+            return
+        first = self.films[0].path
+        name, _ = QFileDialog.getSaveFileName(self, "Write the recording to",
+                                              str(first.with_name(f"{first.stem}-hand.rhotlog")), LOG_FILTER)
+        if name:
+            self.track(Path(name))
+
+    def track(self, log: Path) -> None:
+        """Track the films in another process; `tracked` follows when the log is whole."""
+        rig, films = self.rig_choice.path, self.films
+
+        def work(progress: Progress) -> list[str]:
+            try:
+                said: list[str] = self._solver.run(log_films, (rig, films, log), progress.report)
+            except StoppedError as exc:
+                raise CancelledError("Cancelled.") from exc
+            return said
+
+        self._job = Job(work, lambda said: self._finish(log, said), self._fail, self._report, self).start()
+        self._show_state()
+
+    def cancel(self) -> None:
+        """Give the tracking up; nothing of it is left."""
+        job, self._job = self._job, None
+        if job is not None:
+            job.cancel()
+            self._solver.stop()
+            self.bar.setValue(0)
+            self._show_state()
+            self.sentence.setText("Cancelled; nothing was written.")
+
+    def _report(self, text: str, fraction: float) -> None:
+        self.sentence.setText(f"{text} …")
+        self.bar.setValue(round(1000 * fraction))
+
+    def _finish(self, log: Path, said: list[str]) -> None:
+        self._job = None
+        self.bar.setValue(1000)
+        self._show_state()
+        self.sentence.setText("\n".join(said))
+        self.tracked.emit(log)
+
+    def _fail(self, sentence: str) -> None:
+        self._job = None
+        self.bar.setValue(0)
+        self._show_state()
+        self.sentence.setText(sentence)
+
+    def done(self, result: int) -> None:
+        """What goes on is given up."""
+        self.cancel()
+        self._solver.stop()
+        for job in self._looks:
+            job.cancel()
+        super().done(result)
+
+
+def _describe(path: Path, progress: Progress) -> str:
+    return describe_film(path)
