@@ -225,3 +225,11 @@ def open_table(rig: Rig, name: str, out: Path, zero_ns: int | None = None) -> It
     with (whole_file(out, lambda: None) as path,
           contextlib.closing(StateTable(rig, name, format_of(None, out), path, zero_ns)) as table):
         yield table
+
+
+def closing_sentences(document: dict[str, Any]) -> list[str]:
+    """What the summaries of landmarks and contours have in common: rate, losses, files."""
+    out = [f"Computed: {document['computed_per_s']:.1f} frame sets a second overall, with reading and drawing."]
+    if document["lost_s"] and document["tracked"]:
+        out.append("No hand at " + ", ".join(f"{a:.2f} to {b:.2f}" for a, b in document["lost_s"]) + " s.")
+    return [*out, *(f"Written: {document[key]}" for key in ("out", "overlay", "log", "hand_file") if document.get(key))]

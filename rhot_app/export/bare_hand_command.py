@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     for path in (*given.values(), *empty_given.values()):
         input_file(path)  # refused before numba is loaded
     from rhot_app.export.bare_hand import learn_backgrounds, track_videos
-    from rhot_app.sources.frame_sets import checked_seconds
+    from rhot_app.sources.frame_sets import checked_seconds, open_videos
     from rhot_node.compiled import announce_compilation
 
     rig = msgspec.structs.replace(rig, nodes=tuple(node for node in rig.nodes if node.name in given),
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     announce_compilation()
     foreground, empty_s = None, 0.0
     if args.background:
-        empty = open_all(rig, empty_given, args.fps)
+        empty = open_videos(rig, empty_given, args.fps)
         if len(empty) < len(videos):
             missing = next(node.name for node in rig.nodes if node.name not in {video.camera for video in empty})
             raise RecordingError(f"--background: camera {missing} has none; give one for every camera.")
@@ -133,28 +133,19 @@ def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:
 
 def opened_videos(args: argparse.Namespace, rig: Rig, given: dict[str, str]) -> list[CameraVideo]:
     """The videos of cameras on one clock, by --fps and --offset-s, in the rig's order. Raises RecordingError."""
-    from rhot_app.sources.frame_sets import FPS, checked_seconds, on_one_clock
+    from rhot_app.sources.frame_sets import FPS, checked_seconds, on_one_clock, open_videos
 
     if args.fps is not None and not FPS[0] <= args.fps <= FPS[1]:
         raise RecordingError(f"--fps {args.fps:g}: give the frames per second, from {FPS[0]:g} to {FPS[1]:g}.")
-    return on_one_clock(open_all(rig, given, args.fps), {
+    return on_one_clock(open_videos(rig, given, args.fps), {
         name: checked_seconds(text, f"--offset-s {name}")
         for name, text in named(args.offset_s, "--offset-s", rig).items()})
 
 
-def open_all(rig: Rig, paths: dict[str, str], fps: float | None) -> list[CameraVideo]:
-    """The videos of cameras, in the rig's order. Raises RecordingError."""
-    from rhot_app.sources.frame_sets import open_video
-
-    files = [Path(path).resolve() for path in paths.values()]
-    doubled = next((path for path in files if files.count(path) > 1), None)
-    if doubled is not None:
-        raise RecordingError(f"{doubled}: it is given for two cameras; each has its own video.")
-    return [open_video(node, Path(paths[node.name]), fps) for node in rig.nodes if node.name in paths]
-
-
 def sentences(document: dict[str, Any]) -> list[str]:
     """The summary for a person."""
+    from rhot_app.export.bare_hand import closing_sentences
+
     count, tracked = document["frame_sets"], document["tracked"]
     out = [f"{count} frame sets, {document['frames_left_out']} frames outside the time that all videos show."]
     if not tracked:
@@ -172,11 +163,3 @@ def sentences(document: dict[str, Any]) -> list[str]:
                    f"{one['lengths_sd_percent']:.1f} %, radii by {one['radii_percent']:.1f} ± "
                    f"{one['radii_sd_percent']:.1f} % (rms).")
     return [*out, *closing_sentences(document)]
-
-
-def closing_sentences(document: dict[str, Any]) -> list[str]:
-    """What the summaries of landmarks and contours have in common: rate, losses, files."""
-    out = [f"Computed: {document['computed_per_s']:.1f} frame sets a second overall, with reading and drawing."]
-    if document["lost_s"] and document["tracked"]:
-        out.append("No hand at " + ", ".join(f"{a:.2f} to {b:.2f}" for a, b in document["lost_s"]) + " s.")
-    return [*out, *(f"Written: {document[key]}" for key in ("out", "overlay", "log", "hand_file") if document.get(key))]

@@ -9,11 +9,9 @@ from pathlib import Path
 import cv2
 
 from rhot_app.errors import RecordingError
-from rhot_app.export.bare_hand_command import open_all
-from rhot_app.export.track_command import ASSUMED_DEG, assumed_rig, picture_size, sentences
 from rhot_app.progress import Progress, silent
-from rhot_app.project import load_rig
-from rhot_app.sources.frame_sets import on_one_clock, picture_files
+from rhot_app.project import Intrinsics, load_rig
+from rhot_app.sources.frame_sets import on_one_clock, open_videos, picture_files, picture_size
 from rhot_node.errors import PictureError
 from rhot_node.pictures import open_video
 
@@ -53,7 +51,12 @@ def log_films(rig_file: Path | None, films: Sequence[ChosenFilm], log: Path, *,
     or RigError.
     """
     # numerical code, for which no window should wait
-    from rhot_app.export.landmark_track import landmark_rig_of, track_landmarks
+    from rhot_app.export.landmark_track import (
+        assumed_rig,
+        landmark_rig_of,
+        landmark_sentences,
+        track_landmarks,
+    )
     from rhot_node.landmarks.networks import open_hand_networks
 
     open_hand_networks()  # without them nothing is begun
@@ -61,15 +64,15 @@ def log_films(rig_file: Path | None, films: Sequence[ChosenFilm], log: Path, *,
     if rig_file is None:
         rig = assumed_rig([str(film.path) for film in films])
         films = [ChosenFilm(rig.nodes[0].name, films[0].path)]
-        said.append(f"The lens is assumed to see {ASSUMED_DEG:.0f} degrees across, so distances are a guess.")
+        said.append(f"The lens is assumed to see {Intrinsics.ASSUMED_DEG:.0f} degrees across, so distances are a guess.")
     else:
         rig = load_rig(rig_file)
         strange = next((film for film in films if film.camera not in {node.name for node in rig.nodes}), None)
         if strange is not None:
             raise RecordingError(f"{rig_file}: it has no camera {strange.camera!r}; choose another for {strange.path}.")
     rig = landmark_rig_of(rig, tuple(film.camera for film in films))
-    videos = on_one_clock(open_all(rig, {film.camera: str(film.path) for film in films}, None),
+    videos = on_one_clock(open_videos(rig, {film.camera: str(film.path) for film in films}, None),
                           {film.camera: film.offset_s for film in films})
     summary = track_landmarks(rig, videos, either_side=rig_file is None, kept=log, again=True, progress=progress)
-    return [*said, *sentences(summary.document() | {"out": None, "overlay": None, "log": str(log),
+    return [*said, *landmark_sentences(summary.document() | {"out": None, "overlay": None, "log": str(log),
                                                     "hand_file": None})]

@@ -24,19 +24,19 @@ from rhot_app.barehand.overlay import draw_skeleton
 from rhot_app.calibration.hand.landmark_bones import are_landmarks, measure_bones
 from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.calibration.recorded_observations import read_instants
-from rhot_app.errors import CalibrationError, RecordingError, note_loss
-from rhot_app.export.bare_hand import check_outputs, lost_intervals, open_table
+from rhot_app.errors import CalibrationError, RecordingError, input_file, note_loss
+from rhot_app.export.bare_hand import check_outputs, closing_sentences, lost_intervals, open_table
 from rhot_app.export.pictures import side_by_side, whole_pictures
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.landmarks import ANATOMY_SD_M, NOISE_M
 from rhot_app.progress import Progress, silent
-from rhot_app.project import Rig, landmark_markers
+from rhot_app.project import Intrinsics, Rig, RigNode, landmark_markers
 from rhot_app.recording.films import FILMS, NamedFilm
 from rhot_app.recording.landmark_log import FIRST_NS, HandFilm, landmark_order, write_hand_log
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.rig_history import accept_hand
-from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out
+from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out, picture_size
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
 from rhot_app.tracking.rig_arrays import rigs_of_hands
@@ -103,6 +103,16 @@ def landmark_rig_of(rig: Rig, cameras: Sequence[str]) -> Rig:
         rig, nodes=nodes, markers=landmark_markers(rig.other_hand is not None), depth=type(rig.depth)(),
         filters=type(rig.filters)(), objects=(),
         tracker=msgspec.structs.replace(rig.tracker, kind="estimator", observe="landmarks"))
+
+
+def assumed_rig(videos: list[str]) -> Rig:
+    """A rig of one camera whose lens is assumed, for one video. Raises RecordingError."""
+    if len(videos) != 1:
+        raise RecordingError(f"{len(videos)} videos need a calibrated rig with a camera for each; give it with --rig. "
+                             "One video alone is tracked without." if videos else
+                             "give a video, or a rig with --rig and a video of each camera.")
+    lens = Intrinsics.assumed(*picture_size(input_file(videos[0])))
+    return Rig("one assumed camera", (RigNode(1, "camera", lens),))
 
 
 def find_hands(video: CameraVideo, progress: Progress = silent) -> HandFilm:
@@ -316,6 +326,33 @@ def summarise(rig: Rig, states: Sequence[HandState]) -> dict[str, Any]:
             "reprojection_px": float(np.nanmedian(np.concatenate(errors))), "reprojection_mm": 1e3 * error_m,
             "reprojection_large": error_m > LARGE * MEDIAN_M,
             "joint_sd_mm": 1e3 * float(np.sqrt(np.mean(variances)))}
+
+
+def landmark_sentences(document: dict[str, Any]) -> list[str]:
+    """The summary for a person."""
+    left_out = document["frames_left_out"]
+    out = [f"{document['frame_sets']} frame sets.",
+           *([f"{left_out} frames are of a time that not all videos show; an overlay leaves them out."]
+             if left_out else []),
+           "The networks found the hand in " + ", ".join(f"{100 * part:.0f} % of {camera}'s pictures"
+                                                         for camera, part in document["found"].items()) + "."]
+    foreign = max(document["foreign"].values())
+    if foreign > max(document["found"].values()) and document["other_tracked"] is None:
+        other = "left" if document["side"] == "right" else "right"
+        out.append(f"In {100 * foreign:.0f} % they found a {other} hand, which is not tracked: the rig's hand is a "
+                   f"{document['side']} one. Give a rig with a {other} hand (resources/hands/{other}.json).")
+    if not (document["tracked"] or document["other_tracked"]):
+        return [*out, "No hand was tracked. Is the rig's hand of the right side, and are the videos in its cameras' "
+                      "order?"]
+    both = document["other_tracked"]
+    out += [f"A hand in {100 * document['tracked']:.0f} % of the frame sets"
+            + ("." if both is None else f", the other hand in {100 * both:.0f} %."), document["bones"],
+            f"Reprojection error of the joints: median {document['reprojection_px']:.1f} px, at the hand "
+            f"{document['reprojection_mm']:.1f} mm."]
+    if document["reprojection_large"]:
+        out.append("That is large. Do not rely on the hand: check the rig's calibration, the cameras' order and the "
+                   "hand's side and size.")
+    return [*out, *closing_sentences(document)]
 
 
 def _one_of_each_instant(states: Iterator[HandState], half_ns: int) -> Iterator[HandState]:

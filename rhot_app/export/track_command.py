@@ -5,15 +5,16 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rhot_app.errors import RecordingError, input_file
 from rhot_app.export import bare_hand_command
-from rhot_app.export.bare_hand_command import closing_sentences, named, opened_videos
+from rhot_app.export.bare_hand_command import named, opened_videos
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot track``, whose former name is ``rhot bare-hand``."""
@@ -74,6 +75,15 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
         raise RecordingError("--adapt writes the bones that are measured; leave --bones rig out.")
     if args.background or args.background_seconds is not None:
         said.append("Landmarks need no background: what was given of it is not used.")
+    for path in () if rig is not None else [*args.videos, *(args.video or [])]:
+        input_file(path)  # refused before numba is loaded
+    from rhot_app.export.landmark_track import (
+        assumed_rig,
+        landmark_rig_of,
+        landmark_sentences,
+        track_landmarks,
+    )
+
     if rig is None:
         rig = assumed_rig([*args.videos, *(args.video or [])])
         lens = rig.nodes[0].intrinsics
@@ -84,7 +94,6 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
         given = named(with_names(args, rig), "--video" if args.video else "", rig)
     for path in given.values():
         input_file(path)  # refused before numba is loaded
-    from rhot_app.export.landmark_track import landmark_rig_of, track_landmarks
     from rhot_app.progress import ProgressLine
     from rhot_node.compiled import announce_compilation
     from rhot_node.landmarks.networks import open_hand_networks
@@ -105,74 +114,5 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
                                      "log": args.log and str(args.log),
                                      "hand_file": str(args.adapt) if summary.adapted else None,
                                      "notes": said}
-    print(json.dumps(document) if args.json else "\n".join([*said, *sentences(document)]))
+    print(json.dumps(document) if args.json else "\n".join([*said, *landmark_sentences(document)]))
     return 0
-
-
-def assumed_rig(videos: list[str]) -> Rig:
-    """A rig of one camera whose lens is assumed, for one video. Raises RecordingError."""
-    from rhot_app.project import Intrinsics, Rig, RigNode
-
-    if len(videos) != 1:
-        raise RecordingError(f"{len(videos)} videos need a calibrated rig with a camera for each; give it with --rig. "
-                             "One video alone is tracked without." if videos else
-                             "give a video, or a rig with --rig and a video of each camera.")
-    lens = Intrinsics.assumed(*picture_size(input_file(videos[0])))
-    return Rig("one assumed camera", (RigNode(1, "camera", lens),))
-
-
-def picture_size(path: Path) -> tuple[int, int]:
-    """Width and height, px, of a video's pictures. Raises RecordingError."""
-    import cv2
-
-    from rhot_app.sources.frame_sets import picture_files
-    from rhot_node.capture.yuv import HEADER_NAME, read_header
-    from rhot_node.errors import CameraError, PictureError
-    from rhot_node.pictures import open_video, read_picture
-
-    try:
-        if pictures := picture_files(path):
-            height, width = read_picture(pictures[0]).shape[:2]
-            return width, height
-        if (path / HEADER_NAME).exists():
-            header = read_header(path)
-            return header.width, header.height
-        if path.is_dir():
-            raise RecordingError(f"{path}: this folder has neither pictures nor a recording of raw frames.")
-        capture = open_video(path)
-    except (CameraError, PictureError) as exc:
-        raise RecordingError(str(exc)) from exc
-    try:
-        width, height = (int(capture.get(what)) for what in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
-    finally:
-        capture.release()
-    if not (width > 0 and height > 0):
-        raise RecordingError(f"{path}: no frame of it can be decoded. Is it a video, and complete?")
-    return width, height
-
-
-def sentences(document: dict[str, Any]) -> list[str]:
-    """The summary for a person."""
-    left_out = document["frames_left_out"]
-    out = [f"{document['frame_sets']} frame sets.",
-           *([f"{left_out} frames are of a time that not all videos show; an overlay leaves them out."]
-             if left_out else []),
-           "The networks found the hand in " + ", ".join(f"{100 * part:.0f} % of {camera}'s pictures"
-                                                         for camera, part in document["found"].items()) + "."]
-    foreign = max(document["foreign"].values())
-    if foreign > max(document["found"].values()) and document["other_tracked"] is None:
-        other = "left" if document["side"] == "right" else "right"
-        out.append(f"In {100 * foreign:.0f} % they found a {other} hand, which is not tracked: the rig's hand is a "
-                   f"{document['side']} one. Give a rig with a {other} hand (resources/hands/{other}.json).")
-    if not (document["tracked"] or document["other_tracked"]):
-        return [*out, "No hand was tracked. Is the rig's hand of the right side, and are the videos in its cameras' "
-                      "order?"]
-    both = document["other_tracked"]
-    out += [f"A hand in {100 * document['tracked']:.0f} % of the frame sets"
-            + ("." if both is None else f", the other hand in {100 * both:.0f} %."), document["bones"],
-            f"Reprojection error of the joints: median {document['reprojection_px']:.1f} px, at the hand "
-            f"{document['reprojection_mm']:.1f} mm."]
-    if document["reprojection_large"]:
-        out.append("That is large. Do not rely on the hand: check the rig's calibration, the cameras' order and the "
-                   "hand's side and size.")
-    return [*out, *closing_sentences(document)]

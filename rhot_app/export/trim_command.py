@@ -7,7 +7,7 @@ import math
 import sys
 from pathlib import Path
 
-from rhot_app.errors import RecordingError, add_force_argument, input_file
+from rhot_app.errors import RecordingError, add_force_argument, finite, input_file
 from rhot_app.export.export_command import READ_WITH_LOSSES
 from rhot_node.terminal import add_examples
 
@@ -15,9 +15,9 @@ from rhot_node.terminal import add_examples
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot trim``."""
     parser.add_argument("path", type=input_file, metavar="LOG", help="a raw log")
-    parser.add_argument("--from", dest="begin", type=float, default=0.0, metavar="S",
+    parser.add_argument("--from", dest="begin", type=finite, default=0.0, metavar="S",
                         help="first moment, s since the first state, as in the replay and in exports (default 0)")
-    parser.add_argument("--to", dest="end", type=float, default=math.inf, metavar="S",
+    parser.add_argument("--to", dest="end", type=finite, default=math.inf, metavar="S",
                         help="last moment (default: the end)")
     parser.add_argument("--out", type=Path, required=True, metavar="PART", help="the log to write")
     add_force_argument(parser)
@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.export.trim import trim_log
     from rhot_app.progress import ProgressLine
 
-    if not (math.isfinite(args.begin) and 0.0 <= args.begin < args.end):
+    if not 0.0 <= args.begin < args.end:
         raise RecordingError(f"--from {args.begin:g} --to {args.end:g}: give a moment, s, and a later one.")
     first_ns = int(first_states(args.path, "csv", ExportOptions(), 1).t_master_ns[0])
     end_ns = 2**63 - 1 if math.isinf(args.end) else first_ns + round(1e9 * args.end)

@@ -167,6 +167,35 @@ def open_video(node: RigNode, path: Path, fps: float | None = None) -> CameraVid
     return CameraVideo(node.name, path, node.intrinsics, times, False)
 
 
+def open_videos(rig: Rig, paths: dict[str, str], fps: float | None) -> list[CameraVideo]:
+    """The videos of cameras, in the rig's order. Raises RecordingError."""
+    files = [Path(path).resolve() for path in paths.values()]
+    doubled = next((path for path in files if files.count(path) > 1), None)
+    if doubled is not None:
+        raise RecordingError(f"{doubled}: it is given for two cameras; each has its own video.")
+    return [open_video(node, Path(paths[node.name]), fps) for node in rig.nodes if node.name in paths]
+
+
+def picture_size(path: Path) -> tuple[int, int]:
+    """Width and height, px, of a video's pictures. Raises RecordingError."""
+    try:
+        if pictures := picture_files(path):
+            height, width = read_picture(pictures[0]).shape[:2]
+            return width, height
+        if (path / HEADER_NAME).exists():
+            header = read_header(path)
+            return header.width, header.height
+        if path.is_dir():
+            raise RecordingError(f"{path}: this folder has neither pictures nor a recording of raw frames.")
+    except (CameraError, PictureError) as exc:
+        raise RecordingError(str(exc)) from exc
+    with _opened(path) as capture:
+        width, height = (int(capture.get(what)) for what in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+    if not (width > 0 and height > 0):
+        raise RecordingError(f"{path}: no frame of it can be decoded. Is it a video, and complete?")
+    return width, height
+
+
 def picture_files(path: Path) -> tuple[Path, ...]:
     """The pictures that a path names: itself, or those of a folder in the order of their names; none for a video and
     for a recording of raw frames."""

@@ -7,11 +7,12 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QByteArray, Qt, QTimer
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QSplitter, QVBoxLayout, QWidget
 
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState
 from rhot_app.ui.backend.live import SILENCE_S, Live
+from rhot_app.ui.common.scrolled import scrolled
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import each_hand
@@ -249,12 +250,3 @@ class Docks:
             dock.show()
         self._arranged = True
         QTimer.singleShot(0, self.set_sizes)
-
-
-def scrolled(widget: QWidget) -> QScrollArea:
-    """A widget that scrolls up and down where there is no room for all of it."""
-    frame = QScrollArea()
-    frame.setWidgetResizable(True)
-    frame.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    frame.setWidget(widget)
-    return frame

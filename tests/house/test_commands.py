@@ -44,6 +44,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
                        "--unknown-size", "--out", "--overlay", "--force", "--json"),
     "rhot export": ("LOG", "--out", "--format", "--rig", "--tracker", "--rate", "--frame", "--units", "--hand",
                     "--smooth", "--force"),
+    "rhot trim": ("LOG", "--from", "--to", "--out", "--force"),
     "rhot batch": ("LOG", "--do", "--out", "--workers", "--scheduler", "--force", "--format", "--rig", "--tracker"),
     "rhot simulate": ("--motion", "--seconds", "--out", "--show", "--pictures", "--points", "--markers", "--lamp",
                       "--kelvin"),
@@ -202,7 +203,7 @@ def test_wizards_and_commands_call_a_calibration_by_one_name() -> None:
 def test_a_file_that_exists_is_only_replaced_by_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The option has one name in all commands that have it; a bare hand's and a batch's have their own tests."""
     with_force = {name for name in SUBCOMMANDS if "--force" in help_of(f"rhot {name}")}
-    assert with_force == {"report", "layers", "export", "poses", "track", "bare-hand", "batch"}
+    assert with_force == {"report", "layers", "export", "poses", "track", "trim", "bare-hand", "batch"}
     log, mine = tmp_path / "a.rhotlog", {name: tmp_path / f"mine.{name}" for name in ("zip", "png", "csv")}
     for path in (log, *mine.values()):
         path.write_text("mine")

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSpli
 
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.state import Condition, HandState
+from rhot_app.ui.common.scrolled import scrolled
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.models.pacing import FramePacer
@@ -25,7 +26,6 @@ from rhot_app.ui.replay.film_panel import FilmPanel
 from rhot_app.ui.replay.session import SPEEDS, Comparison, Replay
 from rhot_app.ui.replay.timeline import Timeline
 from rhot_app.ui.scene.view import SceneView
-from rhot_app.ui.screen import scrolled
 
 PANEL_S = 0.1
 PLOT_S = 0.25
