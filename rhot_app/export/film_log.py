@@ -64,7 +64,7 @@ def log_films(rig_file: Path | None, films: Sequence[ChosenFilm], log: Path, *,
     if rig_file is None:
         rig = assumed_rig([str(film.path) for film in films])
         films = [ChosenFilm(rig.nodes[0].name, films[0].path)]
-        said.append(f"The lens is assumed to see {Intrinsics.ASSUMED_DEG:.0f} degrees across, so distances are a guess.")
+        said.append(f"The lens is assumed to see {Intrinsics.ASSUMED_DEG:.0f} degrees across: distances are a guess.")
     else:
         rig = load_rig(rig_file)
         strange = next((film for film in films if film.camera not in {node.name for node in rig.nodes}), None)
