@@ -75,7 +75,11 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
         raise RecordingError("--adapt writes the bones that are measured; leave --bones rig out.")
     if args.background or args.background_seconds is not None:
         said.append("Landmarks need no background: what was given of it is not used.")
-    for path in () if rig is not None else [*args.videos, *(args.video or [])]:
+    paths = [*args.videos, *(args.video or [])]
+    if rig is not None:
+        given = named(with_names(args, rig), "--video" if args.video else "", rig)
+        paths = list(given.values())
+    for path in paths if rig is not None or len(paths) == 1 else ():
         input_file(path)  # refused before numba is loaded
     from rhot_app.export.landmark_track import (
         assumed_rig,
@@ -85,15 +89,11 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
     )
 
     if rig is None:
-        rig = assumed_rig([*args.videos, *(args.video or [])])
+        rig = assumed_rig(paths)
         lens = rig.nodes[0].intrinsics
         said.append(f"Without --rig the lens is assumed to see {lens.ASSUMED_DEG:.0f} degrees across (focal length "
                     f"{lens.fx:.0f} px) and the hand to be of usual size; distances are as wrong as these.")
-        given = {rig.nodes[0].name: next(iter([*args.videos, *(args.video or [])]))}
-    else:
-        given = named(with_names(args, rig), "--video" if args.video else "", rig)
-    for path in given.values():
-        input_file(path)  # refused before numba is loaded
+        given = {rig.nodes[0].name: paths[0]}
     from rhot_app.progress import ProgressLine
     from rhot_node.compiled import announce_compilation
     from rhot_node.landmarks.networks import open_hand_networks

@@ -20,7 +20,7 @@ from rhot_app.export.landmark_track import states_of_log
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.project import TrackerSettings, landmark_markers, load_rig, save_rig
-from rhot_app.recording.films import recorded_films
+from rhot_app.sources.films import recorded_films
 from rhot_app.recording.landmark_log import write_landmark_log
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.rig_history import versions
