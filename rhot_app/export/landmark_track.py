@@ -32,10 +32,10 @@ from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.landmarks import ANATOMY_SD_M, NOISE_M
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Intrinsics, Rig, RigNode, landmark_markers
-from rhot_app.sources.films import FILMS, NamedFilm
 from rhot_app.recording.landmark_log import FIRST_NS, HandFilm, landmark_order, write_hand_log
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.rig_history import accept_hand
+from rhot_app.sources.films import FILMS, NamedFilm
 from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out, picture_size
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState

@@ -20,11 +20,11 @@ from rhot_app.export.landmark_track import states_of_log
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.project import TrackerSettings, landmark_markers, load_rig, save_rig
-from rhot_app.sources.films import recorded_films
 from rhot_app.recording.landmark_log import write_landmark_log
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.rig_history import versions
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
+from rhot_app.sources.films import recorded_films
 from rhot_app.state import Condition
 from rhot_node.capture.yuv import YuvWriter
 from rhot_node.detect.image import from_bgr

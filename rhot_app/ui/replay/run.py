@@ -27,8 +27,8 @@ from rhot_app.errors import RecordingError
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.recording.bookmarks import Bookmark, bookmarks_of
-from rhot_app.sources.films import RecordedFilm, recorded_films
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
+from rhot_app.sources.films import RecordedFilm, recorded_films
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
