@@ -154,7 +154,7 @@ def follow(tracker: BareHandTracker, cameras: list[CameraModel], films: list[lis
     print(f"to the triangulated landmarks, median joint, mm: median {np.median(away_mm):.1f}, p95 "
           f"{np.percentile(away_mm, 95):.1f}, worst {np.max(away_mm):.1f}")
     print(f"frames {len(worst)}, tracked {np.mean(np.array(worst) < 0.1):.0%}, worst joint {np.median(worst):.2f}, "
-          f"median joint {np.median(median):.3f}, contour found {np.nanmean(tracker.fit.support):.2f}")
+          f"median joint {np.median(median):.3f}, contour found {np.nanmean(tracker.support):.2f}")
     if arguments.overlay is not None:
         shown = [overlay(frames[arguments.last - 1], frame, tracker.filter.newest.state)
                  for frames, frame in zip(films, tracker.frames, strict=True) if frame is not None]

@@ -112,7 +112,7 @@ class HandFollower:
 
     def _supported(self, images: Sequence[Image | None]) -> bool:
         """Whether most of the expected contour is found in these images."""
-        counts = np.sum([self.tracker.fit.slice_counts[c].sum(axis=0)
+        counts = np.sum([self.tracker.slice_counts[c].sum(axis=0)
                          for c, image in enumerate(images) if image is not None], axis=0)
         return bool(counts[0] > MAJORITY * counts[1])
 

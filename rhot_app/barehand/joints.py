@@ -10,7 +10,10 @@ from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, SH
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
+from rhot_app.hand.skeleton import HandPose
 from rhot_app.state import Knowledge
+
+Array = NDArray[np.float64]
 
 
 def knowledge_of(sd: ArrayLike, observed: ArrayLike, measured: float, inferred: float) -> NDArray[np.uint8]:
@@ -19,6 +22,13 @@ def knowledge_of(sd: ArrayLike, observed: ArrayLike, measured: float, inferred: 
     guessed = np.where(np.asarray(sd) <= inferred, int(Knowledge.INFERRED), int(Knowledge.GUESSED))
     certain = (np.asarray(sd) <= measured) & np.asarray(observed, np.bool_)
     return np.where(certain, int(Knowledge.MEASURED), guessed).astype(np.uint8)
+
+
+def pose_of(state: Array) -> HandPose:
+    """The pose in a state."""
+    world = np.eye(4)
+    world[:3] = state[:ANGLES].reshape(3, 4)
+    return HandPose(world, state[ANGLES:VELOCITY].copy())
 
 
 @njit(cache=True)

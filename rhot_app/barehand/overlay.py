@@ -9,39 +9,57 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
-from rhot_app.barehand.contours import INNER
+from rhot_app.barehand.contours import SILHOUETTE
+from rhot_app.state import SeenContour
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 SILHOUETTE_RGB, INNER_RGB, BONE_RGB = (40, 230, 80), (60, 140, 255), (255, 255, 255)
 FOUND_RGB, OTHER_RGB, SLICE_RGB = (255, 40, 40), (255, 220, 0), (110, 110, 110)
+NEAR_SD = 3.0
+"""Standard deviations from the contour within which an edge is displayed as the hand's."""
+
 _SUB = 4  # bits of a pixel's fraction in OpenCV's drawing
+
+
+def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array, t_node_ns: int = 0,
+                 shown: bool = False) -> SeenContour:
+    """The contour of a hand in `state` in the image of `t_ns`, `t_node_ns` by its node's clock, with slices and edges,
+    for display. `shown`: see `SeenContour`."""
+    offset, _, good = frame.predict(state)
+    centre, normal, half = frame.slices[:, :2], frame.slices[:, 2:4], frame.slices[:, 4:]
+    ends = np.hstack([centre - half * normal, centre + half * normal])
+    places, near = np.empty((0, 2)), np.empty(0, np.bool_)
+    if frame.edges is not None:
+        edges = frame.edges
+        row, column = np.nonzero((np.arange(edges.offset.shape[1]) < edges.number[:, None]) & good[:, None])
+        along = edges.offset[row, column]
+        places = centre[row] + along[:, None] * normal[row]
+        near = np.abs(along - offset[row]) < NEAR_SD * np.hypot(frame.expected_sd[row], edges.sd[row, column])
+    return SeenContour(camera, t_ns, (centre + offset[:, None] * normal)[good],
+                       frame.points.behind[good] == SILHOUETTE, ends[good] if not shown else np.empty((0, 4)), places,
+                       near, t_node_ns, shown=shown)
 
 
 def overlay(image: Image, frame: ContourFrame, state: Array, joints: Array | None = None, zoom: int = 1) -> Image:
     """A copy of `image` (H, W, 3) RGB, `zoom` times as large, with the contour of the hand in `state`: green before the
-    background, blue before another part of the hand. Slices are thin and grey. Edges are red where they are probably
-    the hand's, otherwise yellow. `joints` (21, 2) px are drawn as a skeleton."""
+    background, blue before another part of the hand. Slices are thin and grey. Edges are red where they are the hand's,
+    otherwise yellow. `joints` (21, 2) px are drawn as a skeleton."""
+    seen = seen_contour("", 0, frame, state)
     out = cv2.resize(image, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_LINEAR)
 
     def place(p: Array) -> tuple[int, int]:
         x, y = (np.asarray(p) + 0.5) * zoom - 0.5
         return round(float(x) * 2**_SUB), round(float(y) * 2**_SUB)
 
-    offset, _, good = frame.predict(state)
-    found, _ = frame.weights(state)
-    edges = frame.edges
-    for s in np.flatnonzero(good):
-        colour = INNER_RGB if frame.points.behind[s] == INNER else SILHOUETTE_RGB
-        centre, normal, half = frame.slices[s, :2], frame.slices[s, 2:4], frame.slices[s, 4]
-        cv2.line(out, place(centre - half * normal), place(centre + half * normal), SLICE_RGB, 1, cv2.LINE_AA,
-                 _SUB)
-        cv2.circle(out, place(centre + offset[s] * normal), zoom << _SUB, colour, -1, cv2.LINE_AA, _SUB)
-        for k in range(int(edges.number[s]) if edges is not None else 0):
-            assert edges is not None
-            cv2.circle(out, place(centre + edges.offset[s, k] * normal), round(0.7 * zoom) << _SUB,
-                       FOUND_RGB if found[s, k] > 0.5 else OTHER_RGB, -1, cv2.LINE_AA, _SUB)
+    for ends in seen.slices:
+        cv2.line(out, place(ends[:2]), place(ends[2:]), SLICE_RGB, 1, cv2.LINE_AA, _SUB)
+    for point, outline in zip(seen.contour, seen.outline, strict=True):
+        cv2.circle(out, place(point), zoom << _SUB, SILHOUETTE_RGB if outline else INNER_RGB, -1, cv2.LINE_AA, _SUB)
+    for point, ours in zip(seen.edges, seen.of_hand, strict=True):
+        cv2.circle(out, place(point), round(0.7 * zoom) << _SUB, FOUND_RGB if ours else OTHER_RGB, -1, cv2.LINE_AA,
+                   _SUB)
     if joints is not None:
         draw_skeleton(np.asarray(out, np.uint8), (joints + 0.5) * zoom - 0.5)
     return np.asarray(out, dtype=np.uint8)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.joints import pose_of
 from rhot_app.barehand.silhouette import LogOddsMaps, log_odds_maps, score
 from rhot_app.barehand.start import STEP, ForegroundMaps, log_odds, settle
 from rhot_app.barehand.surface import SHAPE, Surface
@@ -109,13 +110,6 @@ class Relocaliser:
         moved = _with_pose(state, HandPose(world, angles))
         better = self.log_odds(odds, moved) > self.log_odds(odds, state) + RELOCALISATION_LOG_ODDS
         return moved if better else None
-
-
-def pose_of(state: Array) -> HandPose:
-    """The pose in a state."""
-    world = np.eye(4)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    return HandPose(world, state[ANGLES:VELOCITY].copy())
 
 
 def _with_pose(state: Array, pose: HandPose) -> Array:

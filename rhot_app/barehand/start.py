@@ -162,19 +162,18 @@ def mean_log_odds(pose: HandPose, size: Array, maps: ForegroundMaps, cameras: Se
 def _on_foreground(pose: HandPose, maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraModel],
                    model: HandModel, share: float) -> bool:
     joints = forward(model, pose).joints
-    return all(min(joints_on_foreground(camera, joints, one, STEP)) > share
+    return all(min(joints_on_foreground(camera, joints, one)) > share
                for camera, one in zip(cameras, maps, strict=True))
 
 
-def joints_on_foreground(camera: CameraModel, joints: Array, probability: NDArray[np.float32],
-                         step: int) -> tuple[float, float]:
+def joints_on_foreground(camera: CameraModel, joints: Array, probability: NDArray[np.float32]) -> tuple[float, float]:
     """Part of `joints` (J, 3) m, world, that project into a camera's image where the foreground (h, w) of every
-    `step`-th pixel is known, and the part of these that lie on foreground."""
+    STEP-th pixel is known, and the part of these that lie on foreground."""
     places = camera.project(joints)
     with np.errstate(invalid="ignore"):
         inside = np.all((places > -0.5) & (places < [camera.width - 0.5, camera.height - 0.5]), axis=1)
     rows, columns = probability.shape
-    x, y = (places[inside] // step).astype(int).T
+    x, y = (places[inside] // STEP).astype(int).T
     shown = probability[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)]
     shown = shown[~np.isnan(shown)]
     return len(shown) / len(places), float(np.mean(shown > 0.5)) if len(shown) else 0.0

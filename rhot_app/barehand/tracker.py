@@ -8,8 +8,8 @@ landmark residuals of the same state may be added at any time.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,8 @@ from rhot_app.barehand.contour_residual import (
     velocity_of,
 )
 from rhot_app.barehand.contours import STEP_M, contour_points
-from rhot_app.barehand.joints import knowledge_of, place_joints
-from rhot_app.barehand.relocalisation import ODDS_DROP, Relocaliser, pose_of
+from rhot_app.barehand.joints import knowledge_of, place_joints, pose_of
+from rhot_app.barehand.relocalisation import ODDS_DROP, Relocaliser
 from rhot_app.barehand.start import (
     CONTOUR_THRESHOLD,
     LOG_ODDS_THRESHOLD,
@@ -46,7 +46,6 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import build_model, with_locked
 from rhot_app.hand.motion.hand_process import (
     ACCELERATION,
-    ANGLES,
     BIAS,
     FASTEST,
     MOTION,
@@ -64,10 +63,10 @@ from rhot_app.state import (
     INFERRED_RAD,
     MEASURED_M,
     MEASURED_RAD,
-    UNESTIMATED,
     Condition,
     HandState,
     Knowledge,
+    no_hand,
 )
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import Foreground, foreground_map, no_foreground
@@ -85,7 +84,7 @@ LONGEST_PX = REACH * AMBIGUOUS_PX + 6.0
 """px: half of the longest slice. Farther away, the edges of other fingers are as probable."""
 
 PASSES, START_PASSES = 2, 6
-"""Searches of an image, and of the first one after a start or a relocalisation. Each search halves the standard
+"""Searches of an image, and of the first one after a start. Each search halves the standard
 deviation of the expected contour: six leave less than a pixel of LONGEST_PX."""
 
 SIZE_SD = 0.1, 0.05, 0.08
@@ -113,21 +112,6 @@ PHALANGES = MOTION + np.arange(THICKNESS, FOREARM_RADIUS)
 SAME_POSE_S = 1.0
 """s: images within this time show nearly the same pose, since a grasp takes a second, and count as one for the
 phalanges. Errors of edges and surface are correlated as long; taken as independent, they would move the lengths."""
-
-
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """How much of the expected contour was found in the last image of each camera. `slice_counts` (C, GROUPS, 2): of
-    each finger, the palm and the forearm, the slices on which the contour was found, and all."""
-
-    slice_counts: Array
-
-    @property
-    def support(self) -> Array:
-        """(6,) part of the contour of each finger and of the palm that was found by all cameras; NaN where none is
-        expected."""
-        total = self.slice_counts[:, :FOREARM].sum(axis=0)
-        return np.asarray(total[:, 0] / np.where(total[:, 1] > 0.0, total[:, 1], np.nan))
 
 
 class BareHandTracker:
@@ -206,7 +190,7 @@ class BareHandTracker:
     def verified(self, maps: ForegroundMaps, state: Array | None = None) -> bool:
         """Whether the last images and these maps show a hand in the newest state, or in `state` (n,) at the maps' time:
         CONTOUR_THRESHOLD of its contour and LOG_ODDS_THRESHOLD of its foreground."""
-        found, expected = self.fit.slice_counts.sum(axis=(0, 1))
+        found, expected = self.slice_counts.sum(axis=(0, 1))
         state = self.filter.newest.state if state is None else state
         known = any(one is not None for one in maps)
         return bool(found > CONTOUR_THRESHOLD * expected > 0.0 and known and mean_log_odds(
@@ -238,9 +222,8 @@ class BareHandTracker:
         if maps and odds and (self._first_update or relocaliser.search_due(odds, prediction[0], t_s)):
             start = relocaliser.relocalise(maps, prediction, self.process.stationary, since_s)
             relocaliser.last_search_s = t_s
-        initial = prediction[0] if start is None else start
         passes = START_PASSES if self._first_update or start is not None else PASSES
-        knot = self._fit(images, late, t_s, prediction, initial, extra, passes)
+        knot = self._fit(images, late, t_s, prediction, prediction[0] if start is None else start, extra, passes)
         if odds is not None:
             per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
             if start is not None and per_pixel < relocaliser.log_odds_per_pixel(odds, start) - ODDS_DROP:
@@ -250,6 +233,48 @@ class BareHandTracker:
             relocaliser.average(per_pixel, first=self._first_update)
         self._first_update = False
         return knot
+
+    def _restart(self, t_s: float, start: Array) -> tuple[Array, Array]:
+        """Restart the filter at rest in the pose and shape of the state `start`, with the newest covariance of the
+        shape. Returns state (n,) and covariance (n, n)."""
+        pose = pose_of(start)
+        state, covariance = self.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
+        state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
+        covariance[own, own] = self.filter.newest.covariance[own, own]
+        self.filter.start(t_s, state, covariance)
+        return state, covariance
+
+    def _fit(self, images: dict[int, Image], late_s: Mapping[int, float], t_s: float,
+             prediction: tuple[Array, Array], initial: Array, extra: Sequence[Residual], passes: int) -> Knot:
+        """Search the images and estimate the state, `passes` times; the first search is about the state `initial`."""
+        ambiguous: list[float] = []  # of the first searches
+
+        def search(number: int, state: Array) -> list[ContourFrame]:
+            frames = [self._search(camera, image, state, prediction[1] * 0.25**number, number == passes - 1,
+                                   late_s.get(camera, 0.0)) for camera, image in images.items()]
+            if number == 0:
+                ambiguous.extend(frame.ambiguous for frame in frames)
+            elif passes == PASSES:  # more of them search around a given start
+                for frame, share in zip(frames, ambiguous, strict=True):
+                    frame.ambiguous = share
+            return frames
+
+        return self.solve(t_s, prediction, initial, search, passes, extra)
+
+    def solve(self, t_s: float, prediction: tuple[Array, Array], state: Array,
+              contours: Callable[[int, Array], list[ContourFrame]], passes: int = PASSES,
+              extra: Sequence[Residual] = ()) -> Knot:
+        """Update the state at `t_s`, s since the start, by `extra` residuals and the `contours` of each pass, by its
+        number and the `state` (n,) so far. Raises LinAlgError when the observations contradict the estimate."""
+        residuals: list[Residual] = []
+        velocity = velocity_of(prediction)
+        for number in range(passes):
+            frames = contours(number, state)
+            residuals = [Contours(frames, velocity), *self.constraints, *extra]
+            if number < passes - 1:
+                better = update(self.process, t_s, prediction, residuals, state, self.filter.partial)
+                state, velocity = better.state, velocity_of((better.state, better.covariance))
+        return self.filter.add(t_s, residuals, prediction, state)
 
     def prepare_update(self, cameras: Iterable[int], t_s: float) -> None:
         """Prepare for an update at `t_s`, s since the start, by images of `cameras`: how many correlated images count
@@ -264,43 +289,10 @@ class BareHandTracker:
         share = min(max(t_s - last_s, 0.0) / SAME_POSE_S, 1.0) if cameras else 0.0
         self.filter.partial = Partial(PHALANGES, share)
 
-    def _restart(self, t_s: float, start: Array) -> tuple[Array, Array]:
-        """Restart the filter at rest in the pose and shape of the state `start`, with the newest covariance of the
-        shape. Returns state (n,) and covariance (n, n)."""
-        pose = pose_of(start)
-        state, covariance = self.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
-        state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
-        covariance[own, own] = self.filter.newest.covariance[own, own]
-        self.filter.start(t_s, state, covariance)
-        return state, covariance
-
-    def _fit(self, images: dict[int, Image], late_s: Mapping[int, float], t_s: float,
-             prediction: tuple[Array, Array], state: Array, extra: Sequence[Residual], passes: int) -> Knot:
-        """Search the images and estimate the state, `passes` times; the first search is about `state`."""
-        residuals: list[Residual] = []
-        confusable: list[float] = []
-        covariance, velocity = prediction[1], velocity_of(prediction)
-        for number in range(passes):
-            frames = [self._search(camera, image, state, covariance * 0.25**number, number == passes - 1,
-                                   late_s.get(camera, 0.0)) for camera, image in images.items()]
-            if number == 0:
-                confusable = [frame.confusable for frame in frames]
-            elif passes == PASSES:  # more of them search around a given start
-                for frame, share in zip(frames, confusable, strict=True):
-                    frame.confusable = share
-            residuals = [Contours(frames, velocity), *self.constraints, *extra]
-            if number < passes - 1:
-                better = update(self.process, t_s, prediction, residuals, state, self.filter.partial)
-                state, velocity = better.state, velocity_of((better.state, better.covariance))
-        return self.filter.add(t_s, residuals, prediction, state)
-
     def _maps(self, images: dict[int, Image]) -> list[NDArray[np.float32] | None] | None:
-        """Foreground probabilities of every STEP-th pixel of each camera, None of one without an image or an
-        informative foreground model; None without any."""
-        known = [c in images and model.informative for c, model in enumerate(self.foreground)]
-        if not any(known):
-            return None
-        return [foreground_map(images[c], self.foreground[c], STEP) if one else None for c, one in enumerate(known)]
+        """The maps of cameras with an informative foreground model; None without any."""
+        known = [images.get(c) if model.informative else None for c, model in enumerate(self.foreground)]
+        return None if all(image is None for image in known) else self.maps_of(known)
 
     def _search(self, camera: int, image: Image, state: Array, covariance: Array, last: bool,
                 late_s: float = 0.0) -> ContourFrame:
@@ -324,30 +316,37 @@ class BareHandTracker:
             then = self.process.retract(state, step)
         size, pose, image_size = state[BIAS:BIAS + SHAPE].copy(), self.poses[camera], (model.width, model.height)
         points = contour_points(self.surface, then, size, pose, model.intrinsics, image_size, step_m)
-        frame = slices_of(self.surface, state, covariance, pose, model.intrinsics, points, MOTION, self.row_s[camera],
-                          REACH, LONGEST_PX, self._repeated[camera], late_s)
-        frame.confusable = float(np.mean(frame.expected_sd > AMBIGUOUS_PX)) if len(frame.slices) else 0.0
+        frame = slices_of(self.surface, state, covariance, pose, model.intrinsics, points, self.row_s[camera], REACH,
+                          LONGEST_PX, self._repeated[camera], late_s)
+        frame.ambiguous = float(np.mean(frame.expected_sd > AMBIGUOUS_PX)) if len(frame.slices) else 0.0
         frame.expected_sd = np.minimum(frame.expected_sd, AMBIGUOUS_PX)
         return frame
 
     @property
-    def fit(self) -> Fit:
-        """How much of the expected contour the last images show."""
-        return Fit(np.array([np.zeros((GROUPS, 2)) if frame is None else frame.slice_counts for frame in self.frames]))
+    def slice_counts(self) -> Array:
+        """(C, GROUPS, 2): of the last image of each camera, and of each finger, the palm and the forearm, the slices on
+        which the expected contour was found, and all."""
+        return np.array([np.zeros((GROUPS, 2)) if frame is None else frame.slice_counts for frame in self.frames])
 
-    def state(self, begun: float | None = None, covariance: Array | None = None) -> HandState:
-        """The hand at the newest instant. `covariance` (n, n): published instead of the filter's, where markers
-        contradict it."""
+    @property
+    def support(self) -> Array:
+        """(6,) part of the contour of each finger and of the palm that was found by all cameras; NaN where none is
+        expected."""
+        found, total = self.slice_counts[:, :FOREARM].sum(axis=0).T
+        return np.asarray(found / np.where(total > 0.0, total, np.nan))
+
+    def state(self, begun: float | None = None, markers: tuple[str, ...] = ()) -> HandState:
+        """The hand at the newest instant, with nothing known of `markers`."""
         begun = time.perf_counter() if begun is None else begun
         knot = self.filter.newest
-        state, covariance = knot.state, knot.covariance if covariance is None else covariance
+        state, covariance = knot.state, knot.covariance
         points, covariances, motion = np.empty((26, 3)), np.empty((26, 3, 3)), np.empty((2, 21))
         place_joints(state, covariance, self.model.dh, self.surface.bone, points, covariances, motion)
         deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         frames = [frame for frame in self.frames if frame is not None]
         # predicted so uncertainly, fingers are taken for each other
-        guessed = bool(frames) and min(frame.confusable for frame in frames) > MAJORITY
-        frames = [frame for frame in frames if frame.confusable <= MAJORITY]
+        guessed = bool(frames) and min(frame.ambiguous for frame in frames) > MAJORITY
+        frames = [frame for frame in frames if frame.ambiguous <= MAJORITY]
         # cameras that found three slices or more of each finger, the palm and the forearm
         observing = np.zeros(GROUPS)
         if frames:
@@ -359,30 +358,22 @@ class BareHandTracker:
         angles = knowledge_of(deviation[6:POSE], observed[FINGER_OF_ANGLE], MEASURED_RAD, INFERRED_RAD)
         if guessed:
             joints[1:], angles[:] = int(Knowledge.GUESSED), int(Knowledge.GUESSED)
-        turn_sd = float(np.sqrt(np.trace(covariance[3:6, 3:6])))
-        world = np.eye(4)
-        world[:3] = state[:ANGLES].reshape(3, 4)
+        turn_sd, pose = float(np.sqrt(np.trace(covariance[3:6, 3:6]))), pose_of(state)
         self._sequence += 1
-        no_markers, cameras = np.empty((0, 3)), len(self.cameras)
-        t_ns = self._epoch_ns + round(1e9 * knot.t_s)
-        return HandState(
-            sequence=self._sequence - 1, t_master_ns=t_ns, t_receive_ns=t_ns,
-            condition=Condition.TRACKING if np.all(observing[[*range(6)]] >= 1) else Condition.PARTIAL,
-            marker_ids=(), marker_positions=no_markers, marker_raw_positions=no_markers,
-            marker_covariances=np.empty((0, 3, 3)), marker_knowledge=np.empty(0, np.uint8), camera_names=self.names,
-            camera_pixels=np.empty((cameras, 0, 2)), camera_flags=np.empty((cameras, 0), np.uint16),
-            joint_positions=points[:21], joint_knowledge=joints, fingertip_positions=points[21:],
-            angles=state[ANGLES:VELOCITY].copy(), angle_knowledge=angles, world_from_palm=world,
+        nowhere = no_hand(self._epoch_ns + round(1e9 * knot.t_s),
+                          Condition.TRACKING if np.all(observing[[*range(6)]] >= 1) else Condition.PARTIAL, self.names,
+                          time.perf_counter() - begun, markers)
+        return replace(
+            nowhere, sequence=self._sequence - 1, joint_positions=points[:21], joint_knowledge=joints,
+            fingertip_positions=points[21:], angles=pose.angles, angle_knowledge=angles,
+            world_from_palm=pose.world_from_palm,
             palm_knowledge=Knowledge(int(knowledge_of(turn_sd, observed[PALM], MEASURED_RAD, INFERRED_RAD))),
-            epipolar_error_px=np.empty(0),
-            **UNESTIMATED | {
-                "joint_covariances": covariances[:21], "fingertip_covariances": covariances[21:],
-                "angle_sd": deviation[6:POSE].copy(), "palm_covariance": covariance[:6, :6].copy(),
-                "velocity": state[VELOCITY:ACCELERATION].copy(), "acceleration": state[ACCELERATION:BIAS].copy(),
-                "velocity_sd": deviation[POSE:2 * POSE], "acceleration_sd": deviation[2 * POSE:3 * POSE],
-                "joint_velocity_sd": motion[0], "joint_acceleration_sd": motion[1],
-                "hand_scale": float(np.exp(state[BIAS])), "hand_scale_sd": float(deviation[MOTION])},
-            latency_s={"filter": time.perf_counter() - begun})
+            joint_covariances=covariances[:21], fingertip_covariances=covariances[21:],
+            angle_sd=deviation[6:POSE].copy(), palm_covariance=covariance[:6, :6].copy(),
+            velocity=state[VELOCITY:ACCELERATION].copy(), acceleration=state[ACCELERATION:BIAS].copy(),
+            velocity_sd=deviation[POSE:2 * POSE], acceleration_sd=deviation[2 * POSE:3 * POSE],
+            joint_velocity_sd=motion[0], joint_acceleration_sd=motion[1], hand_scale=float(np.exp(state[BIAS])),
+            hand_scale_sd=float(deviation[MOTION]))
 
 
 def _relative_sd(hand: HandAnatomy) -> Array | None:

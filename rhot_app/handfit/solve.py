@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import COLUMNS, compressed, gathered
+from rhot_app.barehand.contour_residual import RIDGE, gathered
 from rhot_app.barehand.contours import NEAREST_M, project
 from rhot_app.barehand.joints import add_lengths
 from rhot_app.barehand.start import START_SD
@@ -22,7 +22,7 @@ from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENG
 from rhot_app.barehand.tracker import FOREARM_SD
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import Dense, minimise
-from rhot_app.estimation.residual import UNIT, Rows
+from rhot_app.estimation.residual import UNIT, Rows, compressed
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import log_so3
 from rhot_app.hand.kinematics import empty_frames, forward_arrays, jacobian_arrays
@@ -219,12 +219,12 @@ def _contour_rows(contour: Contour, state: FitState, k: int) -> Rows:
     bare[BIAS:BIAS + FOREARM_TURN] = (state.shape - contour.shape)[:FOREARM_TURN]
     bare[BIAS + FOREARM_TURN:] = one.bend
     information, pull, cost = gathered(contour.frames, bare)
-    rows = compressed(information, pull, cost, COLUMNS, POSE)
-    jacobian, own = np.zeros((len(rows.error), state.size)), state.own(k).start
-    jacobian[:, :FOREARM_TURN] = rows.jacobian[:, POSE:POSE + FOREARM_TURN]
-    jacobian[:, own:own + POSE] = rows.jacobian[:, :POSE]
-    jacobian[:, own + POSE:own + OWN] = rows.jacobian[:, POSE + FOREARM_TURN:]
-    return Rows(rows.error, jacobian, UNIT)
+    error, rows = compressed(information, pull, cost, RIDGE)
+    jacobian, own = np.zeros((len(error), state.size)), state.own(k).start
+    jacobian[:, :FOREARM_TURN] = rows[:, POSE:POSE + FOREARM_TURN]
+    jacobian[:, own:own + POSE] = rows[:, :POSE]
+    jacobian[:, own + POSE:own + OWN] = rows[:, POSE + FOREARM_TURN:]
+    return Rows(error, jacobian, UNIT)
 
 
 def free_numbers(state: FitState, instants: Sequence[int], freedom: Freedom, *, own_lengths: bool = False,

@@ -38,7 +38,7 @@ def test_a_hand_is_tracked_from_a_given_start(film) -> None:
         assert errors_mm(tracker, pose).mean() < 1.5
     assert state.condition is Condition.TRACKING
     assert state.joint_covariances.shape == (21, 3, 3)
-    assert np.nanmin(tracker.fit.support) > 0.5
+    assert np.nanmin(tracker.support) > 0.5
 
 
 def test_one_camera_has_a_larger_depth_deviation_than_two(film) -> None:

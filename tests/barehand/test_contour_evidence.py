@@ -17,9 +17,8 @@ from rhot_app.hand.motion.hand_process import BIAS, MOTION
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.contours.finder import Finder, Maps
-from rhot_app.tracking.contours.markers import MarkersOfHand
+from rhot_app.tracking.contours.markers import MarkersOfHand, SizedMarkerResidual
 from rhot_app.tracking.contours.requests import Requests, matched_contour, requested_contour
-from rhot_app.tracking.contours.sized_markers import SizedMarkerResidual
 from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations

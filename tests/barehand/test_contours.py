@@ -26,8 +26,7 @@ def process_of(side: str = "right") -> HandProcess:
 def frame_of(surface: Surface, state: np.ndarray, camera: CameraModel) -> ContourFrame:
     pose, size = camera.camera_from_world[:3].copy(), (camera.width, camera.height)
     points = contour_points(surface, state, state[BIAS:].copy(), pose, camera.intrinsics, size)
-    return slices_of(surface, state, 1e-6 * np.eye(process_of().size), pose, camera.intrinsics, points, MOTION, 0.0,
-                     3.0, 20.0)
+    return slices_of(surface, state, 1e-6 * np.eye(process_of().size), pose, camera.intrinsics, points, 0.0, 3.0, 20.0)
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
@@ -195,11 +194,3 @@ def _information(frame: ContourFrame, state: np.ndarray) -> float:
 def test_two_equally_probable_edges_have_little_weight() -> None:
     one, two = (_information(*_observed(offsets)) for offsets in ((0.0,), (-3.0, 3.0)))
     assert two < 0.3 * one
-
-
-def test_more_slices_do_not_determine_the_surfaces_offset_along_a_side() -> None:
-    frame, state = _observed((0.0,))
-    together = _information(frame, state)
-    frame.side_sd[:] = 0.0
-    alone = _information(frame, state)
-    assert together < 0.7 * alone

@@ -98,7 +98,8 @@ def test_a_hand_in_two_videos_is_a_table_and_a_film(recorded: Recorded, tmp_path
     given = str(EMPTY)
     if start == "pose":
         monkeypatch.setattr("rhot_app.barehand.follower.MIN_DWELL_NS", 0)  # the film is short
-        monkeypatch.setattr("rhot_app.barehand.tracker.CONTOUR_THRESHOLD", 0.5)  # pictures 320 px wide
+        for threshold, least in (("CONTOUR_THRESHOLD", 0.5), ("LOG_ODDS_THRESHOLD", 0.2)):  # pictures 320 px wide
+            monkeypatch.setattr(f"rhot_app.barehand.tracker.{threshold}", least)
         document = msgspec.to_builtins(load_rig(recorded.rig).tracker.start_poses[0])
         (tmp_path / "start.json").write_text(json.dumps({"format": "rhot-pose", "version": 1} | document))
         given = str(tmp_path / "start.json")

@@ -11,10 +11,10 @@ from bare_scenes import poses, rig_of, scene
 from PySide6.QtGui import QImage
 from screen_pictures import check
 
+from rhot_app.barehand.overlay import seen_contour
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.engine.status import TOPIC_CONTOUR, Preview, decode, encode
 from rhot_app.state import SeenContour
-from rhot_app.tracking.contours.evidence import seen_contour
 from rhot_app.ui.backend.live import Live
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.panels.camera_panel import OUTLINE_COLOUR, CameraPanel

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
-from rhot_app.barehand.contours import SILHOUETTE
 from rhot_app.barehand.joints import place_joints
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.barehand.relocalisation import SAME_POSE_M
@@ -18,7 +17,6 @@ from rhot_app.barehand.start import MAJORITY, joints_on_foreground
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.state import SeenContour
 from rhot_app.tracking.contours.requests import NEVER, CameraFrames
 from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
 
@@ -26,10 +24,6 @@ Array = NDArray[np.float64]
 
 SAME_HAND_M = 0.1
 """m: palms of one hand are nearer to each other: a hand's breadth."""
-
-NEAR_SD = 3.0
-"""Standard deviations from the contour within which an edge is displayed as the hand's."""
-
 
 @dataclass(slots=True)
 class _CameraEvidence:
@@ -82,7 +76,8 @@ class Evidence:
     def take_map(self, frame: ForegroundFrame, state: Array) -> None:
         """Take the foreground of one frame, at whose time the hand is in `state`."""
         camera = self._of_camera[frame.camera]
-        inside, share = on_foreground(self._hand, frame, state)
+        inside, share = joints_on_foreground(self._hand.cameras[frame.camera], joints_of(self._hand, state),
+                                             frame.probability)
         camera.whole = inside > MAJORITY
         camera.mapped_ns = frame.t_row0_master_ns
         if share > MAJORITY and (self.confirmed or camera.whole):
@@ -109,12 +104,6 @@ class Evidence:
         self._checked_ns = min((one.checked_ns for one in observing), default=NEVER)
 
 
-def on_foreground(hand: BareHandTracker, frame: ForegroundFrame, state: Array) -> tuple[float, float]:
-    """Part of the 21 joints of a hand in `state` that project into a camera's image where the foreground is known, and
-    the part of these that lie on foreground."""
-    return joints_on_foreground(hand.cameras[frame.camera], joints_of(hand, state), frame.probability, frame.step)
-
-
 def same_hand(hand: BareHandTracker, state: Array, pose: HandPose) -> bool:
     """Whether the hands in `state` and in `pose` agree: SAME_POSE_M in shape, SAME_HAND_M in position."""
     ours, theirs = joints_of(hand, state), forward(hand.model, pose).joints
@@ -129,22 +118,3 @@ def joints_of(hand: BareHandTracker, state: Array) -> Array:
     place_joints(state, np.zeros((len(hand.process.stationary),) * 2), hand.model.dh, hand.surface.bone, points,
                  covariances, motion)
     return points[:21]
-
-
-def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array, t_node_ns: int = 0,
-                 shown: bool = False) -> SeenContour:
-    """The contour of a hand in `state` in the image of `t_ns`, `t_node_ns` by its node's clock, with slices and edges,
-    for display. `shown`: see `SeenContour`."""
-    offset, _, good = frame.predict(state)
-    centre, normal, half = frame.slices[:, :2], frame.slices[:, 2:4], frame.slices[:, 4:]
-    ends = np.hstack([centre - half * normal, centre + half * normal])
-    places, near = np.empty((0, 2)), np.empty(0, np.bool_)
-    if frame.edges is not None:
-        edges = frame.edges
-        row, column = np.nonzero((np.arange(edges.offset.shape[1]) < edges.number[:, None]) & good[:, None])
-        along = edges.offset[row, column]
-        places = centre[row] + along[:, None] * normal[row]
-        near = np.abs(along - offset[row]) < NEAR_SD * np.hypot(frame.expected_sd[row], edges.sd[row, column])
-    return SeenContour(camera, t_ns, (centre + offset[:, None] * normal)[good],
-                       frame.points.behind[good] == SILHOUETTE, ends[good] if not shown else np.empty((0, 4)), places,
-                       near, t_node_ns, shown=shown)

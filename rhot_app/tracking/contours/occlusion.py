@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import INNER, JUMP_M, OUTSIDE_M
+from rhot_app.barehand.joints import pose_of
 from rhot_app.barehand.silhouette import FOREARM_M, FOREARM_SPREAD, rasterise
 from rhot_app.barehand.surface import FOREARM, SHAPE, capsules_of, ray_to_capsule
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
+from rhot_app.hand.motion.hand_process import BIAS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -55,9 +56,8 @@ def occluded_pixels(camera: CameraModel, other: Capsules, shape: tuple[int, int]
 
 
 def _own_capsules(hand: BareHandTracker, state: Array) -> Capsules:
-    world = np.eye(4)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    return capsules_of(hand.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE].copy())
+    pose = pose_of(state)
+    return capsules_of(hand.surface, pose.world_from_palm, pose.angles, state[BIAS:BIAS + SHAPE].copy())
 
 
 def _rays(camera: CameraModel, pixels: Array) -> Array:

@@ -17,7 +17,6 @@ from rhot_app.barehand.contours import STEP_M, ContourPoints
 from rhot_app.barehand.observations import EdgeFrame, SliceRequest
 from rhot_app.barehand.start import STEP
 from rhot_app.barehand.tracker import BareHandTracker
-from rhot_app.hand.motion.hand_process import MOTION
 from rhot_app.tracking.contours.occlusion import Capsules, visible
 from rhot_app.tracking.markers.estimator import WRONG_AFTER_PERIODS
 from rhot_app.tracking.tracker import CameraObservations
@@ -171,7 +170,7 @@ class Requests:
 
 
 def requested_contour(hand: BareHandTracker, camera: int, state: Array, covariance: Array, step_m: float,
-          occluder: Capsules | None = None, max_slices: int = SLICES_MAX) -> ContourFrame:
+                      occluder: Capsules | None = None, max_slices: int = SLICES_MAX) -> ContourFrame:
     """The slices across the contours of a hand in `state` with centres in the image, rounded as the wire rounds them.
     Of more than `max_slices`, every second or third is kept. Those that the `occluder` hides are left out."""
     frame, model = hand.expected_contour(camera, state, covariance, step_m), hand.cameras[camera]
@@ -181,11 +180,11 @@ def requested_contour(hand: BareHandTracker, camera: int, state: Array, covarian
         good &= visible(hand, frame, model, state, occluder)
     kept = np.flatnonzero(good)
     kept = kept[::max(math.ceil(len(kept) / max_slices), 1)]
-    return _on(hand, camera, frame, kept, unpack_slices(pack_slices(frame.slices[kept])))
+    return _on(frame, kept, unpack_slices(pack_slices(frame.slices[kept])))
 
 
 def matched_contour(hand: BareHandTracker, frame: EdgeFrame, state: Array, covariance: Array,
-            occluder: Capsules | None = None) -> ContourFrame | None:
+                    occluder: Capsules | None = None) -> ContourFrame | None:
     """The contour of a hand in `state` on the slices of a recorded request that cross it, with their edges; None
     without any. `frame` is not changed. `occluder`: see `requested_contour`."""
     expected, slices = hand.expected_contour(frame.camera, state, covariance, 0.5 * STEP_M), frame.request.slices
@@ -202,18 +201,15 @@ def matched_contour(hand: BareHandTracker, frame: EdgeFrame, state: Array, covar
     order = order[(reach < slices[:, 4] + MATCH_PX)[order]]
     if not len(order):
         return None
-    contour = _on(hand, frame.camera, expected, nearest[order], slices[order])
+    contour = _on(expected, nearest[order], slices[order])
     contour.observe(Edges(*(column[order] for column in frame.edges)))
     return contour
 
 
-def _on(hand: BareHandTracker, camera: int, frame: ContourFrame, chosen: NDArray[np.int64],
-        slices: Array) -> ContourFrame:
+def _on(frame: ContourFrame, chosen: NDArray[np.int64], slices: Array) -> ContourFrame:
     """The frame with its points of indices `chosen` (K,) on other slices (K, 5)."""
-    p = frame.points
-    points = ContourPoints(p.capsule[chosen], p.kind[chosen], p.along[chosen], p.behind[chosen], p.pixel[chosen],
-                           p.normal[chosen], p.scale[chosen])
-    out = ContourFrame(hand.surface, points, frame.pose, frame.intrinsics, slices, frame.expected_sd[chosen],
-                       frame.late_s[chosen], MOTION, frame.repeated)
-    out.confusable = frame.confusable
+    points = ContourPoints._make(column[chosen] for column in frame.points)
+    out = ContourFrame(frame.surface, points, frame.pose, frame.intrinsics, slices, frame.expected_sd[chosen],
+                       frame.late_s[chosen], frame.repeated)
+    out.ambiguous = frame.ambiguous
     return out

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -19,19 +19,24 @@ from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
+from rhot_app.barehand.overlay import seen_contour
 from rhot_app.barehand.start import MIN_DWELL_NS
-from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.barehand.tracker import AMBIGUOUS_PX, BareHandTracker
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
-from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
-from rhot_app.tracking.contours.evidence import Evidence, same_hand, seen_contour
+from rhot_app.state import Condition, HandState, SeenContour, no_hand
+from rhot_app.tracking.contours.evidence import Evidence, same_hand
 from rhot_app.tracking.contours.finder import SAME_MAPS_NS, Finder, Maps, NewestMaps
-from rhot_app.tracking.contours.markers import MarkersOfHand, update_hand
+from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.contours.occlusion import Capsules
-from rhot_app.tracking.contours.requests import JUMP_NS, NEVER, Requests, requested_contour
+from rhot_app.tracking.contours.requests import (
+    JUMP_NS,
+    NEVER,
+    Requests,
+    requested_contour,
+)
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_node.wire.messages import MarkerFlag
 from rhot_node.wire.slices import SLICES_MAX
 
 Array = NDArray[np.float64]
@@ -48,7 +53,8 @@ class ContourEstimator:
         self._rig, self._max_slices = rig, SLICES_MAX // hands
         self.occluder: Callable[[int], Capsules | None] = lambda _: None
         self._hand = BareHandTracker(rig, known_size=not rig.tracker.float_scale, lateral_m=lateral_m)
-        self._markers = MarkersOfHand(rig, self._hand) if _marked(rig) else None
+        marked = rig.tracker.observe != "contours" and len(rig.markers.markers) > 0
+        self._markers = MarkersOfHand(rig, self._hand) if marked else None
         self._finder = Finder(self._hand)
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._names, self._tracked_with = tuple(node.name for node in rig.nodes), rig.tracked_with
@@ -73,11 +79,11 @@ class ContourEstimator:
         self._requests = Requests(self._hand, self._predict, lambda t_ns: self.occluder(t_ns), self._max_slices)
         self._cameras = self._requests.cameras
         self._evidence, self._maps = Evidence(self._hand, self._cameras), NewestMaps(self._cameras)
+        self._unverified: Maps | None = None
         self._waiting: dict[int, tuple[EdgeFrame, ContourFrame]] = {}
         self._used = self._waiting  # by the last update
-        self._unverified: Maps | None = None
         self._epoch_ns, self.overlaps = 0, [False] * len(self._names)
-        self._maps_ns = self._agreed_ns = NEVER
+        self._agreed_ns = NEVER
         self._tracking = self._was_confirmed = False
         self._latest: CameraObservations | EdgeFrame | None = None
 
@@ -124,14 +130,12 @@ class ContourEstimator:
         first = hand.cameras[0].world_from_camera
         world[:3, :3], world[:3, 3] = first[:3, :3], first[:3, :3] @ np.array([0.0, 0.0, 0.5]) + first[:3, 3]
         disc = np.hypot(*np.mgrid[-30:30, -40:40]) < 12.0
-        maps = Maps(1, [disc.astype(np.float32)] * len(self._names))
         hand.start(HandPose(world, hand.model.pose_prior.mean.copy()), 0)
         contour = requested_contour(hand, 0, *hand.filter.predict(0.0), STEP_M)
         contour.observe(edges_of(len(contour.slices), np.zeros(1, np.int64), np.array([[0.0, 1.0, 9.0, 1.0, 0.0]])))
         hand.frames[0] = contour
         hand.filter.add(0.0, [contour, *hand.constraints])
-        state = hand.filter.newest.state
-        hand.process.difference(state, state)  # compiled here, for `MarkersOfHand.choose_prediction`
+        maps = Maps(1, [disc.astype(np.float32)] * len(self._names))
         self._finder.relocalise(maps, hand.filter.newest.state, hand.filter.newest.covariance, 0.03)
         self._finder.wait()
         self._finder.look(maps)
@@ -177,7 +181,7 @@ class ContourEstimator:
         self.key_frames.clear()
         if self._markers is not None:
             self._markers.start(t_ns)
-        self._epoch_ns, self._maps_ns, self._agreed_ns = t_ns, NEVER, NEVER
+        self._epoch_ns, self._agreed_ns = t_ns, NEVER
         self._tracking, self._waiting, self._unverified = True, {}, None
         self._used = {}
         self._evidence.start(t_ns)
@@ -190,8 +194,6 @@ class ContourEstimator:
         self._hand.frames = [None] * len(self._names)
         self._requests.stop()
         self._waiting = {}
-        if self._markers is not None:
-            self._markers.clear_waiting()
 
     # -- Tracker -------------------------------------------------------------------------------------------------------
 
@@ -259,7 +261,7 @@ class ContourEstimator:
         due."""
         waiting, self._waiting = self._waiting, {}
         try:
-            update_hand(self._hand, self._markers, waiting, self._epoch_ns)
+            self._solve(waiting)
         except np.linalg.LinAlgError:  # the observations contradict the estimate
             self.drop_track()
             return False
@@ -267,7 +269,7 @@ class ContourEstimator:
         self._hand.frames = [None] * len(self._names)
         for number, (one, contour) in waiting.items():
             if self._markers is not None:
-                contour.confusable = 0.0  # markers tell the fingers apart
+                contour.ambiguous = 0.0  # markers tell the fingers apart
             self._hand.frames[number] = contour
             self._requests.request_slices(number, one.t_row0_master_ns)
         self._evidence.take_edges(waiting.values())
@@ -277,14 +279,36 @@ class ContourEstimator:
         self._latest = max((one for one, _ in waiting.values()), key=lambda one: one.t_row0_master_ns)
         return True
 
+    def _solve(self, waiting: Mapping[int, tuple[EdgeFrame, ContourFrame]]) -> None:
+        """Update the state by the edges of some cameras, by number. Every pass has the same edges, and expects the
+        contour with half the standard deviation. Raises LinAlgError when they contradict the estimate."""
+        hand, edges = self._hand, [contour for _, contour in waiting.values()]
+        times_s = [self._seconds(one.t_row0_master_ns + _middle_ns(one)) for one, _ in waiting.values()]
+        t_s, spreads = max(*times_s, hand.filter.knots[0].t_s), [contour.expected_sd for contour in edges]
+        for contour, one_s in zip(edges, times_s, strict=True):
+            contour.late_s = contour.late_s + (one_s - t_s)
+
+        def narrowed(number: int, _: Array) -> list[ContourFrame]:
+            for contour, spread in zip(edges, spreads, strict=True):
+                contour.expected_sd = np.minimum(spread * 0.5**number, AMBIGUOUS_PX)
+            return edges
+
+        hand.prepare_update(waiting, t_s)
+        prediction = hand.filter.predict(t_s)
+        hand.solve(t_s, prediction, prediction[0], narrowed)
+
     def _take_map(self, frame: ForegroundFrame) -> None:
         """Take the foreground of one frame: to verify the track, or to acquire one."""
         maps = self._maps.take(frame)
-        if not self._tracking:
-            self._acquire(maps)
+        if self._tracking:
+            self._evidence.take_map(frame, self.state_at(frame.t_row0_master_ns))
+            self._unverified = maps or self._unverified
             return
-        self._evidence.take_map(frame, self.state_at(frame.t_row0_master_ns))
-        self._unverified = maps or self._unverified
+        found = self._finder.found()
+        if found is not None:
+            self.start(*found)
+        elif maps is not None:
+            self._finder.look(maps)
 
     def _verify(self) -> None:
         """Relocalise or confirm the track by the newest maps of all cameras, once all edges are used."""
@@ -292,43 +316,31 @@ class ContourEstimator:
         if maps is None or self._waiting or not self._tracking:
             return
         self._unverified = None
-        if maps.t_ns == self._maps_ns:
-            return
-        self._maps_ns = maps.t_ns
         # Overlapping hands are not verified: whose foreground it is, is ambiguous.
         if not any(self.overlaps) and self._finder.verify(
                 maps, self._seconds(maps.t_ns), 1e-9 * min(one.period_ns for one in self._cameras)):
             self._requests.restart()
-        oldest_ns = max(self._epoch_ns, maps.t_ns - max(SAME_MAPS_NS, self._maps.simultaneous_ns))
         observed_ns = self._evidence.observed_ns
-        if self._evidence.confirmed or observed_ns <= oldest_ns:
+        held = observed_ns - self._epoch_ns >= MIN_DWELL_NS
+        if self._evidence.confirmed or observed_ns <= max(
+                self._epoch_ns, maps.t_ns - max(SAME_MAPS_NS, self._maps.simultaneous_ns)):
             return
-        if maps.t_ns - self._agreed_ns < SAME_MAPS_NS:
+        if maps.t_ns - self._agreed_ns < SAME_MAPS_NS or (
+                held and self._hand.verified(maps.probabilities, self._predict(maps.t_ns)[0])):
             self._evidence.confirmed = self._was_confirmed = True
-        elif observed_ns - self._epoch_ns >= MIN_DWELL_NS:
-            if self._hand.verified(maps.probabilities, self._predict(maps.t_ns)[0]):
-                self._evidence.confirmed = self._was_confirmed = True
-            else:
-                self.drop_track()
+        elif held:
+            self.drop_track()
 
     # -- the track -----------------------------------------------------------------------------------------------------
 
-    def _acquire(self, maps: Maps | None) -> None:
-        """Start a track where a hand has taken its start pose, or look for one in the newest maps."""
-        found = self._finder.found()
-        if found is not None:
-            self.start(*found)
-        elif maps is not None:
-            self._finder.look(maps)
-
     def _take_markers(self, frame: CameraObservations, markers: MarkersOfHand) -> bool:
-        """Start a track by the markers of one frame, or update by them. Returns whether any markers were used."""
+        """Start a track by the markers of one frame, or update by them. Returns whether a state is due."""
         if not self.confirmed:
             self._locate(frame, markers)
         if not self._tracking:
             return False
         try:
-            return markers.take(frame, self._cameras)
+            return markers.update(frame) and not self._cameras[frame.camera].returns_edges(frame.t_row0_master_ns)
         except np.linalg.LinAlgError:  # the observations contradict the estimate
             self.drop_track()
             return False
@@ -356,35 +368,21 @@ class ContourEstimator:
         return self._epoch_ns + round(1e9 * self._hand.filter.newest.t_s)
 
     def _state(self, frame: CameraObservations | EdgeFrame, begun: float) -> HandState:
-        newest = self._hand.filter.newest if self._tracking else None
-        inflated = self._markers.inflated(newest.state, newest.covariance) if self._markers and newest else None
-        hand = self._hand.state(begun, inflated and inflated[1]) if self.confirmed else no_hand(
-            frame.t_row0_master_ns, Condition.LOST if self._was_confirmed else Condition.SEARCHING)
-        return _published(hand, self._sequence - 1, frame, self.newest_frames(), self._rig.markers.ids, self._names,
-                         time.perf_counter() - begun)
+        """The state of the hand after `frame`, with the pixels and flags of its markers; their positions in space are
+        not estimated."""
+        ids = self._rig.markers.ids
+        hand = self._hand.state(begun, ids) if self.confirmed else no_hand(
+            frame.t_row0_master_ns, Condition.LOST if self._was_confirmed else Condition.SEARCHING, self._names,
+            markers=ids)
+        for number, one in enumerate(self.newest_frames()):
+            if one is not None:
+                hand.camera_pixels[number], hand.camera_flags[number] = one.pixels, one.flags
+        return replace(hand, sequence=self._sequence - 1, t_receive_ns=frame.t_receive_ns,
+                       latency_s={"detect": frame.detect_s, "network": frame.network_s, "pair": 0.0,
+                                  "triangulate": 0.0, "filter": time.perf_counter() - begun, "solve": 0.0})
 
 
-def _marked(rig: Rig) -> bool:
-    """Whether the hand's markers are observed, and it has any."""
-    return rig.tracker.observe != "contours" and len(rig.markers.markers) > 0
-
-
-def _published(hand: HandState, sequence: int, frame: CameraObservations | EdgeFrame,
-              newest: Sequence[CameraObservations | None], marker_ids: tuple[str, ...], cameras: tuple[str, ...],
-              filter_s: float) -> HandState:
-    """The state of a hand after `frame`, with the pixels and flags of M markers; their positions in space are not
-    estimated."""
-    count = len(marker_ids)
-    pixels = np.full((len(cameras), count, 2), np.nan)
-    flags = np.full((len(cameras), count), int(MarkerFlag.LOST), np.uint16)
-    for number, one in enumerate(newest):
-        if one is not None:
-            pixels[number], flags[number] = one.pixels, one.flags
-    return replace(
-        hand, sequence=sequence, t_receive_ns=frame.t_receive_ns, marker_ids=marker_ids,
-        marker_positions=np.full((count, 3), np.nan), marker_raw_positions=np.full((count, 3), np.nan),
-        marker_covariances=np.full((count, 3, 3), np.nan),
-        marker_knowledge=np.full(count, int(Knowledge.UNKNOWN), np.uint8), camera_names=cameras, camera_pixels=pixels,
-        camera_flags=flags, epipolar_error_px=np.full(count, np.nan),
-        latency_s={"detect": frame.detect_s, "network": frame.network_s, "pair": 0.0, "triangulate": 0.0,
-                   "filter": filter_s, "solve": 0.0})
+def _middle_ns(frame: EdgeFrame) -> int:
+    """Time from the exposure of row 0 to that of the mean row of the slices, ns."""
+    slices = frame.request.slices
+    return round(float(slices[:, 1].mean()) * frame.row_time_ns) if len(slices) else 0
