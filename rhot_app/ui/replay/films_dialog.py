@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any, Literal
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
@@ -27,6 +28,7 @@ from PySide6.QtWidgets import (
 from rhot_app.errors import RhotError
 from rhot_app.export.film_log import ChosenFilm, describe_film, log_films
 from rhot_app.project import Rig, load_rig
+from rhot_app.sources.film_offset import offsets_of
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
 from rhot_app.ui.common.sentence import Sentence
@@ -36,7 +38,7 @@ from rhot_app.ui.replay.run_dialog import FileChoice
 ENDINGS = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpg", ".mts", ".webm")
 """What a folder's films are known by; a file that is chosen by itself may have another."""
 
-_SIZE, _LINES = (820, 460), 8
+_SIZE, _LINES, _TABLE_PX = (820, 560), 5, 170
 _LATEST_S = 3600.0
 _MEANING = ("Films of a bare hand by one camera, or by several at the same time. The hand networks find its landmarks; "
             "the tracked hand is then shown beside the pictures. Several films need the rig file that says where their "
@@ -68,20 +70,27 @@ class FilmsDialog(QDialog):
         self.table.setSelectionBehavior(QTableWidget.SelectionBehavior.SelectRows)
         self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
         self.table.verticalHeader().hide()
+        self.table.setMinimumHeight(_TABLE_PX)
         self.add_button, self.folder_button = QPushButton("Add films …"), QPushButton("Add a folder …")
         self.folder_button.setToolTip("All films in a folder, in the order of their names.")
         self.remove_button = QPushButton("Remove")
         self.remove_button.setToolTip("Take the chosen film off the list (Delete); the file stays.")
+        self.sound_button, self.flash_button = QPushButton("Align by sound"), QPushButton("Align by a flash")
+        self.sound_button.setToolTip("Find by how much later each film began: what all of them heard, such as a clap.")
+        self.flash_button.setToolTip("Find by how much later each film began: a lamp that goes on in all of them.")
         self.sentence = Sentence(_LINES)
         self.bar = QProgressBar()
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
         self.track_button, self.close_button = QPushButton("Track …"), QPushButton("Close")
+        self.track_button.setDefault(True)
         self.track_button.setToolTip("Choose where the recording is written; it opens when it is whole.")
         self._lay_out(meaning)
         self.add_button.clicked.connect(self._choose_films)
         self.folder_button.clicked.connect(self._choose_folder)
         self.remove_button.clicked.connect(self.remove)
+        self.sound_button.clicked.connect(lambda: self.align("sound"))
+        self.flash_button.clicked.connect(lambda: self.align("flash"))
         self.table.itemSelectionChanged.connect(self._show_state)
         self.rig_choice.changed.connect(self._take_rig)
         self.track_button.clicked.connect(self._track_or_cancel)
@@ -96,6 +105,9 @@ class FilmsDialog(QDialog):
             button.setAutoDefault(False)
             films.addWidget(button)
         films.addStretch(1)
+        for button in (self.sound_button, self.flash_button):
+            button.setAutoDefault(False)
+            films.addWidget(button)
         buttons.addWidget(self.bar, 1)
         buttons.addWidget(self.close_button)
         buttons.addWidget(self.track_button)
@@ -140,13 +152,14 @@ class FilmsDialog(QDialog):
                 name.setData(Qt.ItemDataRole.UserRole, str(path))
                 name.setToolTip(str(path))
                 later.setRange(-_LATEST_S, _LATEST_S)
-                later.setDecimals(3)
+                later.setDecimals(4)
                 later.setSuffix(" s")
                 later.setToolTip("By how much this film began after the others.")
                 self.table.setCellWidget(row, 0, QComboBox())
                 self.table.setItem(row, 1, name)
                 self.table.setItem(row, 2, what)
                 self.table.setCellWidget(row, 3, later)
+            self.table.resizeColumnToContents(3)
             self._name_cameras()
             self._looks.append(Job(partial(_describe, path), partial(self._show_what, path, wrong=False),
                                    partial(self._show_what, path, wrong=True), None, self).start())
@@ -230,6 +243,8 @@ class FilmsDialog(QDialog):
         for part in (self.add_button, self.folder_button, self.rig_choice, self.table):
             part.setEnabled(not busy)
         self.remove_button.setEnabled(not busy and bool(self.table.selectedIndexes()))
+        for button in (self.sound_button, self.flash_button):
+            button.setEnabled(not busy and len(self.films) > 1)
         self.track_button.setText("Cancel" if busy else "Track …")
         self.track_button.setEnabled(busy or not wanting)
         if not busy:
@@ -249,17 +264,23 @@ class FilmsDialog(QDialog):
 
     def track(self, log: Path) -> None:
         """Track the films in another process; `tracked` follows when the log is whole."""
-        rig, films = self.rig_choice.path, self.films
+        self._start(log_films, (self.rig_choice.path, self.films, log), partial(self._finish, log))
 
-        def work(progress: Progress) -> list[str]:
+    def align(self, by: Literal["sound", "flash"]) -> None:
+        """Find by how much later each film began, and write it into the list."""
+        self._start(offsets_of, ({str(film.path): film.path for film in self.films}, by), self._show_offsets)
+
+    def _start(self, function: Callable[..., Any], arguments: tuple[Any, ...], done: Callable[[Any], None]) -> None:
+        """Have the other process do one thing."""
+        def work(progress: Progress) -> Any:
             try:
-                said: list[str] = self._solver.run(log_films, (rig, films, log), progress.report)
+                return self._solver.run(function, arguments, progress.report)
             except StoppedError as exc:
                 raise CancelledError("Cancelled.") from exc
-            return said
 
-        self._job = Job(work, lambda said: self._finish(log, said), self._fail, self._report, self).start()
+        self._job = Job(work, done, self._fail, self._report, self).start()
         self._show_state()
+        self.sentence.setText("…")
 
     def cancel(self) -> None:
         """Give the tracking up; nothing of it is left."""
@@ -274,6 +295,17 @@ class FilmsDialog(QDialog):
     def _report(self, text: str, fraction: float) -> None:
         self.sentence.setText(f"{text} …")
         self.bar.setValue(round(1000 * fraction))
+
+    def _show_offsets(self, offsets_s: dict[str, float]) -> None:
+        self._job = None
+        self.bar.setValue(1000)
+        for row in range(self.table.rowCount()):
+            later = self.table.cellWidget(row, 3)
+            assert isinstance(later, QDoubleSpinBox)
+            later.setValue(offsets_s[str(self._path(row))])
+        self._show_state()
+        self.sentence.setText("Aligned: " + ", ".join(f"{Path(path).name} {seconds:+.3f} s"
+                                                      for path, seconds in offsets_s.items()) + ".")
 
     def _finish(self, log: Path, said: list[str]) -> None:
         self._job = None

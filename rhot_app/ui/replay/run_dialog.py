@@ -42,6 +42,8 @@ class FileChoice(QWidget):
         self.path: Path | None = None
         self.label = QLabel(own)
         self.choose_button, self.forget_button = QPushButton("Choose …"), QPushButton(without)
+        for button in (self.choose_button, self.forget_button):
+            button.setAutoDefault(False)
         self.choose_button.clicked.connect(self.choose)
         self.forget_button.clicked.connect(lambda: self.show_path(None))
         row = QHBoxLayout(self)

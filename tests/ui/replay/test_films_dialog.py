@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from drawn_films import RATE, StandIn, seen_by, use_networks, video
@@ -114,6 +115,27 @@ def test_what_is_missing_is_said(person: Person, films: Path, tmp_path: Path,
     (tmp_path / "notes.mp4").unlink()
     person.click(dialog.folder_button)
     person.until(said(person, "holds no films"))
+
+
+def flashing(path: Path, at: int) -> Path:
+    """A film of 25 images/s in which a lamp goes on at a frame."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, (64, 48))
+    for number in range(60):
+        writer.write(np.full((48, 64, 3), 150 if number >= at else 40 + number % 2, np.uint8))
+    writer.release()
+    return path
+
+
+def test_films_are_aligned_by_a_flash_and_silence_is_no_sound(person: Person, tmp_path: Path) -> None:
+    dialog = person.window
+    dialog.add([flashing(tmp_path / "left.avi", 30), flashing(tmp_path / "right.avi", 20)])
+    person.until(dialog.flash_button.isEnabled)
+    person.click(dialog.flash_button)
+    person.until(said(person, "Aligned", "right.avi"))
+    assert [film.offset_s for film in dialog.films] == [0.0, pytest.approx(0.4, abs=0.02)]
+    person.click(dialog.sound_button)
+    person.until(said(person, "sound"))
+    assert [film.offset_s for film in dialog.films] == [0.0, pytest.approx(0.4, abs=0.02)], "a refusal changes nothing"
 
 
 def test_one_film_needs_no_rig_and_without_networks_nothing_is_begun(person: Person, films: Path, tmp_path: Path,
