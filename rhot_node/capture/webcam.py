@@ -28,6 +28,8 @@ log = logging.getLogger(__name__)
 
 FIRST_FRAME_S = 5.0
 SILENCE_S = 3.0
+OLDEST_STAMP_NS = 1_000_000_000
+"""A frame that is read is never older: a stamp that is, is of another clock than the monotonic one."""
 V4L2_EXPOSURE_MANUAL = 1
 V4L2_EXPOSURE_UNIT_US = 100.0
 
@@ -37,6 +39,7 @@ class Capture(Protocol):
 
     def isOpened(self) -> bool: ...  # noqa: N802 - OpenCV's name
     def set(self, propId: int, value: float) -> bool: ...  # noqa: N803 - OpenCV's name
+    def get(self, propId: int) -> float: ...  # noqa: N803 - OpenCV's name
     def read(self) -> tuple[bool, Any]: ...
     def release(self) -> None: ...
 
@@ -48,16 +51,18 @@ def open_v4l2(device: str) -> Capture:
 
 
 class GrabbedCamera:
-    """A camera that cannot say when a frame was exposed: mid-exposure of row 0 is taken to be the time at which the
-    read returned, less the readout of the frame (rows x row time) and half the exposure; transfer time adds to that."""
+    """A camera whose frames are grabbed by OpenCV. Where its driver stamps them (V4L2, at the start of exposure),
+    mid-exposure of row 0 is half the exposure later. Else it is taken to be the time at which the read returned, less
+    the readout of the frame (rows x row time) and half the exposure; transfer time adds to that."""
 
-    def __init__(self, name: str, remedy: str, capture: Capture, settings: CameraSettings, clock: NodeClock) -> None:
+    def __init__(self, name: str, remedy: str, capture: Capture, settings: CameraSettings, clock: NodeClock, *,
+                 stamped: bool = False) -> None:
         """Wait for the first frame of an opened `capture`. `name` and `remedy` begin and end each sentence about it.
-        Raises CameraError when no frame comes."""
+        `stamped`: its driver may state when a frame began. Raises CameraError when no frame comes."""
         self._name, self._remedy = name, remedy
         self._exposure_ns = settings.exposure_ns
         self._row_time_ns = settings.row_time_ns
-        self._grabber = LatestGrabber(lambda: _read(capture), capture.release, clock)
+        self._grabber = LatestGrabber(lambda: _read(capture, stamped), capture.release, clock)
         first = self._grabber.take(FIRST_FRAME_S)
         if first is None:
             self.close()
@@ -88,7 +93,8 @@ class GrabbedCamera:
         return Frame(
             image=image,
             number=grabbed.number,
-            t_node_ns=grabbed.t_return_node_ns - self._delay_ns,
+            t_node_ns=(grabbed.t_return_node_ns - self._delay_ns if grabbed.t_begin_node_ns is None
+                       else grabbed.t_begin_node_ns + self._exposure_ns // 2),
             t_available_node_ns=grabbed.t_return_node_ns,
             exposure_ns=self._exposure_ns,
             row_time_ns=self._row_time_ns,
@@ -116,7 +122,7 @@ class Webcam(GrabbedCamera):
         self.refused = tuple(configure(capture, settings))
         for name in self.refused:
             log.warning("%s: the camera does not take the setting %s", device, name)
-        super().__init__(device, "Is the camera plugged in well?", capture, settings, clock)
+        super().__init__(device, "Is the camera plugged in well?", capture, settings, clock, stamped=True)
         if self.size != (settings.width, settings.height):
             log.warning("%s: delivers %d x %d px instead of %d x %d", device, *self.size, settings.width,
                         settings.height)
@@ -206,9 +212,14 @@ def configure(capture: Capture, settings: CameraSettings) -> list[str]:
     return [name for name, prop, value in wanted if value is not None and not capture.set(prop, value)]
 
 
-def _read(capture: Capture) -> Plane | None:
+def _read(capture: Capture, stamped: bool) -> tuple[Plane, int | None] | None:
+    """The next image and when it began, ns by this machine's monotonic clock; None where nothing says it."""
     ok, image = capture.read()
-    return np.asarray(image, dtype=np.uint8) if ok and image is not None else None
+    if not ok or image is None:
+        return None
+    begin_ns = round(1e6 * capture.get(cv2.CAP_PROP_POS_MSEC)) if stamped else 0
+    believed = 0 <= time.monotonic_ns() - begin_ns <= OLDEST_STAMP_NS  # else it is of another clock, or missing
+    return np.asarray(image, dtype=np.uint8), begin_ns if believed else None
 
 
 # -- reading thread ----------------------------------------------------------------------------------------------------
@@ -216,18 +227,22 @@ def _read(capture: Capture) -> Plane | None:
 
 @dataclass(frozen=True, slots=True)
 class Grabbed:
-    """One image as the device gave it: (H, W, 3) BGR, how many came before it, and when its read returned."""
+    """One image as the device gave it: (H, W, 3) BGR, how many came before it, when its read returned, and when its
+    driver says that it began, None where it does not."""
 
     image: Plane
     number: int
     t_return_node_ns: int
+    t_begin_node_ns: int | None
 
 
 class LatestGrabber:
-    """Calls `grab` for ever in its own thread and keeps the newest image. `grab` returns None when the device failed;
-    `release` is called at the end, in the same thread."""
+    """Calls `grab` for ever in its own thread and keeps the newest image. `grab` gives it with the time at which it
+    began, ns by the machine's monotonic clock or None, and returns None when the device failed; `release` is called at
+    the end, in the same thread."""
 
-    def __init__(self, grab: Callable[[], Plane | None], release: Callable[[], object], clock: NodeClock) -> None:
+    def __init__(self, grab: Callable[[], tuple[Plane, int | None] | None], release: Callable[[], object],
+                 clock: NodeClock) -> None:
         self._grab = grab
         self._release = release
         self._clock = clock
@@ -257,8 +272,10 @@ class LatestGrabber:
     def _run(self) -> None:
         number = 0
         try:
-            while not self._ending and (image := self._grab()) is not None:
-                grabbed = Grabbed(image, number, self._clock.now_ns())
+            while not self._ending and (found := self._grab()) is not None:
+                image, begin_ns = found
+                grabbed = Grabbed(image, number, self._clock.now_ns(),
+                                  None if begin_ns is None else self._clock.from_host_ns(begin_ns))
                 with self._changed:
                     self._newest = grabbed
                     self._changed.notify_all()

@@ -37,6 +37,7 @@ class FakeCapture:
         self.hold.set()
         self.reads = 0
         self.released = False
+        self.stamp_ms: Callable[[], float] = lambda: 0.0  # as a driver without stamps
 
     def isOpened(self) -> bool:  # noqa: N802 - OpenCV's name
         return self.opened
@@ -46,6 +47,10 @@ class FakeCapture:
             return False
         self.settings[propId] = value
         return True
+
+    def get(self, propId: int) -> float:  # noqa: N803 - OpenCV's name
+        assert propId == cv2.CAP_PROP_POS_MSEC
+        return self.stamp_ms()
 
     def read(self) -> tuple[bool, Any]:
         self.hold.wait(5.0)
@@ -93,6 +98,24 @@ def test_mid_exposure_is_before_readout_and_half_the_exposure(plug: Callable[[Fa
     assert frame is not None and camera.size == (64, 48) == frame.image.size
     assert frame.t_available_node_ns - frame.t_node_ns == 2_000_000 + 47 * 50_000
     assert 0 <= CLOCK.now_ns() - frame.t_available_node_ns < 10**9
+    camera.close()
+
+
+@pytest.mark.parametrize(("clock_ms", "believed"), [
+    (lambda: 1e3 * time.monotonic() - 30.0, True), (lambda: 1e3 * time.time(), False),
+    (lambda: 1e3 * time.monotonic() + 500.0, False), (lambda: 1e3 * time.monotonic() - 5e3, False)])
+def test_the_drivers_time_is_used_where_it_is_of_the_same_clock(
+        plug: Callable[[FakeCapture], Webcam], clock_ms: Callable[[], float], believed: bool) -> None:
+    capture = FakeCapture()
+    capture.stamp_ms = clock_ms
+    camera = plug(capture)
+    frame = camera.read(1.0)
+    assert frame is not None
+    behind_ns = frame.t_available_node_ns - frame.t_node_ns  # began 30 ms before, its middle 2 ms later
+    if believed:
+        assert 28_000_000 <= behind_ns < 2_000_000_000
+    else:
+        assert behind_ns == 2_000_000 + 47 * 50_000
     camera.close()
 
 
