@@ -19,6 +19,7 @@ from rhot_node.config import CameraSettings
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import CameraError
 from rhot_node.health.checks import is_black
+from rhot_node.threads import OneShotThread
 
 Picture = NDArray[np.uint8]
 
@@ -47,14 +48,16 @@ class CameraPreview:
         self.source = source
         self.picture: Picture | None = None
         """(H, W, 3) BGR, the newest one."""
-        self.problem = ""
-        """Why there is no picture, a sentence."""
         self._after, self._open = after, open_source
         self._times: deque[float] = deque()
-        self._fault = ""
+        self._fault = self._lost = ""
         self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=f"preview of {source.title}", daemon=True)
-        self._thread.start()
+        self._task = OneShotThread(f"shows the picture of {source.title}", self._run)
+
+    @property
+    def problem(self) -> str:
+        """Why there is no picture, a sentence; "" while there may be one."""
+        return self._lost or self._task.failure
 
     @property
     def rate_hz(self) -> float | None:
@@ -81,8 +84,8 @@ class CameraPreview:
 
     def wait(self, timeout_s: float = 5.0) -> bool:
         """Whether the source was let go of in time."""
-        self._thread.join(timeout_s)
-        return not self._thread.is_alive()
+        self._task.join(timeout_s)
+        return not self._task.running
 
     def _run(self) -> None:
         if self._after is not None:
@@ -93,7 +96,7 @@ class CameraPreview:
         try:
             camera = self._open(self.source.spec, camera_controls(self.source), NodeClock())
         except CameraError as exc:
-            self.problem = str(exc)
+            self._lost = str(exc)
             return
         shown_s = 0.0
         try:
@@ -115,7 +118,7 @@ class CameraPreview:
                     self._fault = fault_of(frame.image)
                     self.picture = to_bgr(frame.image)
         except CameraError as exc:
-            self.problem = str(exc)
+            self._lost = str(exc)
         finally:
             camera.close()
 

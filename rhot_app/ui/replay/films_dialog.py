@@ -60,6 +60,7 @@ class FilmsDialog(QDialog):
         self._looks: list[Job] = []
         self._job: Job | None = None
         self.problem = ""  # of the rig file
+        self._state = ""
         meaning = QLabel(_MEANING)
         meaning.setWordWrap(True)
         meaning.setProperty("muted", True)
@@ -247,8 +248,10 @@ class FilmsDialog(QDialog):
             button.setEnabled(not busy and len(self.films) > 1)
         self.track_button.setText("Cancel" if busy else "Track …")
         self.track_button.setEnabled(busy or not wanting)
-        if not busy:
-            self.sentence.setText(wanting or "Ready. Looking for hands takes about as long as the films.")
+        state = wanting or "Ready. Looking for hands takes about as long as the films."
+        if not busy and state != self._state:  # what came of the last work stays until something else is missing
+            self._state = state
+            self.sentence.setText(state)
 
     # -- tracking --------------------------------------------------------------------------------------------------
 
