@@ -34,7 +34,11 @@ def export_apart(log: Path, out: Path, format_name: str, options: ExportOptions,
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
     child = context.Process(target=_export, args=(there, log, out, format_name, options, rig), daemon=True)
-    child.start()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # an interrupt within its imports would be told
+    try:
+        child.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     there.close()
     last = ("starting", 0.0)
     try:
@@ -73,6 +77,7 @@ def _export(there: Connection, log: Path, out: Path, format_name: str, options: 
             raise KeyboardInterrupt from None
 
     with contextlib.suppress(BrokenPipeError, KeyboardInterrupt):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         try:
             exported = export_log(log, out, format_name=format_name, rig=rig, options=options, again=True,
                                   progress=report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import resource
 import struct
@@ -189,6 +190,20 @@ def test_an_interrupt_at_the_last_moment_leaves_nothing(name: str, log: Path, tm
     with pytest.raises(KeyboardInterrupt):
         export_log(log, tmp_path / f"a{ending(name)}", options=ExportOptions(tracker="classic"))
     assert left(tmp_path) == []
+
+
+@pytest.mark.parametrize("looks", [2, 4, 6])
+def test_a_cancel_while_the_other_process_starts_is_silent(looks: int, log: Path, tmp_path: Path,
+                                                           capfd: pytest.CaptureFixture[str]) -> None:
+    waits = iter(range(looks))
+
+    def cancelled(text: str, fraction: float) -> None:
+        if next(waits, None) is None:
+            raise InterruptedError
+
+    with contextlib.suppress(InterruptedError):  # a quick machine may have ended before
+        export_apart(log, tmp_path / "a.csv", "csv", ExportOptions(tracker="classic"), cancelled)
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_a_cancel_whose_interrupt_is_lost_leaves_nothing(log: Path, tmp_path: Path,
