@@ -7,6 +7,7 @@ memory: OpenCV decodes twenty formats, and some by code with known errors (CVE-2
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,6 +32,7 @@ VIDEO_SUFFIXES: Final = frozenset({".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4
 """Of a video's name, where pictures and videos are both expected."""
 
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong with a file is said in a sentence
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # likewise; OpenCV hands it to FFmpeg (AV_LOG_QUIET)
 
 _SEGMENTS_MAX: Final = 4096  # before the size of a JPEG picture
 _FORGIVEN: Final = 0.25  # of a JPEG's bytes after its end mark: cameras append thumbnails and notes

@@ -33,7 +33,8 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.progress import ProgressLine
 
     if not 0.0 <= args.begin < args.end:
-        raise RecordingError(f"--from {args.begin:g} --to {args.end:g}: give a moment, s, and a later one.")
+        end = "" if math.isinf(args.end) else f" --to {args.end:g}"
+        raise RecordingError(f"--from {args.begin:g}{end}: give a moment, s since the first state, and a later one.")
     first_ns = int(first_states(args.path, "csv", ExportOptions(), 1).t_master_ns[0])
     end_ns = 2**63 - 1 if math.isinf(args.end) else first_ns + round(1e9 * args.end)
     line = ProgressLine(f"trimming {args.path.name}")
