@@ -53,7 +53,7 @@ def test_the_simulated_bare_hand_works_the_mouse_live() -> None:
             if cursor is not None:
                 places.append(cursor[0])
                 moved_m = max(places) - min(places)
-            if moved_m > 0.05:
+            if moved_m > 0.05 and len(places) > 10:
                 running.send_signal(signal.SIGINT)
                 break
         _, notes = running.communicate()
