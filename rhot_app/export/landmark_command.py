@@ -58,7 +58,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write_log(args: argparse.Namespace) -> int:
-    from rhot_app.export.landmark_track import MEDIAN_M, states_of_log, summarise, with_measured_bones
+    from rhot_app.export.landmark_track import states_of_log, summarise, with_measured_bones
+    from rhot_app.hand.landmarks import MEDIAN_M
     from rhot_app.project import load_rig, with_tracker
     from rhot_app.recording.landmark_log import landmark_order, read_landmark_table, write_landmark_log
     from rhot_node.compiled import announce_compilation

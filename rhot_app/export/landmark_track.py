@@ -7,7 +7,6 @@ first.
 from __future__ import annotations
 
 import contextlib
-import math
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -29,7 +28,7 @@ from rhot_app.export.bare_hand import check_outputs, closing_sentences, lost_int
 from rhot_app.export.pictures import side_by_side, whole_pictures
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
-from rhot_app.hand.landmarks import ANATOMY_SD_M, NOISE_M
+from rhot_app.hand.landmarks import DISAGREEMENT_M
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Intrinsics, Rig, RigNode, landmark_markers
 from rhot_app.recording.landmark_log import FIRST_NS, HandFilm, landmark_order, write_hand_log
@@ -49,13 +48,6 @@ from rhot_node.landmarks.networks import open_hand_networks
 from rhot_node.wire.messages import LandmarkedHand
 
 Image = NDArray[np.uint8]
-
-MEDIAN_M = math.sqrt(2.0 * math.log(2.0) * (ANATOMY_SD_M**2 + NOISE_M**2))
-"""m: median distance of a landmark from its joint (`hand.landmarks`): a Rayleigh distribution's."""
-
-LARGE = 1.7
-"""Times MEDIAN_M from which the rig or its hand is wrong. Chosen: between 1.2 of the
-recorded hand in docs/landmarks.md with the shipped bones, and 1.8 with a wrong side or unit."""
 
 REASON: Final = "bones measured by landmarks"
 """Why a hand file is replaced."""
@@ -301,8 +293,8 @@ def states_of_log(rig: Rig, log: Path, smooth: bool = False) -> Iterator[HandSta
 def summarise(rig: Rig, states: Sequence[HandState]) -> dict[str, Any]:
     """What the estimator has made of landmarks. `tracked`: part of the states with a hand; `start_s`: of the first of
     them, after the first frame; `reprojection_px`, `reprojection_mm`: median distance of the landmarks of all hands
-    from their joints' images, and as long at the hand; `reprojection_large`: whether that is more than LARGE of
-    MEDIAN_M."""
+    from their joints' images, and as long at the hand; `reprojection_large`: whether that is more than
+    DISAGREEMENT_M."""
     cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
     hands = [(own, columns, np.array(landmark_order(own))) for own, columns in rigs_of_hands(rig)]
     errors, errors_m, variances = [], [], []
@@ -324,7 +316,7 @@ def summarise(rig: Rig, states: Sequence[HandState]) -> dict[str, Any]:
     return {"tracked": len(own) / len(states),
             "start_s": 1e-9 * (own[0].t_master_ns - states[0].t_master_ns) if own else None,
             "reprojection_px": float(np.nanmedian(np.concatenate(errors))), "reprojection_mm": 1e3 * error_m,
-            "reprojection_large": error_m > LARGE * MEDIAN_M,
+            "reprojection_large": error_m > DISAGREEMENT_M,
             "joint_sd_mm": 1e3 * float(np.sqrt(np.mean(variances)))}
 
 

@@ -10,6 +10,7 @@ lengths at the hand, per axis.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import msgspec
@@ -31,6 +32,14 @@ NOISE_M = 3e-3
 from 13 to 66 of a recorded hand with its own bones: of 1.5 to 6 mm it leaves 95 % of the joints nearest to
 triangulation, within 7.3 mm (median 3.1). In those from 67 to 119 these are 5.8 and 2.6 mm
 (`python benchmarks/landmarks.py`)."""
+
+MEDIAN_M = math.sqrt(2.0 * math.log(2.0) * (ANATOMY_SD_M**2 + NOISE_M**2))
+"""m: median distance of a landmark from its joint: a Rayleigh distribution's."""
+
+DISAGREEMENT_M = 1.7 * MEDIAN_M
+"""m: median distance of a hand's landmarks from its joints from which its rig or its bones are wrong: 8.5 mm. Chosen
+between those of a recorded hand, frame by frame: at most 4.7 mm with its own bones and 6.2 with the shipped ones, and
+10.4 or more at 0.58 of the true scale (`python benchmarks/wrong_rigs.py`)."""
 
 
 # -- the master's part of a model card (docs/landmarks.md) -------------------------------------------------------------

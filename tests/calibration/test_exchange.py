@@ -196,7 +196,7 @@ def cameras_for(form: str, numbers: Sequence[float], wide: bool) -> list[Foreign
     if form == "caliscope":
         names = ["cam_0", "cam_1", "cam_2"]
     elif form == "opencv":
-        names = ["left", "right"]
+        names = ["cam1", "cam2"]
     else:
         names = ["left", "upper right", "other"]
     return [ForeignCamera(name, lens, pose) for name, pose in zip(names, poses[:FORMATS[form].most], strict=False)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import cv2
 import msgspec
 import numpy as np
 import pytest
@@ -46,6 +47,26 @@ def test_a_file_becomes_a_rig_of_these_cameras(tmp_path: Path, capsys: pytest.Ca
     assert made.nodes[0].pose == CameraPose() and made.calibration is None and made.up == "-y"
     baseline = np.linalg.norm(made.nodes[1].pose.translation_m)
     assert baseline == pytest.approx(1.5, abs=0.2) and answer["cameras"][1]["translation_mm"][2] > 1000.0
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_pair_of_opencvs_may_stand_in_any_order_and_its_rig_passes_the_check(
+        side: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its file has no names; which camera stands to the left is nothing that it says."""
+    source, out = tmp_path / "pair.yml", tmp_path / "pair.json"
+    matrix = np.array([[500.0, 0.0, 319.5], [0.0, 500.0, 239.5], [0.0, 0.0, 1.0]])
+    lens = np.array([[0.05, -0.1, 1e-3, 1e-3, 0.0]])
+    file = cv2.FileStorage(str(source), cv2.FILE_STORAGE_WRITE)
+    for key, value in (("M1", matrix), ("D1", lens), ("M2", matrix), ("D2", lens), ("R", np.eye(3)),
+                       ("T", np.array([[side * 100.0], [0.5], [0.2]]))):
+        file.write(key, value)
+    file.release()
+    assert main(["calibrate", "import", str(source), "--unit", "mm", "--size", "640x480", "--out", str(out)]) == 0
+    capsys.readouterr()
+    main(["check", "--rig", str(out), "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert not [one for one in said["warnings"] if "port" in one or "left" in one], said["warnings"]
+    assert said["grade"] != "poor" and len({node.udp_port for node in load_rig(out).nodes}) == 2
 
 
 @pytest.mark.parametrize("form", FORMATS)

@@ -162,6 +162,17 @@ def test_a_hand_that_the_newest_frames_do_not_show_is_not_called_tracking(hidden
     assert after[2:4] == [Condition.PARTIAL] * 2, "from their second frames on"
 
 
+@pytest.mark.parametrize(("scale", "believed"), [(1.0, True), (0.4, False), (1.5, False)])
+def test_a_hand_that_its_landmarks_contradict_is_not_called_tracking(scale, believed):
+    """Cameras said to stand nearer or farther than they do, as with a wrong unit: no pose of this hand fits."""
+    nodes = tuple(msgspec.structs.replace(node, pose=msgspec.structs.replace(
+        node.pose, translation_m=tuple(scale * part for part in node.pose.translation_m))) for node in RIG.nodes)
+    states = states_of(msgspec.structs.replace(RIG, nodes=nodes), detected_landmarks(RIG, hand(), 1))
+    settled = [state.condition for state in states if 1e-9 * (state.t_master_ns - EPOCH_NS) >= SETTLED_S]
+    called = np.mean([one is Condition.TRACKING for one in settled])
+    assert called > 0.95 if believed else called == 0.0
+
+
 def test_one_wrong_landmark_does_not_take_another_ones_place():
     """The index fingertip reported where the middle one is: a detector errs so, and no painted marker is confused."""
     truth, frames = hand("rest"), []

@@ -16,6 +16,7 @@ from synthetic_rig import WIDE, Viewing, hand_trajectory, make_rig, observe
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import CameraCalibration, DepthSettings, Rig
 from rhot_app.recording.raw_log import LogReader
+from rhot_app.simulator.nodes.landmark_detector import landmark_rig
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.refinement.pair_observations import CAPACITY, PairStore, linearise
 from rhot_app.tracking.refinement.refined_rig import Refinement, Scale, refined_rig, stale_sentence, usable, verdict_of
@@ -227,9 +228,26 @@ def test_rigs_that_cannot_be_refined_say_nothing() -> None:
     for rig in (msgspec.structs.replace(RIG, depth=DepthSettings("disparity")),
                 msgspec.structs.replace(RIG, nodes=RIG.nodes[:1]),
                 msgspec.structs.replace(RIG, nodes=(RIG.nodes[0], msgspec.structs.replace(
-                    RIG.nodes[1], text_datagrams=True)))):
+                    RIG.nodes[1], text_datagrams=True))), landmark_rig()):
         refiner = RigRefiner(rig)
         assert not refiner.active and refiner.step() is None
+
+
+def test_landmarks_do_not_turn_the_cameras() -> None:
+    """Their errors last: of a rig with both, paint alone is looked at."""
+    rig = msgspec.structs.replace(RIG, markers=msgspec.structs.replace(RIG.markers, markers=(
+        *RIG.markers.markers, *(msgspec.structs.replace(one, id=f"landmark_{one.id}")
+                                for one in landmark_rig().markers.markers))))
+    refiner, count = RigRefiner(rig), len(rig.markers.ids)
+    pixels = np.full((2, count, 2), np.nan)
+    pixels[:] = np.array([[300.0, 240.0], [250.0, 246.0]])[:, None]  # six pixels off each other's epipolar lines
+    for number in range(40):
+        for camera in range(2):
+            refiner.take(CameraObservations(
+                camera, number * 25_000_000, 0, 1e-5, number * 25_000_000, 0.0, 0.0, pixels[camera],
+                np.tile(0.01 * np.eye(2), (count, 1, 1)), np.full(count, 10.0), np.ones(count),
+                np.zeros(count, np.uint16)))
+    assert set(refiner.gather().rows.marker.tolist()) <= set(range(len(RIG.markers.ids)))
 
 
 def test_a_second_timeline_begins_anew(still: list[CameraObservations]) -> None:

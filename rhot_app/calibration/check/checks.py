@@ -115,7 +115,8 @@ def pair_findings(rig: Rig, pairs: list[PairGeometry]) -> list[Finding]:
                                  "small.", "Measure from lens to lens. If that is right, put them 75 mm apart."))
         elif pair.baseline_m > _APART_M:
             found.append(Finding("apart", Grade.POOR, f"{both} are {pair.baseline_m:.0f} m apart.",
-                                 "A pose's translation is in metres, not millimetres.", _STEREO))
+                                 "A rig's translations are in metres: is the unit right (--unit, --square-mm)?",
+                                 _STEREO))
     return [*found, *_overlap_findings(pairs), *_side_findings(rig)]
 
 

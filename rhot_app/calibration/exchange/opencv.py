@@ -21,7 +21,8 @@ Array = NDArray[np.float64]
 
 
 def read(documents: Sequence[Entry], stated: Stated) -> list[ForeignCamera]:
-    """One camera a file, without poses, or the pair of one file or of two. Raises CalibrationError."""
+    """One camera a file, without poses, or the pair of one file or of two, named by the numbers of M1 and M2: nothing
+    in it says which one stands to the left. Raises CalibrationError."""
     if any(one.has("M1") or one.has("R") for one in documents):
         return _read_pair(documents, stated)
     return [_read_camera(one, stated) for one in documents]
@@ -46,7 +47,7 @@ def _read_pair(documents: Sequence[Entry], stated: Stated) -> list[ForeignCamera
     lenses = [lens_of(pair, size, focal_of(pair[f"M{k}"]), pair[f"D{k}"].numbers()) for k in (1, 2)]
     shift = pair["T"]
     second = rigid(pair["R"].rotation(), stated.unit_of(shift) * shift.numbers(3))
-    return [ForeignCamera("left", lenses[0], np.eye(4)), ForeignCamera("right", lenses[1], second)]
+    return [ForeignCamera("cam1", lenses[0], np.eye(4)), ForeignCamera("cam2", lenses[1], second)]
 
 
 def write(cameras: Sequence[ForeignCamera], unit_m: float) -> dict[str, str]:

@@ -18,10 +18,15 @@ from rhot_app.project import CameraPose, Rig, RigNode
 
 Array = NDArray[np.float64]
 
+_PORTS = {field.name: int(field.default) for field in msgspec.structs.fields(RigNode)
+          if field.name in ("udp_port", "control_port", "preview_port", "pairing_port")}
+_NEXT = 10  # as in resources/nodes: nodes on one machine, until they have addresses
+
 
 def new_rig(name: str, cameras: Mapping[str, ForeignCamera]) -> Rig:
     """A rig of a bare hand with these cameras, by name, still without their poses. Raises CalibrationError."""
-    nodes = [{"node_id": k, "name": node, "intrinsics": camera.lens}
+    nodes = [{"node_id": k, "name": node, "intrinsics": camera.lens,
+              **{port: first + _NEXT * (k - 1) for port, first in _PORTS.items()}}
              for k, (node, camera) in enumerate(cameras.items(), 1)]
     try:
         return msgspec.convert(msgspec.to_builtins({"name": name, "nodes": nodes}), Rig)

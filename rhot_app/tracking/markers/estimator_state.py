@@ -9,7 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.geometry.camera import project_with_slope
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
+from rhot_app.hand.landmarks import DISAGREEMENT_M
 from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, POSE, VELOCITY
 from rhot_app.hand.skeleton import FINGER_OF_ANGLE, FINGER_OF_JOINT, TIP_ROLES, WRIST_ROLE
 from rhot_app.state import (
@@ -179,7 +181,8 @@ class EstimatorStates:
         palm = _conclude(covariance, covariances, shown, m.finger, markers, joints, angles, angle_sd)
         # two frames may be missing, but not of most markers: without any, a fast hand is centimetres off
         in_sight = ((np.count_nonzero(age <= 2 * observations.fresh_ns[:, None], axis=0) > 1).all()
-                    and np.mean(np.count_nonzero(fresh, axis=0) > 1) > 0.5)
+                    and np.mean(np.count_nonzero(fresh, axis=0) > 1) > 0.5
+                    and not self._contradicted(points[_FIRST_MARKER:], aligned, fresh))
         world, deviation = np.eye(4), np.sqrt(np.maximum(np.diag(covariance), 0.0))
         world[:3] = state[:ANGLES].reshape(3, 4)
         return HandState(
@@ -201,6 +204,20 @@ class EstimatorStates:
             hand_scale_sd=self._scale_sd,
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
                        "filter": solved - begun, "solve": time.perf_counter() - solved})
+
+    def _contradicted(self, points: Array, aligned: Array, fresh: Mask) -> bool:
+        """Whether the landmarks that are seen (C, M) say that the hand whose markers are at `points` (M, 3) m is not
+        theirs: the rig, its times or the bones are wrong. `aligned` (C, M, 2) px: brought to the state's time."""
+        errors_m = [np.zeros(0)]
+        for camera, seen in enumerate(fresh & self._markers.landmark):
+            if seen.any():
+                expected, slopes = project_with_slope(points[seen], self._rig.cameras[camera],
+                                                      self._rig.intrinsics[camera])
+                pixels_per_metre = np.linalg.norm(slopes, axis=(1, 2)) / math.sqrt(2.0)
+                errors_m.append(np.linalg.norm(aligned[camera, seen] - expected, axis=1) / pixels_per_metre)
+        known = np.concatenate(errors_m)
+        known = known[np.isfinite(known)]
+        return bool(len(known)) and float(np.median(known)) > DISAGREEMENT_M
 
     def none(self, sequence: int, condition: Condition, newest: CameraObservations, begun: float) -> HandState:
         """No hand: what the cameras see is all there is."""

@@ -26,6 +26,7 @@ from rhot_app.estimation.quantiles import chi_squared_tail
 from rhot_app.geometry.camera import CameraModel, point_rays, undistort_point
 from rhot_app.geometry.transforms import exp_so3, inverse, log_so3, rigid
 from rhot_app.geometry.triangulate import Outcome, triangulate
+from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.project import Rig
 from rhot_app.tracking.locate import EXACT_PX2
 from rhot_app.tracking.pairing import Paired, Pairing
@@ -115,8 +116,9 @@ class _Solution:
 class RigRefiner:
     """Takes every frame (`take`) and estimates the refinement every few seconds (`step`). One thread.
 
-    A rig of one camera, of cameras in one place, without calibrated depth or without times is not refined: `active` is
-    False.
+    Landmarks are left out: their errors are lasting and the same in no two cameras, so they would turn the cameras. A
+    rig of one camera, of cameras in one place, without calibrated depth, without times, or of landmarks alone is not
+    refined: `active` is False.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -127,9 +129,10 @@ class RigRefiner:
         self._focal = self._compiled.focal
         centres = self._stored[:, :3, 3]
         self._base_m = float(np.linalg.norm(centres - centres[0], axis=1).sum())
+        self._own = np.array([marker.role not in LANDMARK_ROLES for marker in rig.markers.markers])
         places = {tuple(centre) for centre in centres.tolist()}
         self.active = (len(models) > 1 and len(places) == len(models) and rig.depth.mode == "stereo"
-                       and not any(node.text_datagrams for node in rig.nodes))
+                       and self._own.any() and not any(node.text_datagrams for node in rig.nodes))
         self._pairs = list(combinations(range(len(models)), 2))
         self._pair_of = np.zeros((len(models), len(models)), np.intp)
         for number, (i, j) in enumerate(self._pairs):
@@ -186,7 +189,7 @@ class RigRefiner:
         assert self._epoch_ns is not None
         t_s = 1e-9 * (paired.t_ns - self._epoch_ns)
         speed = (paired.pixels - before.pixels) / (1e-9 * (paired.t_ns - before.t_ns))
-        clear = (paired.flags >= 0) & ((paired.flags & DOUBTFUL) == 0) & np.isfinite(speed).all(axis=2)
+        clear = (paired.flags >= 0) & ((paired.flags & DOUBTFUL) == 0) & np.isfinite(speed).all(axis=2) & self._own
         for marker in np.flatnonzero(np.count_nonzero(clear, axis=0) >= 2):
             self._keep_marker(t_s, int(marker), paired, clear[:, marker], speed[:, marker], bounds_s)
 
