@@ -76,7 +76,7 @@ def format_of(name: str | None, out: Path | None) -> str:
     for found, one in FORMATS.items():
         if out.suffix.lower() in one.endings:
             return found
-    endings = ", ".join(ending for one in FORMATS.values() for ending in one.endings)
+    endings = ", ".join(dict.fromkeys(ending for one in FORMATS.values() for ending in one.endings))
     raise ExportError(f"{out}: no format has the ending {out.suffix!r}; give the file one of {endings}.")
 
 

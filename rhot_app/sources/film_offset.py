@@ -20,7 +20,7 @@ from rhot_app.errors import RecordingError
 from rhot_app.progress import Progress, silent
 from rhot_app.sources.frame_sets import FPS
 from rhot_node.errors import PictureError
-from rhot_node.files import require_file, why
+from rhot_node.files import require_file
 from rhot_node.pictures import open_video
 
 Array = NDArray[np.float64]
@@ -126,7 +126,7 @@ def _sound(path: Path) -> tuple[Array, float]:
                 raise RecordingError(f"{path}: this film has no sound. Give the offset by hand, or by a flash.")
             return _decoded(film, av)
     except (OSError, ValueError) as exc:  # av's errors are both
-        raise RecordingError(f"{path}: its sound cannot be read ({why(exc) if isinstance(exc, OSError) else exc}). Is "
+        raise RecordingError(f"{path}: its sound cannot be read ({getattr(exc, 'strerror', None) or exc}). Is "
                              "it a film, and complete?") from exc
 
 

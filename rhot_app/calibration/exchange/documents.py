@@ -176,7 +176,9 @@ def _yaml(text: str, path: Path) -> Any:
                 parts = open_parts.pop()
                 open_parts[-1].append(_table(parts, path) if isinstance(event, yaml.MappingEndEvent) else parts)
     except yaml.YAMLError as exc:
-        raise CalibrationError(f"{path}: not valid YAML ({printable(' '.join(str(exc).split()))[:200]}).") from exc
+        what = printable(" ".join(str(exc).split()))[:200]
+        raise CalibrationError(f"{path}: not valid YAML ({what}). Files of OpenCV, ROS and "
+                               "Kalibr (YAML), anipose and caliscope (TOML) are read.") from exc
     if len(open_parts[0]) != 1:
         raise CalibrationError(f"{path}: one document is needed, it has {len(open_parts[0])}.")
     return open_parts[0][0]

@@ -61,8 +61,8 @@ def measure_bones(tracks: MarkerTracks, base: HandAnatomy) -> BonesReport:
             seen = seen[np.isfinite(seen)]
             if len(seen) < LEAST_INSTANTS:
                 raise CalibrationError(f"{JOINTS[chain[bone]]} and {JOINTS[chain[bone + 1]]} of the {name} finger are "
-                                       f"located in {len(seen)} instants; a bone needs {LEAST_INSTANTS}. Hold the hand "
-                                       "so that two cameras see all of it.")
+                                       f"located together in {len(seen)} of the instants; a bone needs "
+                                       f"{LEAST_INSTANTS}. Hold the hand so that two cameras see all of it.")
             instants = min(instants, len(seen))
             lengths[finger, bone] = np.median(seen)
             spreads[finger, bone] = np.subtract(*np.percentile(seen, [90.0, 10.0])) / _DECILES
