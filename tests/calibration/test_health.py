@@ -14,6 +14,7 @@ from synthetic_rig import make_rig
 
 from rhot_app.calibration.check.health import HealthMonitor, HealthSample
 from rhot_app.project import CameraCalibration, Rig
+from rhot_app.simulator.nodes.landmark_detector import landmark_rig
 from rhot_node.wire.messages import MarkerFlag
 
 MARKERS = 6
@@ -100,6 +101,18 @@ def test_each_doubt_about_a_running_rig_is_said(change: Callable[[int, HealthSam
                                                 code: str) -> None:
     assert codes_after(lambda k, one: one) == []
     assert codes_after(change) == [code]
+
+
+def test_landmarks_say_nothing_of_the_calibration() -> None:
+    """They err by pixels, each by itself, with the best calibration."""
+    rig = landmark_rig()
+    monitor, rng, count = HealthMonitor(rig), np.random.default_rng(3), len(rig.markers.ids)
+    for k in range(400):
+        positions = 0.05 * rng.normal(size=(count, 3)) + (0.0, 0.0, 0.6)
+        monitor.feed(HealthSample(t_ns=k * 100_000_000, positions=positions, measured=np.ones(count, np.bool_),
+                                  errors_px=np.full(count, 3.0), qualities=np.full((2, count), 0.1),
+                                  flags=np.zeros((2, count), np.uint16)))
+    assert monitor.findings() == ()
 
 
 def test_times_that_step_back_begin_anew() -> None:

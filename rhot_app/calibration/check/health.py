@@ -204,13 +204,17 @@ class HealthSample:
 
 
 class HealthMonitor:
-    """`feed` it up to twelve times a second (50 µs), ask for `findings` every few seconds (below a millisecond). One
-    thread. A new rig needs a new one."""
+    """Looks at painted markers alone: landmarks err by pixels where the calibration is right.
+
+    `feed` it up to twelve times a second (50 µs), ask for `findings` every few seconds (below a millisecond). One
+    thread. A new rig needs a new one.
+    """
 
     def __init__(self, rig: Rig) -> None:
         roles = [marker.role or "" for marker in rig.markers.markers]
         cameras, markers = len(rig.nodes), len(roles)
         self._rig = rig
+        self._painted = np.array([marker.shape != "landmark" for marker in rig.markers.markers])
         self._stereo = rig.depth.mode == "stereo"
         self._wrist = roles.index(WRIST_ROLE) if WRIST_ROLE in roles else -1
         tips = [(finger, roles.index(role)) for finger, role in enumerate(TIP_ROLES) if role in roles]
@@ -242,15 +246,16 @@ class HealthMonitor:
         row = self._count % _CAPACITY
         positions = np.where(sample.measured[:, None], sample.positions, np.nan)
         self._times[row] = 1e-9 * sample.t_ns
-        self._errors[row] = sample.errors_px
+        self._errors[row] = np.where(self._painted, sample.errors_px, np.nan)
         self._speeds[row] = self._speed(sample)
         self._reaches[row] = np.linalg.norm(positions[self._tips] - positions[self._wrist], axis=1)
         for k, (a, b) in enumerate(self._rigid):
             self._distances[row, k] = distance = float(np.linalg.norm(positions[a] - positions[b]))
             if len(self._learnt[k]) < _LEARN_SAMPLES and np.isfinite(distance):
                 self._learnt[k].append(distance)
-        self._qualities[row] = np.where(sample.flags & _DOUBTFUL, np.nan, sample.qualities)
-        self._ambiguous[row] = np.where(sample.flags & _LOST, np.nan, (sample.flags & _AMBIGUOUS) != 0)
+        self._qualities[row] = np.where((sample.flags & _DOUBTFUL != 0) | ~self._painted, np.nan, sample.qualities)
+        self._ambiguous[row] = np.where((sample.flags & _LOST != 0) | ~self._painted, np.nan,
+                                        (sample.flags & _AMBIGUOUS) != 0)
         self._count += 1
         self._last = sample
 

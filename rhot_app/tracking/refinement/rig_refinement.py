@@ -26,7 +26,6 @@ from rhot_app.estimation.quantiles import chi_squared_tail
 from rhot_app.geometry.camera import CameraModel, point_rays, undistort_point
 from rhot_app.geometry.transforms import exp_so3, inverse, log_so3, rigid
 from rhot_app.geometry.triangulate import Outcome, triangulate
-from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.project import Rig
 from rhot_app.tracking.locate import EXACT_PX2
 from rhot_app.tracking.pairing import Paired, Pairing
@@ -129,7 +128,7 @@ class RigRefiner:
         self._focal = self._compiled.focal
         centres = self._stored[:, :3, 3]
         self._base_m = float(np.linalg.norm(centres - centres[0], axis=1).sum())
-        self._own = np.array([marker.role not in LANDMARK_ROLES for marker in rig.markers.markers])
+        self._own = np.array([marker.shape != "landmark" for marker in rig.markers.markers])
         places = {tuple(centre) for centre in centres.tolist()}
         self.active = (len(models) > 1 and len(places) == len(models) and rig.depth.mode == "stereo"
                        and self._own.any() and not any(node.text_datagrams for node in rig.nodes))
