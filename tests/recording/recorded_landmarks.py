@@ -6,6 +6,7 @@ Truth is what the landmarks of both cameras triangulate to, so that errors are d
 from __future__ import annotations
 
 import contextlib
+import itertools
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -101,6 +102,15 @@ class Recording:
             if state.tracked and frame in self._frames:
                 found[np.searchsorted(self._frames, frame)] = state.joint_positions
         return found
+
+    def states_from(self, begin: int, count: int) -> list:
+        """The first `count` states of a recording that begins at frame WHOLE + `begin`."""
+        tables = []
+        for table in self.tables:
+            kept = table.times_s * FPS > WHOLE + begin - 0.5
+            tables.append(LandmarkTable(table.times_s[kept], table.pixels[kept], table.scores[kept],
+                                        table.sigma_px[kept]))
+        return [state for _, state in itertools.islice(_states(self.rig, tables, False), count)]
 
     def held_still(self, frame: int, seconds: float = 1.0) -> np.ndarray:
         """(21,) mm: how far the joints are off after a frame was held so long; NaN when no hand is found."""

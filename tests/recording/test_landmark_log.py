@@ -21,6 +21,7 @@ from rhot_app.recording.landmark_log import read_landmark_table, write_landmark_
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.simulator.nodes.landmark_detector import detected_landmarks, landmark_rig, moving_hand
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import INFERRED_M, Condition
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.files import resource_path
 
@@ -144,3 +145,16 @@ def test_a_recorded_hands_bones_are_measured_and_used(tmp_path: Path, capsys: py
 def hand_bones(hand: HandAnatomy) -> list[float]:
     """All lengths, mm."""
     return [length for name in FINGERS for length in hand.fingers[name].bones_mm]
+
+
+@needs_recording
+@pytest.mark.parametrize("begin", [0, 32, 64])
+def test_a_recording_that_begins_amid_a_motion_is_tracking_once_the_hands_places_are_known(begin: int) -> None:
+    one = recording()
+    states = one.states_from(begin, 6)
+    tracking = [state for state in states if state.condition is Condition.TRACKING]
+    assert len(tracking) >= 3
+    for state in tracking:
+        spreads = np.sqrt(np.trace(state.marker_covariances, axis1=1, axis2=2))
+        assert np.median(spreads) <= INFERRED_M
+    assert any(state.condition is Condition.PARTIAL and np.isfinite(state.joint_positions).all() for state in states)

@@ -182,6 +182,7 @@ class EstimatorStates:
         # two frames may be missing, but not of most markers: without any, a fast hand is centimetres off
         in_sight = ((np.count_nonzero(age <= 2 * observations.fresh_ns[:, None], axis=0) > 1).all()
                     and np.mean(np.count_nonzero(fresh, axis=0) > 1) > 0.5
+                    and np.mean(markers < _GUESSED) > 0.5
                     and not self._contradicted(points[_FIRST_MARKER:], aligned, fresh))
         world, deviation = np.eye(4), np.sqrt(np.maximum(np.diag(covariance), 0.0))
         world[:3] = state[:ANGLES].reshape(3, 4)
