@@ -24,8 +24,8 @@ from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.project import Rig
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.tracking.markers.acquisition import Located
-from rhot_app.tracking.markers.hand_size import GRID, USUAL_SD, HandSize
-from rhot_app.tracking.markers.marker_model import MarkerModel, compile_markers
+from rhot_app.tracking.markers.hand_size import GRID, HandSize
+from rhot_app.tracking.markers.marker_model import USUAL_SIZE_SD, MarkerModel, compile_markers
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def main() -> int:
 
 def learnt(group: People, rig: Rig, markers: MarkerModel, rng: np.random.Generator) -> tuple[float, float, float]:
     """Of one person: the logarithm of the size, its standard deviation, and the truth."""
-    log_scale, size = USUAL_SD * rng.normal(), HandSize(
+    log_scale, size = USUAL_SIZE_SD * rng.normal(), HandSize(
         markers.dh, markers.limits, markers.pose_prior, markers.paint_variance)
     hand = person(rig.hand, group.bones, rng)
     worn = compile_markers(msgspec.structs.replace(rig, hand=hand)).dh

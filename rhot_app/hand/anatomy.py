@@ -14,7 +14,7 @@ from msgspec import Meta
 
 from rhot_app.errors import RigError
 from rhot_app.hand.skeleton import ANGLES, FINGERS
-from rhot_node.files import PRINTABLE, read_document, write_document
+from rhot_node.files import PRINTABLE, read_document, resource_path, write_document
 
 # -- coupled angles ----------------------------------------------------------------------------------------------------
 
@@ -122,6 +122,11 @@ class HandAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def load_hand(path: Path) -> HandAnatomy:
     """Read and validate a hand file; raises RigError naming file and field."""
     return read_document(path, HandAnatomy, format_name=FORMAT, version=VERSION, error=RigError)
+
+
+def is_shipped(hand: HandAnatomy) -> bool:
+    """Whether it is the hand that RHOT comes with: nobody's own has been measured."""
+    return hand == load_hand(resource_path("hands", f"{hand.side}.json"))
 
 
 def save_hand(path: Path, hand: HandAnatomy) -> None:

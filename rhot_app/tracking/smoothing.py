@@ -150,9 +150,9 @@ class RecordingEstimator(Estimator):
             state, covariance = estimate.process.predict(state, covariance, 1e-9 * later_ns)
         # What is triangulated stays as it was tracked: its observations are carried on by the motion of then.
         own = states.describe(instant.t_ns, knot.state, knot.covariance, 0, instant.observations, begun)
-        out = states.describe(instant.t_ns + later_ns, state, covariance, 0, instant.observations, begun)
-        return replace(out, marker_raw_positions=own.marker_raw_positions, epipolar_error_px=own.epipolar_error_px,
-                       condition=Condition.PARTIAL if instant.by_one else out.condition)
+        out = states.describe(instant.t_ns + later_ns, state, covariance, 0, instant.observations, begun,
+                              by_one=instant.by_one)
+        return replace(out, marker_raw_positions=own.marker_raw_positions, epipolar_error_px=own.epipolar_error_px)
 
     # -- observing the estimator ---------------------------------------------------------------------------------------
 

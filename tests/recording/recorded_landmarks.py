@@ -103,14 +103,19 @@ class Recording:
                 found[np.searchsorted(self._frames, frame)] = state.joint_positions
         return found
 
-    def states_from(self, begin: int, count: int) -> list:
-        """The first `count` states of a recording that begins at frame WHOLE + `begin`."""
+    def states_from(self, begin: int, count: int, only: int | None = None) -> list:
+        """The first `count` states of a recording that begins at frame WHOLE + `begin`, each with the joints' places
+        (21, 3) m. `only`: the camera that sees the hand."""
         tables = []
-        for table in self.tables:
+        for camera, table in enumerate(self.tables):
             kept = table.times_s * FPS > WHOLE + begin - 0.5
+            if only not in (None, camera):
+                kept[:-1] = False  # a log has frames of all its cameras
             tables.append(LandmarkTable(table.times_s[kept], table.pixels[kept], table.scores[kept],
                                         table.sigma_px[kept]))
-        return [state for _, state in itertools.islice(_states(self.rig, tables, False), count)]
+        first_s = min(table.times_s[0] for table in tables)
+        return [(state, self.places[round((1e-9 * (state.t_master_ns - first_ns) + first_s) * FPS) - WHOLE])
+                for first_ns, state in itertools.islice(_states(self.rig, tables, False), count)]
 
     def held_still(self, frame: int, seconds: float = 1.0) -> np.ndarray:
         """(21,) mm: how far the joints are off after a frame was held so long; NaN when no hand is found."""

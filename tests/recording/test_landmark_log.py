@@ -151,10 +151,22 @@ def hand_bones(hand: HandAnatomy) -> list[float]:
 @pytest.mark.parametrize("begin", [0, 32, 64])
 def test_a_recording_that_begins_amid_a_motion_is_tracking_once_the_hands_places_are_known(begin: int) -> None:
     one = recording()
-    states = one.states_from(begin, 6)
+    states = [state for state, _ in one.states_from(begin, 6)]
     tracking = [state for state in states if state.condition is Condition.TRACKING]
     assert len(tracking) >= 3
     for state in tracking:
         spreads = np.sqrt(np.trace(state.marker_covariances, axis1=1, axis2=2))
         assert np.median(spreads) <= INFERRED_M
     assert any(state.condition is Condition.PARTIAL and np.isfinite(state.joint_positions).all() for state in states)
+
+
+@needs_recording
+@pytest.mark.parametrize("camera", [0, 1])
+def test_one_camera_alone_says_how_badly_it_knows_the_distance(camera: int) -> None:
+    """Of a hand that is a tenth smaller than the file's, whose distance one camera cannot show."""
+    states = recording().states_from(0, 100, only=camera)[5:]
+    assert all(state.condition is Condition.PARTIAL for state, _ in states)
+    away = np.linalg.norm([state.joint_positions - places for state, places in states], axis=2)
+    spreads = np.sqrt([np.trace(state.joint_covariances, axis1=1, axis2=2) for state, _ in states])
+    assert np.percentile(away / spreads, 95) < 3.0
+    assert np.median(spreads) < 0.15

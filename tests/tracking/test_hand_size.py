@@ -7,8 +7,8 @@ from modelled_hand import model_rig
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.simulator.scene.motion import FACING
 from rhot_app.tracking.markers.acquisition import Located
-from rhot_app.tracking.markers.hand_size import FOLLOW_S, GRID, LEAST_SD, USUAL_SD, HandSize
-from rhot_app.tracking.markers.marker_model import compile_markers
+from rhot_app.tracking.markers.hand_size import FOLLOW_S, GRID, HandSize
+from rhot_app.tracking.markers.marker_model import LEAST_SIZE_SD, USUAL_SIZE_SD, compile_markers
 
 WORN = compile_markers(model_rig())
 MARKERS = len(WORN.roles)
@@ -65,15 +65,15 @@ def learnt(poses, scale, seed=0):
 def test_eight_natural_poses_show_the_size_and_how_well(scale, seed):
     log_scale, variance = learnt(natural_poses(8, seed), scale, seed).known
     assert abs(log_scale - np.log(scale)) < 0.02
-    assert LEAST_SD < np.sqrt(variance) < 0.025
+    assert LEAST_SIZE_SD < np.sqrt(variance) < 0.025
 
 
 def test_a_single_shape_leaves_the_size_open_and_what_is_stated_is_true():
     off = []
     for seed in range(8):
-        scale = float(np.exp(USUAL_SD * np.random.default_rng(seed).normal()))
+        scale = float(np.exp(USUAL_SIZE_SD * np.random.default_rng(seed).normal()))
         log_scale, variance = learnt(natural_poses(1, seed), scale, seed).known
-        assert 0.025 < np.sqrt(variance) < USUAL_SD
+        assert 0.025 < np.sqrt(variance) < USUAL_SIZE_SD
         off.append((log_scale - np.log(scale)) / np.sqrt(variance))
     assert np.abs(off).max() < 2.5
 
@@ -94,14 +94,14 @@ def test_nothing_is_believed_of_fingers_in_exchange_of_markers_in_doubt_and_of_t
     for wrong in (seen._replace(positions=swapped), seen._replace(clear=few)):
         size = size_of_nobody()
         show(size, wrong, angles)
-        assert size.known == (0.0, USUAL_SD**2)
+        assert size.known == (0.0, USUAL_SIZE_SD**2)
     astray = seen.positions.copy()
     astray[INDEX] += 0.05
     doubtful = np.arange(MARKERS) != INDEX
     one, other = size_of_nobody(), size_of_nobody()
     show(one, seen._replace(positions=astray, clear=doubtful), angles)
     show(other, seen._replace(clear=doubtful), angles)
-    assert one.known == other.known != (0.0, USUAL_SD**2)
+    assert one.known == other.known != (0.0, USUAL_SIZE_SD**2)
 
 
 def test_the_size_is_followed_slowly_and_what_it_lags_is_doubt():
@@ -116,4 +116,4 @@ def test_the_size_is_followed_slowly_and_what_it_lags_is_doubt():
     assert steps[99, 0] == pytest.approx(np.log(size.scale) * -np.expm1(-1.0 / FOLLOW_S))
     assert (np.abs(steps[:, 0] - np.log(1.1)) < 2.0 * np.sqrt(steps[:, 1])).all()
     size.reset()
-    assert size.known == (0.0, USUAL_SD**2) and size.scale == 1.0
+    assert size.known == (0.0, USUAL_SIZE_SD**2) and size.scale == 1.0

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,9 +115,8 @@ class Estimator:
             return self._states.none(self._sequence - 1, Condition.LOST if self._ever else Condition.SEARCHING,
                                      taken[-1], begun)
         knot = self._filter.newest
-        state = self._states.describe(self._time_ns(knot.t_s), knot.state, knot.covariance, self._sequence - 1,
-                                      taken[-1], begun)
-        return replace(state, condition=Condition.PARTIAL) if self._by_one else state
+        return self._states.describe(self._time_ns(knot.t_s), knot.state, knot.covariance, self._sequence - 1,
+                                      taken[-1], begun, by_one=self._by_one)
 
     def _seconds(self, t_ns: int) -> float:
         return 1e-9 * (t_ns - self._epoch_ns)

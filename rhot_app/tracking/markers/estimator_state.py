@@ -154,8 +154,9 @@ class EstimatorStates:
         self._dh, self._scale, self._scale_sd = scaled_table(self._file_size, scale), scale, sd
 
     def describe(self, t_ns: int, state: Array, covariance: Array, sequence: int, newest: CameraObservations,
-                 begun: float) -> HandState:
-        """The state of master time `t_ns`; work on it began at `begun`, s of `time.perf_counter`."""
+                 begun: float, *, by_one: bool = False) -> HandState:
+        """The state of master time `t_ns`; work on it began at `begun`, s of `time.perf_counter`. `by_one`: one camera
+        alone has found the hand, so it is as far as a hand of the file's size is."""
         solved, rig, observations, m = time.perf_counter(), self._rig, self._observations, self._markers
         state = state.copy()
         state[ANGLES:VELOCITY] = np.minimum(np.maximum(state[ANGLES:VELOCITY], m.limits[:, 0]), m.limits[:, 1])
@@ -178,9 +179,13 @@ class EstimatorStates:
             locate.turn_band(world, rig.band_half_axes, self._shapes[rig.wrist])
         locate_all(aligned, observations.covariances, fresh & (np.count_nonzero(fresh, axis=0) > 1), rig.intrinsics,
                    rig.cameras, self._shapes, raw, raw_covariances, errors)
+        if by_one:
+            covariance = covariance.copy()
+            self._doubt_distance(newest.camera, points, covariances, state, covariance)
         palm = _conclude(covariance, covariances, shown, m.finger, markers, joints, angles, angle_sd)
         # two frames may be missing, but not of most markers: without any, a fast hand is centimetres off
-        in_sight = ((np.count_nonzero(age <= 2 * observations.fresh_ns[:, None], axis=0) > 1).all()
+        in_sight = (not by_one
+                    and (np.count_nonzero(age <= 2 * observations.fresh_ns[:, None], axis=0) > 1).all()
                     and np.mean(np.count_nonzero(fresh, axis=0) > 1) > 0.5
                     and np.mean(markers < _GUESSED) > 0.5
                     and not self._contradicted(points[_FIRST_MARKER:], aligned, fresh))
@@ -205,6 +210,15 @@ class EstimatorStates:
             hand_scale_sd=self._scale_sd,
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
                        "filter": solved - begun, "solve": time.perf_counter() - solved})
+
+    def _doubt_distance(self, camera: int, points: Array, covariances: Array, state: Array, covariance: Array) -> None:
+        """Add what `camera` cannot show: hand and distance may be larger or smaller together, about its centre."""
+        variance = (self._scale_sd if self._scale_sd > 0.0 else self._markers.size_sd) ** 2
+        centre = self._rig.cameras[camera, :, :3].T @ -self._rig.cameras[camera, :, 3]
+        away = points - centre
+        covariances += variance * away[:, :, None] * away[:, None, :]
+        palm = state[:ANGLES].reshape(3, 4)[:, 3] - centre
+        covariance[:3, :3] += variance * np.outer(palm, palm)
 
     def _contradicted(self, points: Array, aligned: Array, fresh: Mask) -> bool:
         """Whether the landmarks that are seen (C, M) say that the hand whose markers are at `points` (M, 3) m is not

@@ -18,19 +18,13 @@ from numpy.typing import NDArray
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.limits import PosePrior
 from rhot_app.tracking.markers.acquisition import Located
+from rhot_app.tracking.markers.marker_model import LEAST_SIZE_SD, USUAL_SIZE_SD
 from rhot_app.tracking.markers.size_evidence import Posture, implausibility
 
 Array = NDArray[np.float64]
 
 GRID = 0.0125 * np.arange(-24, 25)
 """(49,) logarithms of the scales that are weighed."""
-
-USUAL_SD = 0.1
-"""How far hands are from the size in their file, before anything is seen: standard deviation of the logarithm."""
-
-LEAST_SD = 0.015
-"""No size is known better: bones of hands of one length scatter by 3 to 8 %, so hands differ in proportion, and the one
-size is a mean over fifteen bones."""
 
 DISTINCT_M = 0.01
 """A shape is another when the distance of two markers differs by as much from every shape that is kept."""
@@ -70,7 +64,7 @@ class HandSize:
         self._shapes: list[Array] = []  # each (P,) m, distances of all pairs of markers
         self._curves: list[Array] = []  # each (49,), how implausible the grid's sizes are; zero where unfit
         self._in_work: _Curve | None = None
-        self._aim, self._aim_variance = 0.0, USUAL_SD**2
+        self._aim, self._aim_variance = 0.0, USUAL_SIZE_SD**2
         self._log_scale, self._t_ns = 0.0, 0
 
     @property
@@ -120,11 +114,11 @@ class HandSize:
         if not counted:
             return
         weight = min(SHARE * len(counted), MOST)
-        total = weight * np.mean(counted, axis=0) + 0.5 * np.square(GRID / USUAL_SD)
+        total = weight * np.mean(counted, axis=0) + 0.5 * np.square(GRID / USUAL_SIZE_SD)
         likely = np.exp(total.min() - total)
         likely /= likely.sum()
         self._aim = float(likely @ GRID)
-        self._aim_variance = float(likely @ np.square(GRID - self._aim)) + LEAST_SD**2
+        self._aim_variance = float(likely @ np.square(GRID - self._aim)) + LEAST_SIZE_SD**2
 
 
 class _Curve:

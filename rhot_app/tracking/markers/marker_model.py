@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import RigError
 from rhot_app.geometry.camera import REACH, CameraModel, project_ray
+from rhot_app.hand.anatomy import is_shipped
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.landmarks import ANATOMY_SD_M, LASTING_S
 from rhot_app.hand.limits import PosePrior
@@ -40,6 +41,14 @@ NEAREST_M = 0.02
 _COUPLED_SD_RAD = math.radians(0.02)  # as good as exact
 
 
+USUAL_SIZE_SD = 0.1
+"""How far hands are from the size in their file, before anything is seen: standard deviation of the logarithm."""
+
+LEAST_SIZE_SD = 0.015
+"""No size is known better: bones of hands of one length scatter by 3 to 8 %, so hands differ in proportion, and the one
+size is a mean over fifteen bones."""
+
+
 @dataclass(frozen=True, slots=True)
 class MarkerModel:
     """M markers on a hand before C cameras. Read-only.
@@ -48,6 +57,7 @@ class MarkerModel:
     their bodies along the palm's axes, zero for flat ones. `slender` (M,): visible area of a fingertip from its side
     over that from its end, less 1; negative where the size says nothing of the distance. `paint_variance` (M,) m^2.
     `landmark` (M,) bool: landmarks, which err as `hand.landmarks` says.
+    `size_sd`: of the logarithm of the hand's size before anything of it is seen.
     `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 13) as `CameraModel`. `limits` (21, 2) rad.
     """
 
@@ -64,6 +74,7 @@ class MarkerModel:
     limits: Array
     roles: tuple[str, ...]
     places: tuple[Place, ...]
+    size_sd: float
 
     def scaled(self, factor: float) -> MarkerModel:
         """The markers on a hand `factor` times as large."""
@@ -100,7 +111,8 @@ def compile_markers(rig: Rig) -> MarkerModel:
         np.array([camera.camera_from_world[:3] for camera in cameras]),
         np.array([camera.intrinsics for camera in cameras]),
         pose_prior_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),
-        tuple(marker.role or "" for marker in rig.markers.markers), places)
+        tuple(marker.role or "" for marker in rig.markers.markers), places,
+        USUAL_SIZE_SD if is_shipped(rig.hand) else LEAST_SIZE_SD)
 
 
 def scaled_table(dh: DhArrays, factor: float) -> DhArrays:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rhot_app.calibration.check.camera_calibration import calibration_finding
-from rhot_app.hand.anatomy import load_hand
+from rhot_app.hand.anatomy import is_shipped
 from rhot_app.project import Rig
-from rhot_node.files import resource_path
 
 Wear = Literal["paint", "bare", "landmarks"]
 """What shows the hand: painted or taped markers; a bare hand, by the networks; landmarks or nodes of one's own."""
@@ -67,10 +66,9 @@ def next_steps(answers: Answers, rig: Rig, *, networks: bool, printed: bool, rea
         steps.append(Step("Teach the colours", "Which colour each marker has in this light.",
                           exact or _noted(reasons, "colour calibration"), "colours"))
     if answers.wear == "paint" or two:
-        own = rig.hand != load_hand(resource_path("hands", f"{rig.hand.side}.json"))
         steps.append(Step("Measure your hand", "How long its bones are, from a minute of movement.",
-                          own or _noted(reasons, "bones", "hand adapted"), "bones" if answers.wear == "paint"
-                          else "measured"))
+                          not is_shipped(rig.hand) or _noted(reasons, "bones", "hand adapted"),
+                          "bones" if answers.wear == "paint" else "measured"))
     return steps
 
 
