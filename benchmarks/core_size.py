@@ -94,8 +94,8 @@ class Chosen(ast.NodeVisitor):
 
     def visit_Compare(self, node: ast.Compare) -> None:
         """A number of dimensions or of elements chooses nothing."""
-        if any(isinstance(one, ast.Attribute) and one.attr in ("ndim", "shape") or isinstance(one, ast.Call)
-               and getattr(one.func, "id", "") == "len" for one in ast.walk(node)):
+        if any((isinstance(one, ast.Attribute) and one.attr in ("ndim", "shape")) or (isinstance(one, ast.Call)
+               and getattr(one.func, "id", "") == "len") for one in ast.walk(node)):
             return
         self.generic_visit(node)
 

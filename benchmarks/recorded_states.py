@@ -19,6 +19,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from tables import arguments, publish, table
 
 from rhot_app.engine.offline.replay_summary import replay_states, smoothed_states
 from rhot_app.errors import RecordingError, RhotError
@@ -28,7 +29,6 @@ from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
 from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.trackers import make_tracker
-from tables import arguments, publish, table
 
 SAME_M = 1e-6
 TRACKERS = "own", "classic", "estimator", "smoothed"
