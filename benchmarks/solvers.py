@@ -11,8 +11,7 @@ knuckle through the axis of abduction, where the finger's plane must jump by 23 
 prints times per call of all five fingers, µs, median and p99; iterations per finger, median and most; residuals, mm,
 median and worst; fingers that missed their target by more than 0.001 mm (FABRIK: 0.05 mm), and that FABRIK handed over,
 %; the worst excess over a limit, degrees; and of each path the largest change of a joint in one step, degrees, and the
-largest distance from the nearest reachable target, mm. Then hands whose neighbouring fingers bend one another, and
-chains of points with a parabola at the root, both through Python.
+largest distance from the nearest reachable target, mm.
 """
 
 from __future__ import annotations
@@ -32,20 +31,15 @@ from tables import arguments, publish, table
 
 from rhot_app.hand.anatomy import DIP_PER_PIP, load_hand
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.model import HandModel, build_model, inter_finger, neutral_pose
+from rhot_app.hand.model import HandModel, build_model, neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
-from rhot_app.hand.solvers.finger_chain import Status, chain_points
 from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint, shape_knuckles
-from rhot_app.hand.solvers.limited_chain import JointLimit, solve_limited_chain
 from rhot_app.hand.solvers.methods import (
     COARSE,
     EFFORT,
     Method,
-    differences_of,
-    share_out,
     solve,
     solve_arrays,
-    solve_neighbours,
 )
 from rhot_app.hand.solvers.problem import Problem, make_problem
 from rhot_node.files import resource_path
@@ -162,48 +156,6 @@ def all_figures(model: HandModel, hands: int) -> dict[str, dict[str, dict[str, f
     return figures
 
 
-def neighbours(model: HandModel, hands: int) -> dict[str, float]:
-    """Hands whose knuckles stay behind their neighbours' by no more than 25 degrees, solved with that bound."""
-    rng, times, reached = np.random.default_rng(3), [], []
-    differences = differences_of(*inter_finger(np.radians(25.0)))
-    bounds = np.array(differences)
-    for _ in range(hands):
-        angles = rng.uniform(*model.limits.T)
-        share_out(angles, model.limits.copy(), bounds)
-        targets = forward(model, HandPose(np.eye(4), angles)).marker_centres
-        problem = make_problem(model, neutral_pose(), targets)
-        before = time.perf_counter_ns()
-        solution = solve_neighbours(Method.LEVENBERG, problem, differences=differences)
-        times.append(1e-3 * (time.perf_counter_ns() - before))
-        reached.append(solution.statuses == Status.REACHED)
-    return {"median_us": float(np.median(times)), "p99_us": float(np.percentile(times, 99)),
-            "missed_percent": float(100.0 - 100.0 * np.mean(reached))}
-
-
-def border_chains(model: HandModel, count: int) -> dict[str, float]:
-    """Index fingers with a parabola at the knuckle, often on its border, as chains of points."""
-    rng, times, residuals, locked = np.random.default_rng(4), [], [], []
-    lengths = model.chain[INDEX]
-    low, high = model.limits[ANGLE_SLICES[INDEX]].T
-    bounds = np.column_stack([low, high])[:2]
-    limits = [JointLimit(Shape.PARABOLA, (low[1], high[1]), (low[0], high[0])),
-              *(JointLimit(Shape.HINGE, (low[k], high[k])) for k in (2, 3))]
-    for _ in range(count):
-        joints = np.empty((2, 4, 3))
-        for chain in joints:
-            angles = rng.uniform(low, high)
-            angles[:2] = clamp_joint(int(Shape.PARABOLA), bounds, *angles[:2])
-            chain_points(angles, lengths, chain, np.empty((3, 4)))
-        before = time.perf_counter_ns()
-        solution = solve_limited_chain(joints[0], joints[1, 3], limits, tolerance=COARSE)
-        times.append(1e-3 * (time.perf_counter_ns() - before))
-        residuals.append(1e3 * solution.residual)
-        locked.append(solution.stopped is not Status.REACHED)
-    return {"median_us": float(np.median(times)), "p99_us": float(np.percentile(times, 99)),
-            "missed_percent": float(100.0 * np.mean(np.array(residuals) > 1e3 * COARSE)),
-            "worst_mm": float(max(residuals)), "handed_percent": float(100.0 * np.mean(locked))}
-
-
 def shortfalls(figures: dict[str, dict[str, dict[str, float]]]) -> list[str]:
     """What misses the targets, in words."""
     lines = []
@@ -230,15 +182,12 @@ def main() -> int:
     model = build_model(load_hand(resource_path("hands", "right.json")))
     figures = all_figures(model, options.hands)
     missed = shortfalls(figures)
-    others = {"neighbouring fingers": neighbours(model, options.hands),
-              "a chain with a parabola": border_chains(model, options.hands)}
     cases = {f"{name}, {case}": of[case] for name, of in figures.items() for case in ("near", "far", "any")}
     paths = {f"{name}, {path}": of[path] for name, of in figures.items() for path in ("stretch", "axis") if path in of}
-    publish(options, figures | {"others": others},
+    publish(options, figures,
             *(table([head, *(name.replace("_", " ") for name in next(iter(rows.values())))],
                     [[name, *row.values()] for name, row in rows.items()])
               for head, rows in (("solver, case", cases), ("solver, path", paths))),
-            *(table([name, ""], row.items()) for name, row in others.items()),
             "; ".join(missed) or f"All targets are met (medians of near and far; FABRIK to {1e3 * COARSE:g} mm).")
     if options.chart:
         options.chart.write_text(draw_chart(figures), encoding="utf-8")

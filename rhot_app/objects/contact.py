@@ -1,4 +1,4 @@
-"""Contact of fingertips with an object: signed distances, contact flags with hysteresis, and a residual.
+"""Contact of fingertips with an object: signed distances, and contact flags with hysteresis.
 
 A fingertip pad is the capsule of the last segment (`rhot_app.hand.shape`), as three spheres on its axis.
 """
@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.estimation.quantiles import normal_isf
-from rhot_app.estimation.residual import Kernel, Rows, student
+from rhot_app.estimation.residual import Kernel, student
 from rhot_app.hand.dh import DhArrays, riding_points
-from rhot_app.hand.kinematics import TWIST, empty_frames, forward_arrays, jacobian_arrays
+from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.places import segment_axis
-from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
+from rhot_app.hand.skeleton import FINGERS, JOINTS
 from rhot_app.objects.shape import Shape
 
 Array = NDArray[np.float64]
@@ -30,15 +30,11 @@ BEGIN_SD, END_SD = 0.0, 2.0 * normal_isf(SWITCHING)
 """Standard deviations of the distance: contact begins when the pad is within the surface with a probability of one
 half, and ends beyond a distance that noise exceeds by SWITCHING from midway."""
 
-PULP_SD_M = 1e-3
-"""m: as a residual, contact puts the pad on the surface within this; a pressed fingertip gives way by millimetres
-(Serina, Mote and Rempel 1997)."""
 
 CONTACT_KERNEL: Kernel = student(4.0)
 """A contact may be none: heavy tails, as of the markers."""
 
 _SPHERES = 3  # of a pad: the ends of its axis and its middle
-_WORLD = 12  # numbers of a state before the angles: world_from_palm (3, 4), as `hand.motion.hand_process`
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,46 +104,12 @@ class ContactTrigger:
         return self.touching.copy()
 
 
-@dataclass(frozen=True, slots=True)
-class ContactResidual:
-    """Touching fingertips lie on an object's surface; implements `estimation.residual.Residual`.
-
-    A state begins with world_from_palm (3, 4) and the 21 angles; its tangent space of `size` numbers begins with the
-    palm's translation and rotation along the world's axes and the angles (`hand.motion.hand_process`). `touching` (5,);
-    `sd_m` (5,) of the surface's position along its normal, without that of the pulp. The object's pose is given.
-    """
-
-    pads: FingertipPads
-    shape: Shape
-    world_from_object: Array
-    touching: Flags
-    sd_m: Array
-    size: int
-
-    def linearise(self, state: Array) -> Rows:
-        """A row, m, for each touching finger."""
-        dh, world = self.pads.dh, np.eye(4)
-        world[:3] = state[:_WORLD].reshape(3, 4)
-        frames, points = empty_frames(dh), np.empty((len(dh.point_row), 3))
-        slopes = np.empty((len(points), 3, TWIST + len(ANGLES)))
-        forward_arrays(dh, world, state[_WORLD:_WORLD + len(ANGLES)], frames, points)
-        jacobian_arrays(dh, world, frames, points, slopes)
-        found = pad_distances(self.pads, points, self.shape, self.world_from_object)
-        fingers = np.flatnonzero(self.touching)
-        jacobian = np.zeros((len(fingers), self.size))
-        jacobian[:, :slopes.shape[2]] = np.einsum("fi,fij->fj", found.normal[fingers], slopes[found.sphere[fingers]])
-        return Rows(-found.distance[fingers], jacobian, self.sd_m[fingers] ** 2 + PULP_SD_M**2, CONTACT_KERNEL)
-
-
 class ContactMonitor:
-    """Contacts of one hand with one object, from the tracker's states and the object's poses.
+    """Contacts of one hand with one object, from the tracker's states and the object's poses. They move no hand: a
+    wrong shape or pose of the object would do so as well."""
 
-    `as_observation`: whether `residual` offers the contacts to the estimator. It is off by default: a wrong shape or
-    pose of the object would then move the hand.
-    """
-
-    def __init__(self, model: HandModel, shape: Shape, *, as_observation: bool = False) -> None:
-        self.pads, self.shape, self.as_observation = fingertip_pads(model), shape, as_observation
+    def __init__(self, model: HandModel, shape: Shape) -> None:
+        self.pads, self.shape = fingertip_pads(model), shape
         self.trigger = ContactTrigger()
 
     def update(self, world_from_palm: Array, angles: Array, fingertip_covariances: Array, world_from_object: Array,
@@ -165,10 +127,3 @@ class ContactMonitor:
         surface = np.einsum("fi,ij,fj->f", by_pose, object_covariance, by_pose)
         sd = np.sqrt(surface + distance_sd(found.normal, fingertip_covariances, np.zeros((3, 3))) ** 2)
         return found, sd, self.trigger.update(found.distance, np.nan_to_num(sd))
-
-    def residual(self, world_from_object: Array, sd_m: Array, size: int) -> ContactResidual | None:
-        """The present contacts as a residual of a state whose tangent space has `size` numbers; None while nothing
-        touches, or when contacts are no observations. `sd_m` (5,) as of `ContactResidual`."""
-        if not self.as_observation or not self.trigger.touching.any():
-            return None
-        return ContactResidual(self.pads, self.shape, world_from_object, self.trigger.touching.copy(), sd_m, size)

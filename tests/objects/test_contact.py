@@ -1,4 +1,4 @@
-"""Distances of fingertip pads to objects, contact flags that do not chatter, and contact as a residual."""
+"""Distances of fingertip pads to objects, and contact flags that do not chatter."""
 
 from __future__ import annotations
 
@@ -10,32 +10,22 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "estimation"))
 
-from hand_states import assert_jacobian, make_process, markers, natural_state, points_of, world_of
-from shapes_oracle import star
 
-from rhot_app.estimation.filter import update
 from rhot_app.geometry.transforms import exp_so3, rigid
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model, neutral_pose
-from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY
 from rhot_app.hand.shape import segments
-from rhot_app.hand.skeleton import ANGLES as ANGLE_NAMES
 from rhot_app.objects.contact import (
     END_SD,
-    PULP_SD_M,
     ContactMonitor,
-    ContactResidual,
     ContactTrigger,
     fingertip_pads,
     pad_distances,
     pad_points,
 )
-from rhot_app.objects.shape import Box, Cylinder, Mesh, Sphere
+from rhot_app.objects.shape import Box, Sphere
 from rhot_node.files import resource_path
-
-ALL = np.ones(5, dtype=bool)
-SHAPES = [Box((0.06, 0.05, 0.12)), Sphere(0.04), Cylinder(0.03, 0.12), Mesh(*star(np.random.default_rng(3)))]
 
 
 def hand(side="right"):
@@ -68,51 +58,6 @@ def test_the_distance_is_that_of_the_capsule_less_its_radius():
                                found.distance + pads.radii + 0.02)
 
 
-def residual_at(state, shape, touching=ALL, sd_m=1e-4):
-    """Of a state and an object beside its fingertips, turned any way."""
-    process = make_process()
-    tips = points_of(markers().model.dh, state)[[4, 8, 12, 16, 20]]
-    world = rigid(exp_so3([0.4, 1.1, -0.3]), tips.mean(axis=0) + np.array([0.02, 0.03, 0.01]))
-    return process, ContactResidual(fingertip_pads(markers().model), shape, world, touching, np.full(5, sd_m),
-                                    process.size)
-
-
-@pytest.mark.parametrize("shape", SHAPES, ids=["box", "sphere", "cylinder", "mesh"])
-@pytest.mark.parametrize("seed", range(3))
-def test_the_rows_have_the_right_jacobian(shape, seed):
-    state = natural_state(np.random.default_rng(seed))
-    process, residual = residual_at(state, shape)
-    assert len(residual.linearise(state).error) == 5
-    assert_jacobian(process, residual, state, rtol=1e-4, atol=1e-5)
-
-
-def test_the_state_is_that_of_the_hand_process():
-    """Contacts know the beginning of a state without importing the tracker."""
-    assert (12, len(ANGLE_NAMES), 27) == (ANGLES, VELOCITY - ANGLES, POSE)
-
-
-def test_only_touching_fingers_have_rows():
-    state = natural_state(np.random.default_rng(0))
-    _, residual = residual_at(state, SHAPES[0], touching=np.array([True, False, False, True, False]))
-    rows = residual.linearise(state)
-    assert rows.error.shape == (2,) and rows.jacobian.shape == (2, residual.size)
-    np.testing.assert_allclose(rows.noise, PULP_SD_M**2 + 1e-8)
-
-
-def test_an_update_puts_the_pads_on_the_surface():
-    rng = np.random.default_rng(1)
-    state = natural_state(rng)
-    index = np.arange(5) == 1
-    process, residual = residual_at(state, SHAPES[1], touching=index)
-    points = pad_points(residual.pads, world_of(state), state[ANGLES:VELOCITY])
-    found = pad_distances(residual.pads, points, SHAPES[1], residual.world_from_object)
-    residual.world_from_object[:3, 3] += (found.distance[1] - 6e-3) * found.normal[1]
-    _, covariance = process.start(world_of(state), process.mean, (0.01, 0.1))
-    after = update(process, 0.0, (state, covariance), [residual])
-    assert residual.linearise(state).error[0] == pytest.approx(-6e-3, abs=1e-4)
-    assert abs(residual.linearise(after.state).error[0]) < 0.5e-3
-
-
 SD_M = 0.5e-3
 
 
@@ -143,18 +88,15 @@ def test_contact_begins_at_the_surface_and_ends_beyond_the_noise():
     assert not trigger.update(np.full(5, np.nan), sd).any()
 
 
-def test_contacts_are_no_observations_unless_asked_for():
+def test_a_hand_around_a_ball_touches_it_where_its_pads_reach_the_surface():
     model, pose = hand(), neutral_pose()
     points = pad_points(fingertip_pads(model), pose.world_from_palm, pose.angles)
     world = rigid(np.eye(3), points[3:].mean(axis=0))
-    for as_observation in (False, True):
-        monitor = ContactMonitor(model, Sphere(0.06), as_observation=as_observation)
-        assert monitor.residual(world, np.full(5, 1e-3), 99) is None
-        found, sd, flags = monitor.update(pose.world_from_palm, pose.angles, np.tile(1e-6 * np.eye(3), (5, 1, 1)),
-                                          world, np.diag([3e-6] * 3 + [0.0] * 3))
-        np.testing.assert_allclose(sd, 2e-3)
-        assert flags.any() and (flags == (found.distance <= 0.0)).all()
-        assert (monitor.residual(world, np.full(5, 1e-3), 99) is not None) == as_observation
+    found, sd, flags = ContactMonitor(model, Sphere(0.06)).update(
+        pose.world_from_palm, pose.angles, np.tile(1e-6 * np.eye(3), (5, 1, 1)), world,
+        np.diag([3e-6] * 3 + [0.0] * 3))
+    np.testing.assert_allclose(sd, 2e-3)
+    assert flags.any() and (flags == (found.distance <= 0.0)).all()
 
 
 def test_a_turn_of_the_object_moves_its_surface():
