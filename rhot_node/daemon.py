@@ -15,6 +15,7 @@ from rhot_node.config import CameraSettings, NodeSettings, network_model
 from rhot_node.detect.image import Detector
 from rhot_node.errors import CameraError
 from rhot_node.foreground_store import ForegroundStore
+from rhot_node.health.camera import RateMeter, brightness, camera_troubles
 from rhot_node.health.checks import BLACK_PICTURE, Check, is_black
 from rhot_node.landmark_search import LandmarkSearch
 from rhot_node.network.pictures import PictureBox
@@ -104,7 +105,8 @@ class NodeDaemon:
         self._shown_state = NodeState.STARTING
         self._retry_s = 0.0
         self._last_frame: tuple[int, int] | None = None  # number and time of the frame before
-        self._black = False
+        self._black, self._luma = False, 0.0
+        self._rate = RateMeter()
         self._light_due_s = 0.0
         self._session = 0  # whose sequence is being counted
         self._sequence = 0
@@ -126,16 +128,20 @@ class NodeDaemon:
     def report(self) -> dict[str, Any]:
         """State, for the control channel."""
         stream, camera = self.sessions.current, self._camera
+        said: dict[str, Any] = camera.report() if isinstance(camera, Reporting) else {}
         return {"node_id": self._settings.node_id, "name": self._settings.name, "state": self.state.name.lower(),
                 "message": self._hangs() or self._message, "session": stream.session if stream else 0,
                 "width": self._size[0], "height": self._size[1], "detector": self._settings.detector,
                 "tags": list(self._settings.tags.sought),
                 "foreground": self.foreground.report(*self._size),
                 "marker_checksum": self._settings.markers.checksum, "t_node_ns": self._clock.now_ns(),
-                "camera": camera.report() if isinstance(camera, Reporting) else {},
-                "health": [*self._troubles(), *self._landmarks.troubles(),
-                           *([BLACK_PICTURE] if self._black else []),
+                "camera": said,
+                "health": [*self._troubles(), *self._landmarks.troubles(), *self._camera_troubles(said),
                            *(Check("threads", "error", text) for text in complaints())]}
+
+    def _camera_troubles(self, said: dict[str, Any]) -> list[Check]:
+        """What its pictures say against the camera; `said`: what it says of itself."""
+        return [BLACK_PICTURE] if self._black else camera_troubles(said, self._rate.rate_hz, self._luma)
 
     def introduce(self) -> dict[str, Any]:
         """What anybody may know, paired or not."""
@@ -194,6 +200,7 @@ class NodeDaemon:
         if frame is None:
             return True
         self._look_at_light(frame)
+        self._rate.add(frame.number, frame.t_node_ns)
         self._frames.what = f"finds markers by the detector {self._settings.detector}"
         markers = self._detector.detect(frame.image)
         self._frames.what = _SENDS
@@ -239,7 +246,7 @@ class NodeDaemon:
         now_s = time.monotonic()
         if now_s >= self._light_due_s:
             self._light_due_s = now_s + _LIGHT_PERIOD_S
-            self._black = is_black(frame.image.y)
+            self._black, self._luma = is_black(frame.image.y), brightness(frame.image.y)
 
     def _count_frame(self, frame: Frame) -> bool:
         """Count the frame; says whether its processing took longer than the budget."""
@@ -258,7 +265,7 @@ class NodeDaemon:
 
     def _open(self) -> None:
         self._last_frame = None
-        self._black = False
+        self._black, self._rate = False, RateMeter()
         with self._opening.timed():
             self._camera = self._open_camera(self._settings.camera)
         self._size = self._camera.size

@@ -19,8 +19,10 @@ from typing import Final
 Ioctl = Callable[[int, int, bytearray], object]
 """``ioctl(descriptor, request, structure)``; raises OSError."""
 
-QUERYCAP, ENUM_FMT, REQBUFS, ENUM_FRAMESIZES, ENUM_FRAMEINTERVALS = (
-    0x80685600, 0xC0405602, 0xC0145608, 0xC02C564A, 0xC034564B)  # VIDIOC_...
+QUERYCAP, ENUM_FMT, REQBUFS, ENUM_FRAMESIZES, ENUM_FRAMEINTERVALS, G_CTRL = (
+    0x80685600, 0xC0405602, 0xC0145608, 0xC02C564A, 0xC034564B, 0xC008561B)  # VIDIOC_...
+EXPOSURE_AUTO, EXPOSURE_ABSOLUTE, AUTO_WHITE_BALANCE = 0x009A0901, 0x009A0902, 0x0098090C  # V4L2_CID_...
+_CONTROL: Final = struct.Struct("<Ii")
 _CAPABILITY: Final = struct.Struct("<16s32s32sIII12x")
 _FORMAT: Final = struct.Struct("<III32sI16x")
 _BUFFERS: Final = struct.Struct("<III8x")
@@ -29,6 +31,9 @@ _INTERVAL: Final = struct.Struct("<IIIIIII24x")
 _VIDEO_CAPTURE, _DEVICE_CAPS = 0x00000001, 0x80000000
 _CAPTURE_TYPE, _MMAP, _DISCRETE = 1, 1, 1
 _MOST: Final = 256  # of an enumeration; a driver that never ends one is broken
+
+EXPOSURE_TIME_BY_CAMERA: Final = 0, 3  # V4L2_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY
+EXPOSURE_UNIT_US: Final = 100.0
 
 USUAL: Final = 640, 480, 30.0
 """What most webcams have, and what a node asks for by itself."""
@@ -74,6 +79,40 @@ def list_devices(folder: Path = Path("/dev"), ioctl: Ioctl = fcntl.ioctl) -> tup
                       if (match := re.fullmatch(r"video(\d+)", path.name)))
     found = (look_at_device(path, ioctl) for _, path in numbered)
     return tuple(device for device in found if device is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class Automatics:
+    """What a driver says of its automatic modes now; None where it does not. `exposure`: the camera chooses its
+    exposure time, which may be longer than a frame in the dark (`exposure_dynamic_framerate`)."""
+
+    exposure: bool | None = None
+    white_balance: bool | None = None
+    exposure_us: float | None = None
+
+
+def read_automatics(path: str, ioctl: Ioctl = fcntl.ioctl) -> Automatics:
+    """Ask a webcam's driver; it may be in use."""
+    try:
+        handle = os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError:
+        return Automatics()
+    try:
+        mode, balance, time = (_control(handle, ioctl, one)
+                               for one in (EXPOSURE_AUTO, AUTO_WHITE_BALANCE, EXPOSURE_ABSOLUTE))
+    finally:
+        os.close(handle)
+    return Automatics(None if mode is None else mode in EXPOSURE_TIME_BY_CAMERA,
+                      None if balance is None else balance != 0, None if time is None else EXPOSURE_UNIT_US * time)
+
+
+def _control(handle: int, ioctl: Ioctl, control: int) -> int | None:
+    data = bytearray(_CONTROL.pack(control, 0))
+    try:
+        ioctl(handle, G_CTRL, data)
+    except OSError:
+        return None
+    return int(_CONTROL.unpack(data)[1])
 
 
 def look_at_device(path: Path, ioctl: Ioctl = fcntl.ioctl) -> Device | None:

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 
 from rhot_node.capture.camera import Frame, available_delay_ns
+from rhot_node.capture.v4l2 import EXPOSURE_UNIT_US, Automatics, read_automatics
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, from_bgr
@@ -31,7 +32,6 @@ SILENCE_S = 3.0
 OLDEST_STAMP_NS = 1_000_000_000
 """A frame that is read is never older: a stamp that is, is of another clock than the monotonic one."""
 V4L2_EXPOSURE_MANUAL = 1
-V4L2_EXPOSURE_UNIT_US = 100.0
 
 
 class Capture(Protocol):
@@ -109,7 +109,8 @@ class Webcam(GrabbedCamera):
     """A webcam."""
 
     def __init__(self, device: str, settings: CameraSettings, clock: NodeClock,
-                 open_capture: Callable[[str], Capture] = open_v4l2) -> None:
+                 open_capture: Callable[[str], Capture] = open_v4l2,
+                 automatics: Callable[[str], Automatics] = read_automatics) -> None:
         """Open ``/dev/videoN`` and wait for a first frame. Raises CameraError when absent, busy or silent."""
         if not Path(device).exists():
             present = ", ".join(sorted(str(path) for path in Path("/dev").glob("video*"))) or "none"
@@ -119,13 +120,25 @@ class Webcam(GrabbedCamera):
             capture.release()
             raise CameraError(f"{device}: the camera cannot be opened. Does another program use it, and may you read "
                               "it (group video)?")
-        self.refused = tuple(configure(capture, settings))
+        refused = configure(capture, settings)
+        self._device, self._automatics = device, automatics
+        self._fps = capture.get(cv2.CAP_PROP_FPS)
+        now = automatics(device)
+        self.refused = tuple(dict.fromkeys([
+            *refused, *(["automatic exposure off"] if now.exposure else []),
+            *(["automatic white balance off"] if now.white_balance else [])]))
         for name in self.refused:
             log.warning("%s: the camera does not take the setting %s", device, name)
         super().__init__(device, "Is the camera plugged in well?", capture, settings, clock, stamped=True)
         if self.size != (settings.width, settings.height):
             log.warning("%s: delivers %d x %d px instead of %d x %d", device, *self.size, settings.width,
                         settings.height)
+
+    def report(self) -> dict[str, Any]:
+        """What the driver says: the rate of its mode, its exposure, and which settings it does not take."""
+        now = self._automatics(self._device)
+        return {"fps": self._fps if self._fps > 0.0 else None, "exposure_us": now.exposure_us,
+                "automatic_exposure": now.exposure, "refused": list(self.refused)}
 
 
 # -- network cameras ---------------------------------------------------------------------------------------------------
@@ -201,7 +214,7 @@ def configure(capture: Capture, settings: CameraSettings) -> list[str]:
         ("one buffer", cv2.CAP_PROP_BUFFERSIZE, 1),
         ("automatic exposure off", cv2.CAP_PROP_AUTO_EXPOSURE, V4L2_EXPOSURE_MANUAL),
         ("automatic white balance off", cv2.CAP_PROP_AUTO_WB, 0),
-        ("exposure_us", cv2.CAP_PROP_EXPOSURE, max(1.0, round(settings.exposure_us / V4L2_EXPOSURE_UNIT_US))),
+        ("exposure_us", cv2.CAP_PROP_EXPOSURE, max(1.0, round(settings.exposure_us / EXPOSURE_UNIT_US))),
         ("gain", cv2.CAP_PROP_GAIN, settings.gain),
         ("saturation", cv2.CAP_PROP_SATURATION, settings.saturation),
         ("brightness", cv2.CAP_PROP_BRIGHTNESS, settings.brightness),

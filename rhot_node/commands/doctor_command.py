@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 
+from rhot_node.capture.camera import Camera
+from rhot_node.capture.open import open_camera
 from rhot_node.capture.pi_camera import CameraStack, load_stack
 from rhot_node.capture.sensors import PRESETS
+from rhot_node.capture.v4l2 import Device, list_devices
+from rhot_node.clock import NodeClock
 from rhot_node.compiled import is_compiled_in
-from rhot_node.config import NodeSettings, load_settings, network_model
+from rhot_node.config import CameraSettings, NodeSettings, load_settings, network_model
 from rhot_node.errors import CameraError, KeypointError, NodeError, TrustError
+from rhot_node.health.camera import watch_camera
 from rhot_node.health.checks import (
     Check,
     Level,
@@ -31,13 +36,14 @@ from rhot_node.landmark_search import OpenNetworks, open_networks
 from rhot_node.service.install import NAME, STATE_FOLDER
 from rhot_node.terminal import add_examples
 
-SUMMARY = ("Look at everything that a node needs: power, heat, memory, clock, network, camera, compiled code, pairing "
+SUMMARY = ("Look at everything that a node needs: power, heat, memory, clock, network, cameras and their light, compiled code, pairing "
            "and the service. Exit code 0: nothing is wrong, as far as can be seen; 1: something could be better; 2: "
            "something is wrong.")
 EXIT_CODES: dict[Level, int] = {"ok": 0, "unknown": 0, "warning": 1, "error": 2}
 SERVICE_CACHE = Path("var/cache") / STATE_FOLDER.name
 
 LoadStack = Callable[[], CameraStack]
+OpenCamera = Callable[[str, CameraSettings, NodeClock], Camera]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,11 +71,13 @@ def examine(machine: Machine, settings: Path | None, user_cache: Path, load: Loa
     """All checks, in the order in which a node needs the things. `settings` None: the service's, if it has any."""
     flags = machine.throttled()
     model = machine.model()
+    is_pi = model is not None and model.startswith("Raspberry")
     return [
         Check("machine", "ok", f"{model or 'Not a Raspberry Pi'}."),
         check_power(flags), check_heat(machine.temperature_c(), flags), check_memory(machine.available_bytes()),
         check_speed(machine.governor()), check_clock(machine.ntp_synchronised(), machine.clock_source()),
-        *check_network(machine), check_camera(machine, model is not None and model.startswith("Raspberry"), load),
+        *check_network(machine), check_camera(machine, is_pi, load),
+        *(() if is_pi else check_webcams(list_devices(machine.root / "dev"))),
         check_compiled([user_cache, machine.root / SERVICE_CACHE]), *check_settings(machine, settings),
         *check_service(machine)]
 
@@ -93,6 +101,29 @@ def check_camera(machine: Machine, is_pi: bool, load: LoadStack) -> Check:
         presets = ", ".join(preset.name for preset in PRESETS if str(info["Model"]).startswith(preset.sensor))
         names.append(f"{info['Model']} ({f'presets {presets}' if presets else 'no presets'})")
     return Check("camera", "ok", f"Pi cameras: {', '.join(names)}.")
+
+
+def check_webcams(devices: Sequence[Device], open_with: OpenCamera = open_camera) -> list[Check]:
+    """Two seconds of each webcam in its usual mode, as the app opens it: its light, its rate, its automatic modes."""
+    found = []
+    for device in devices:
+        if device.problem:
+            found.append(Check("webcam", "unknown", f"{device.path}: {device.problem}"))
+            continue
+        mode = device.mode
+        settings = CameraSettings(width=mode.width, height=mode.height, fps=mode.fps, exposure_us=0.5e6 / mode.fps)
+        try:
+            camera = open_with(device.path, settings, NodeClock())
+            try:
+                troubles = watch_camera(camera, mode.fps)
+            finally:
+                camera.close()
+        except CameraError as exc:
+            found.append(Check("webcam", "error", f"{exc}"))
+            continue
+        well = Check("webcam", "ok", f"bright enough for {mode.fps:g} frames/s.")
+        found += [replace(check, text=f"{device.path}: {check.text}") for check in troubles or [well]]
+    return found
 
 
 def check_compiled(caches: list[Path]) -> Check:

@@ -20,6 +20,7 @@ class FakeCamera:
     capabilities: int = CAPTURE | STREAMING
     formats: list[list[tuple[int, int, list[float]]]] = field(default_factory=lambda: [
         [(640, 480, [30.0, 15.0]), (1280, 720, [10.0])], [(640, 480, [30.0]), (1280, 720, [30.0])]])
+    controls: dict[int, int] = field(default_factory=dict)
     held: bool = False
     steps: bool = False
 
@@ -40,6 +41,10 @@ class Driver:
         elif request == v4l2.REQBUFS:
             if camera.held:
                 raise OSError(errno.EBUSY, "busy")
+        elif request == v4l2.G_CTRL:
+            control = struct.unpack_from("<I", data)[0]
+            self._has(control in camera.controls)
+            struct.pack_into("<i", data, 4, camera.controls[control])
         elif request == v4l2.ENUM_FMT:
             index = struct.unpack_from("<I", data)[0]
             self._has(index < len(camera.formats))

@@ -6,7 +6,17 @@ from pathlib import Path
 
 from fake_v4l2 import CAPTURE, METADATA, Driver, FakeCamera
 
-from rhot_node.capture.v4l2 import Device, Mode, list_devices, look_at_device
+from rhot_node.capture.v4l2 import (
+    AUTO_WHITE_BALANCE,
+    EXPOSURE_ABSOLUTE,
+    EXPOSURE_AUTO,
+    Automatics,
+    Device,
+    Mode,
+    list_devices,
+    look_at_device,
+    read_automatics,
+)
 
 
 def listed(folder: Path, **cameras: FakeCamera) -> tuple[Device, ...]:
@@ -40,3 +50,13 @@ def test_the_mode_is_the_usual_one_or_the_nearest_that_is_not_slow(tmp_path: Pat
     assert mode((640, 480, [5.0])) == Mode(640, 480, 5.0), "a slow camera is better than none"
     assert mode((1920, 1080, [30.0]), steps=True) == Mode(640, 480, 30.0)
     assert mode() == Mode(640, 480, 30.0), "one that lists no modes is asked for the usual one"
+
+
+def test_what_a_driver_says_of_its_automatic_modes(tmp_path: Path) -> None:
+    def read(**controls: int) -> Automatics:
+        ids = {"exposure": EXPOSURE_AUTO, "time": EXPOSURE_ABSOLUTE, "balance": AUTO_WHITE_BALANCE}
+        camera = FakeCamera(controls={ids[name]: value for name, value in controls.items()})
+        return read_automatics(str(tmp_path / "video0"), Driver(tmp_path, {"video0": camera}).ioctl)
+    assert read(exposure=3, time=666, balance=1) == Automatics(True, True, 66_600.0)
+    assert read(exposure=1, balance=0) == Automatics(False, False, None)
+    assert read() == Automatics() == read_automatics(str(tmp_path / "video9"))

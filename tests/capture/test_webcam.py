@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import rhot_node.capture.webcam
+from rhot_node.capture.v4l2 import Automatics
 from rhot_node.capture.webcam import Webcam
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
@@ -21,6 +22,7 @@ from rhot_node.errors import CameraError
 
 SETTINGS = CameraSettings(width=64, height=48, exposure_us=4000, gain=2.0, red_gain=1.5, row_time_us=50)
 CLOCK = NodeClock(offset_ns=10**14)
+SILENT = Automatics()
 
 
 class FakeCapture:
@@ -49,6 +51,8 @@ class FakeCapture:
         return True
 
     def get(self, propId: int) -> float:  # noqa: N803 - OpenCV's name
+        if propId == cv2.CAP_PROP_FPS:
+            return self.settings[propId]
         assert propId == cv2.CAP_PROP_POS_MSEC
         return self.stamp_ms()
 
@@ -63,10 +67,11 @@ class FakeCapture:
 
 
 @pytest.fixture
-def plug(tmp_path: Path) -> Callable[[FakeCapture], Webcam]:
+def plug(tmp_path: Path) -> Callable[..., Webcam]:
     device = tmp_path / "video0"
     device.touch()
-    return lambda capture: Webcam(str(device), SETTINGS, CLOCK, lambda _device: capture)
+    return lambda capture, said=SILENT: Webcam(str(device), SETTINGS, CLOCK, lambda _device: capture,
+                                                   lambda _device: said)
 
 
 def test_automatic_modes_are_off_and_given_settings_on(plug: Callable[[FakeCapture], Webcam]) -> None:
@@ -90,6 +95,17 @@ def test_refused_settings_are_reported(plug: Callable[[FakeCapture], Webcam],
     assert camera.refused == ("automatic white balance off", "gain")
     assert "does not take the setting gain" in caplog.text
     camera.close()
+
+
+def test_what_a_driver_takes_and_does_not_do_is_told(plug: Callable[..., Webcam]) -> None:
+    camera = plug(FakeCapture(), Automatics(exposure=True, white_balance=False, exposure_us=66_000.0))
+    assert camera.refused == ("automatic exposure off",)
+    assert camera.report() == {"fps": 30.0, "exposure_us": 66_000.0, "automatic_exposure": True,
+                               "refused": ["automatic exposure off"]}
+    camera.close()
+    manual = plug(FakeCapture(), Automatics(exposure=False, white_balance=False))
+    assert manual.refused == ()
+    manual.close()
 
 
 def test_mid_exposure_is_before_readout_and_half_the_exposure(plug: Callable[[FakeCapture], Webcam]) -> None:

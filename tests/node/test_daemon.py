@@ -268,3 +268,18 @@ def test_the_report_says_that_the_picture_is_black(tmp_path: Path, monkeypatch: 
         node.cameras[0].luma = luma
         node.step()
         assert [trouble.code for trouble in node.daemon.report()["health"]] == codes
+
+
+@pytest.mark.parametrize(("period_ns", "level", "codes"), [
+    (66_000_000, 40, ["too_dark"]), (66_000_000, 130, ["slow"]), (33_000_000, 40, [])])
+def test_the_report_says_whether_it_is_too_dark_for_the_rate(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, period_ns: int, level: int, codes: list[str]) -> None:
+    monkeypatch.setattr(rhot_node.daemon, "_LIGHT_PERIOD_S", 0.0)
+    node = Node(tmp_path, range(99), period_ns=period_ns)
+    node.daemon.prepare()
+    camera = node.cameras[0]
+    camera.report = lambda: {"fps": 30.0}  # type: ignore[attr-defined]
+    camera.began_ns -= 10**10
+    camera.luma = np.full((480, 640), level, np.uint8)
+    node.step(60)
+    assert [trouble.code for trouble in node.daemon.report()["health"]] == codes

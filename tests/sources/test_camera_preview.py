@@ -30,6 +30,7 @@ class FakeCamera:
         self.image, self.hz, self.frames, self.error = image, hz, frames, error
         self.size, self.never = image.size, threading.Event()
         self.count, self.rewound, self.closed = 0, 0, False
+        self.refused: list[str] = []
 
     def read(self, _timeout_s: float) -> Frame:
         if self.frames is not None and self.count >= self.frames:
@@ -42,6 +43,9 @@ class FakeCamera:
 
     def rewind(self) -> None:
         self.rewound, self.count = self.rewound + 1, 0
+
+    def report(self) -> dict[str, object]:
+        return {"refused": self.refused}
 
     def close(self) -> None:
         self.closed = True
@@ -62,10 +66,18 @@ def look() -> Iterator[object]:
 
 
 def test_a_slow_camera_is_told_with_what_to_do(look) -> None:
-    preview = look(FakeCamera(picture(), hz=5.0))
+    preview = look(FakeCamera(picture(50), hz=5.0))
     assert preview.rate_hz is None and preview.remark == "", "nothing is said before it is measured"
     eventually(lambda: preview.rate_hz is not None)
     assert preview.rate_hz < 6.0 and "more light" in preview.remark and preview.picture.shape == (48, 64, 3)
+
+
+def test_automatic_modes_that_stay_on_are_told(look) -> None:
+    camera = FakeCamera(picture(), hz=200.0)
+    camera.refused = ["gain", "automatic white balance off"]
+    preview = look(camera)
+    eventually(lambda: "white balance cannot be turned off" in preview.remark)
+    assert "exposure" not in preview.remark
 
 
 def test_a_film_begins_again_and_a_camera_is_let_go_of(look) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from typing import Final
 
@@ -12,25 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.sources.cameras.camera_set import CameraSource, camera_controls
-from rhot_node.capture.camera import Camera, EndOfRecording, Rewindable
+from rhot_node.capture.camera import Camera, EndOfRecording, Reporting, Rewindable
 from rhot_node.capture.open import open_camera
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import CameraError
-from rhot_node.health.checks import is_black
+from rhot_node.health.camera import RateMeter, brightness, camera_troubles
+from rhot_node.health.checks import Check, is_black
 from rhot_node.threads import OneShotThread
 
 Picture = NDArray[np.uint8]
 
-WINDOW_S: Final = 2.0
-"""s: over which the rate is measured."""
-
 PICTURE_S: Final = 1.0 / 15.0
 """s: from one picture for the screen to the next."""
-
-SHORT: Final = 0.75
-"""Of the rate that was asked for: less is said. A webcam in the dark halves its rate."""
 
 ONE_COLOUR: Final = 1.5
 """Grey levels: standard deviation of luma and chroma below which a picture shows nothing. A sensor's noise has more."""
@@ -49,7 +43,8 @@ class CameraPreview:
         self.picture: Picture | None = None
         """(H, W, 3) BGR, the newest one."""
         self._after, self._open = after, open_source
-        self._times: deque[float] = deque()
+        self._rate = RateMeter()
+        self._troubles: list[Check] = []
         self._fault = self._lost = ""
         self._ending = threading.Event()
         self._task = OneShotThread(f"shows the picture of {source.title}", self._run)
@@ -62,21 +57,14 @@ class CameraPreview:
     @property
     def rate_hz(self) -> float | None:
         """Frames/s that come; None until that is measured."""
-        times = self._times.copy()
-        if len(times) < 2 or times[-1] - times[0] < 0.5 * WINDOW_S:
-            return None
-        return (len(times) - 1) / (times[-1] - times[0])
+        return self._rate.rate_hz
 
     @property
     def remark(self) -> str:
         """What is wrong with the pictures that come, a sentence; "" for nothing."""
-        rate_hz = self.rate_hz
         if self._fault or self.problem:
             return self._fault
-        if rate_hz is not None and rate_hz < SHORT * self.source.fps:
-            return (f"{rate_hz:.0f} frames/s come instead of {self.source.fps:.0f}. In the dark a webcam exposes "
-                    "longer: give it more light. Two cameras on one USB hub halve each other's rate.")
-        return ""
+        return " ".join(check.sentence for check in self._troubles)
 
     def stop(self) -> None:
         """Let go of the source soon; `wait` says when."""
@@ -110,12 +98,12 @@ class CameraPreview:
                 if frame is None:
                     continue
                 now_s = time.monotonic()
-                self._times.append(now_s)
-                while now_s - self._times[0] > WINDOW_S:
-                    self._times.popleft()
+                self._rate.add(frame.number, round(1e9 * now_s))
                 if now_s - shown_s >= PICTURE_S:
                     shown_s = now_s
                     self._fault = fault_of(frame.image)
+                    said = camera.report() if isinstance(camera, Reporting) else {}
+                    self._troubles = camera_troubles(said, self.rate_hz, brightness(frame.image.y), self.source.fps)
                     self.picture = to_bgr(frame.image)
         except CameraError as exc:
             self._lost = str(exc)
