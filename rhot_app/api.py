@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
+from rhot_app.calibration.board.boards import AprilGrid, Board, CharucoBoard, Chessboard, CircleGrid
 from rhot_app.calibration.stereo.report import StereoReport
 from rhot_app.engine.client import EngineClient
 from rhot_app.errors import CalibrationError, EngineError, ExportError, RecordingError, RhotError, RigError
@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     import pandas
 
 __all__ = [
-    "ANGLES", "FINGERS", "JOINTS", "CalibrationError", "CharucoBoard", "Chessboard", "Condition", "EngineClient",
-    "EngineError", "ExportError", "Exported", "Extrapolator", "HandState", "HandStates", "Knowledge", "ObjectModel",
-    "ObjectState", "ObjectStates", "Recording", "RecordingError", "RhotError", "Rig", "RigError",
-    "StereoCalibration", "Validity", "calibrate_stereo", "export", "live", "load_object", "load_rig",
+    "ANGLES", "FINGERS", "JOINTS", "AprilGrid", "CalibrationError", "CharucoBoard", "Chessboard", "CircleGrid",
+    "Condition", "EngineClient", "EngineError", "ExportError", "Exported", "Extrapolator", "HandState", "HandStates",
+    "Knowledge", "ObjectModel", "ObjectState", "ObjectStates", "Recording", "RecordingError", "RhotError", "Rig",
+    "RigError", "StereoCalibration", "Validity", "calibrate_stereo", "export", "live", "load_object", "load_rig",
     "open_recording", "save_object", "save_rig",
 ]
 
@@ -159,9 +159,9 @@ def calibrate_stereo(pictures: Mapping[str, Sequence[str | Path]], board: Board,
     """Put two or more cameras together from pictures of a board that they took at the same moments.
 
     `pictures`: files by the camera's name in `rig`; those of one moment have the same number in their names. `board`:
-    `Chessboard(cols, rows, square_m)` or a `CharucoBoard`. `intrinsics`: files of calibrated lenses by camera; others
-    are found from the same pictures. `baseline_m`: the distance of the first two cameras as measured by hand. Only this
-    length shows a wrong size of the squares. Nothing is written: `save_rig` does that.
+    `Chessboard(cols, rows, square_m)`, `CharucoBoard`, `AprilGrid` or `CircleGrid`. `intrinsics`: files of calibrated
+    lenses by camera; others are found from the same pictures. `baseline_m`: the distance of the first two cameras as
+    measured by hand. Only this length shows a wrong size of the squares. Nothing is written: `save_rig` does that.
 
     Raises CalibrationError when the pictures cannot be put together. The command is ``rhot calibrate stereo``.
     """

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board.boards import Board, Chessboard
+from rhot_app.calibration.board.boards import AprilGrid, Board, Chessboard, CircleGrid
 from rhot_app.geometry.camera import full_lens
 
 Array = NDArray[np.float64]
@@ -17,6 +17,16 @@ Array = NDArray[np.float64]
 PAPER, INK, ROOM = 215.0, 35.0, 120.0
 MARGIN = 1.2  # of the sheet around the outermost squares, in squares
 LENS = full_lens([535.0, 535.0, 322.3, 238.1, -0.28, 0.09, 0.001, -0.0005])
+
+
+CIRCLE_RADIUS = 0.45  # of the spacing; nobody says it to the detector
+
+KALIBR_CODES = (
+    0xd5d628584, 0xd97f18b49, 0xdd280910e, 0xe479e9c98, 0xebcbca822, 0xf31dab3ac, 0x056a5d085, 0x10652e1d4,
+    0x22b1dfead, 0x265ad0472, 0x34fe91b86, 0x3ff962cd5, 0x43a25329a, 0x474b4385f, 0x4e9d243e9, 0x5246149ae,
+    0x5997f5538, 0x683bb6c4c, 0x6be4a7211, 0x7e3158eea, 0x81da494af, 0x858339a74, 0x8cd51a5fe, 0x9f21cc2d7,
+    0xa2cabc89c, 0xadc58d9eb, 0xb16e7dfb0, 0xb8c05eb3a, 0xd25ef139d, 0xd607e1962)
+"""The first codes of the family 36h11 as ethz-asl/kalibr's kalibr_create_target_pdf has them (BSD-3-Clause)."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +113,7 @@ def _sheet_px(board: Board, camera_from_board: Array, photo: Photo) -> tuple[int
 def paint(board: Board, x: Array, y: Array) -> Array:
     """Grey level of the printed sheet at (x, y) m of the board's frame; the room beyond the sheet's margin."""
     levels, per_square = _sheet(board)
-    first = per_square * (1.0 + MARGIN) + 1.0  # a square before the first corner, the margin, and the room
+    first = per_square * (board.margin_m / board.square_m + MARGIN) + 1.0  # what is before the first corner, the room
     column, row = (np.clip(one * (per_square / board.square_m) + first, 0, size - 1).astype(np.intp)
                    for one, size in zip((x, y), levels.shape[::-1], strict=True))
     return levels[row, column]
@@ -111,9 +121,21 @@ def paint(board: Board, x: Array, y: Array) -> Array:
 
 @functools.lru_cache(maxsize=8)
 def _sheet(board: Board) -> tuple[Array, int]:
-    """Grey levels of the sheet, a pixel of the room around it, and how many there are to a square: as OpenCV draws a
-    ChArUco board, the squares of a chessboard."""
-    if isinstance(board, Chessboard):
+    """Grey levels of the sheet, a pixel of the room around it, and how many there are to a square, or what is measured
+    in its place: as OpenCV draws a ChArUco board, and Kalibr an AprilGrid."""
+    if isinstance(board, AprilGrid):
+        per_square = 100
+        black = april_grid(board.tag_cols, board.tag_rows, per_square, round(board.spacing * per_square))
+    elif isinstance(board, CircleGrid):
+        per_square = 120
+        y, x = np.ogrid[:(board.rows + 1) * per_square, :(2 * board.cols + 1) * per_square]
+        black = np.zeros((y.size, x.size), bool)
+        for row in range(board.rows):
+            for col in range(board.cols):
+                u, v = (1 + 2 * col + row % 2) * per_square - 0.5, (1 + row) * per_square - 0.5
+                rows = slice(row * per_square, (row + 2) * per_square)
+                black[rows] |= np.hypot(x - u, y[rows] - v) < CIRCLE_RADIUS * per_square
+    elif isinstance(board, Chessboard):
         per_square = 5
         black = np.add.outer(np.arange(board.rows + 1), np.arange(board.cols + 1)) % 2 == 0
         black = np.kron(black, np.ones((per_square, per_square), bool))
@@ -122,3 +144,28 @@ def _sheet(board: Board) -> tuple[Array, int]:
         black = board.opencv().generateImage((board.squares_x * per_square, board.squares_y * per_square)) < 128
     paper = np.pad(np.where(black, INK, PAPER), round(MARGIN * per_square), constant_values=PAPER)
     return np.pad(paper, 1, constant_values=ROOM), per_square
+
+
+def april_grid(tag_cols: int, tag_rows: int, tag: int, gap: int) -> NDArray[np.bool_]:
+    """Black is True: the grid as kalibr_create_target_pdf draws it, y upwards, with `tag` and `gap` in pixels."""
+    black = np.zeros((tag_rows * (tag + gap) + gap, tag_cols * (tag + gap) + gap), bool)
+    cell = tag // 10
+
+    def fill(x: int, y: int, width: int, height: int) -> None:
+        black[y + gap:y + gap + height, x + gap:x + gap + width] = True
+
+    for y in range(tag_rows):
+        for x in range(tag_cols):
+            left, low = x * (tag + gap), y * (tag + gap)
+            for right, up in ((-gap, -gap), (tag, -gap), (tag, tag), (-gap, tag)):
+                fill(left + right, low + up, gap, gap)
+            border = 2 * cell
+            fill(left, low, tag, border)
+            fill(left, low + tag - border, tag, border)
+            fill(left + tag - border, low, border, tag)
+            fill(left, low, border, tag)
+            code = KALIBR_CODES[tag_cols * y + x]
+            bits = np.rot90(np.array([[not code >> (6 * i + j) & 1 for j in range(6)] for i in range(6)]), 2)
+            for i, j in zip(*np.nonzero(bits), strict=True):
+                fill(left + (int(j) + 2) * cell, low + (7 - int(i)) * cell, cell, cell)
+    return black[::-1]

@@ -1,4 +1,4 @@
-"""Boards as Kalibr and caliscope state them: what they say is the board that is searched for; others are refused."""
+"""Boards as Kalibr, caliscope and anipose state them: the board that is searched for; others are refused."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from board_rendering import Photo, pose, take
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
+from rhot_app.calibration.board.boards import AprilGrid, Board, CharucoBoard, Chessboard, CircleGrid
 from rhot_app.calibration.exchange.boards import read_board
 from rhot_app.errors import CalibrationError
 
@@ -22,6 +22,26 @@ colSpacingMeters: 0.06      #size of one chessboard square [m]
 """ethz-asl/kalibr, the wiki's page "calibration targets", BSD-3-Clause."""
 
 APRILGRID = "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.088\ntagSpacing: 0.3\n"
+
+CIRCLEGRID = """target_type: 'circlegrid' #gridtype
+targetCols: 6               #number of circles (cols)
+targetRows: 7               #number of circles (rows)
+spacingMeters: 0.02         #distance between circles [m]
+asymmetricGrid: True        #use asymmetric grid (opencv) [bool]
+"""
+"""Both from the same page of Kalibr's wiki."""
+
+ANIPOSE = """nesting = 1
+[calibration]
+animal_calibration = false
+board_type = "charuco"
+board_size = [10, 7]
+board_marker_bits = 4
+board_marker_dict_number = 50
+board_marker_length = 18.75 # mm
+board_square_side_length = 25 # If charuco or checkerboard, square side length mm
+"""
+"""lambdaloop/anipose, docs, config.toml, BSD-2-Clause."""
 
 CHARUCO = """columns = 4
 rows = 5
@@ -43,6 +63,10 @@ def written(folder: Path, name: str, text: str) -> Path:
 
 @pytest.mark.parametrize(("name", "text", "board"), [
     ("target.yaml", CHECKERBOARD, Chessboard(6, 7, 0.06)),
+    ("target.yaml", APRILGRID, AprilGrid(6, 6, 0.088, 0.3)),
+    ("target.yaml", CIRCLEGRID, CircleGrid(6, 7, 0.02)),
+    ("config.toml", ANIPOSE, CharucoBoard(10, 7, 0.025, 0.01875)),
+    ("config.toml", ANIPOSE.replace("charuco", "checkerboard"), Chessboard(10, 7, 0.025)),
     ("charuco.toml", CHARUCO, CharucoBoard(4, 5, 0.054, 0.0405)),
     ("config.toml", "fps = 6\n[charuco]\n" + CHARUCO + "legacy_pattern = true\n",
      CharucoBoard(4, 5, 0.054, 0.0405, legacy=True)),
@@ -57,8 +81,14 @@ def test_a_published_board_is_the_one_that_it_says(tmp_path: Path, name: str, te
 
 
 @pytest.mark.parametrize(("name", "text", "words"), [
-    ("a.yaml", APRILGRID, "aprilgrid"),
-    ("a.yaml", APRILGRID.replace("aprilgrid", "circlegrid"), "circlegrid"),
+    ("a.yaml", APRILGRID.replace("aprilgrid", "assembly"), "assembly"),
+    ("a.yaml", APRILGRID.replace("tagSize: 0.088\n", ""), "tagSize is missing"),
+    ("a.yaml", APRILGRID.replace("0.3", "26"), "spacing of 26"),
+    ("a.yaml", APRILGRID.replace("tagCols: 6", "tagCols: 60"), "60x6 tags is not possible"),
+    ("a.yaml", CIRCLEGRID.replace("True", "False"), "same turned"),
+    ("a.toml", ANIPOSE.replace("charuco", "aruco"), "aruco"),
+    ("a.toml", ANIPOSE.replace("[10, 7]", "[10.5, 7]"), "board_size"),
+    ("a.toml", ANIPOSE.replace("= 4", "= 3"), "DICT_3X3_50"),
     ("a.yaml", CHECKERBOARD.replace("rowSpacingMeters: 0.06", "rowSpacingMeters: 0.05"), "60 x 50 mm"),
     ("a.yaml", CHECKERBOARD.replace("targetCols: 6", "targetCols: 6.5"), "targetCols"),
     ("a.yaml", CHECKERBOARD.replace("0.06", ".nan"), "finite"),

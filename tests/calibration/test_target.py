@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.board.boards import STANDARD_BOARD, CharucoBoard, Chessboard
+from rhot_app.calibration.board.boards import STANDARD_BOARD, AprilGrid, CharucoBoard, Chessboard, CircleGrid
 from rhot_app.calibration.board.corners import detect
 from rhot_app.calibration.board.target import PAPERS_MM, RULER_MM, Drawing, draw_target
 from rhot_app.errors import CalibrationError
@@ -18,13 +18,20 @@ from rhot_app.errors import CalibrationError
 PX_PER_MM = 4.0
 
 BOARDS = [Chessboard(9, 6, 0.025), Chessboard(6, 9, 0.02), CharucoBoard(10, 7, 0.025, 0.018),
-          CharucoBoard(8, 6, 0.025, 0.018, "DICT_5X5_100", legacy=True), CharucoBoard(8, 6, 0.025, 0.018)]
+          CharucoBoard(8, 6, 0.025, 0.018, "DICT_5X5_100", legacy=True), CharucoBoard(8, 6, 0.025, 0.018),
+          AprilGrid(7, 5, 0.025, 0.3), CircleGrid(4, 11, 0.02)]
 
 
 def boxes_of_svg(svg: bytes) -> np.ndarray:
     """(N, 4) mm: x, y, width, height of the black rectangles."""
     found = re.findall(rb'<rect x="([\d.-]+)" y="([\d.-]+)" width="([\d.-]+)" height="([\d.-]+)"/>', svg)
     return np.array(found, dtype=np.float64)
+
+
+def discs_of_svg(svg: bytes) -> np.ndarray:
+    """(N, 3) mm: middle and radius of the black circles."""
+    found = re.findall(rb'<circle cx="([\d.-]+)" cy="([\d.-]+)" r="([\d.-]+)"/>', svg)
+    return np.array(found, dtype=np.float64).reshape(-1, 3)
 
 
 def boxes_of_pdf(pdf: bytes, page_height_mm: float) -> np.ndarray:
@@ -39,6 +46,9 @@ def picture_of(drawing: Drawing) -> np.ndarray:
     picture = np.full((round(drawing.height * PX_PER_MM), round(drawing.width * PX_PER_MM)), 255, np.uint8)
     for x, y, width, height in PX_PER_MM * boxes_of_svg(drawing.to_svg()):
         picture[round(y):round(y + height), round(x):round(x + width)] = 0
+    v, u = np.indices(picture.shape)
+    for x, y, radius in PX_PER_MM * discs_of_svg(drawing.to_svg()):
+        picture[np.hypot(u + 0.5 - x, v + 0.5 - y) < radius] = 0
     return cv2.GaussianBlur(picture, (0, 0), 1.0)
 
 
@@ -73,9 +83,28 @@ def test_nothing_leaves_the_page_or_lies_on_the_ruler(board) -> None:
     boxes = boxes_of_svg(drawing.to_svg())
     assert (boxes[:, :2] >= 5.0).all()
     assert (boxes[:, 0] + boxes[:, 2] <= drawing.width - 5.0).all()
-    squares = boxes[np.isclose(boxes[:, 2], 1e3 * board.square_m)]
-    ruler = boxes[(boxes[:, 2] < 0.3)]
-    assert (squares[:, 1] + squares[:, 3]).max() + 3.0 < ruler[:, 1].min()
+    ruler = boxes[:, 2] < 0.3
+    discs = discs_of_svg(drawing.to_svg())
+    lowest = max([*(boxes[~ruler, 1] + boxes[~ruler, 3])[boxes[~ruler, 3] > 0.3], *(discs[:, 1] + discs[:, 2])])
+    assert lowest + 3.0 < boxes[ruler, 1].min()
+
+
+def test_discs_are_round_in_pdf_as_well() -> None:
+    """Points on the curves of one disc, by de Casteljau, lie on its rim."""
+    board = CircleGrid(4, 11, 0.02)
+    drawing = draw_target(board)
+    discs = discs_of_svg(drawing.to_svg())
+    assert len(discs) == 44
+    starts = re.findall(rb"([\d. -]+) m\n((?:[\d. -]+ c\n){4})f", drawing.to_pdf())
+    assert len(starts) == 44
+    for (start, curves), (x, y, radius) in zip(starts, discs, strict=True):
+        here = np.array(start.split(), float) * 25.4 / 72.0
+        for curve in curves.splitlines():
+            knots = np.vstack([here, np.array(curve.split()[:6], float).reshape(3, 2) * 25.4 / 72.0])
+            here = knots[3]
+            for weights in ([1, 0, 0, 0], [0.125, 0.375, 0.375, 0.125]):
+                px, py = np.array(weights) @ knots
+                assert np.hypot(px - x, drawing.height - py - y) == pytest.approx(radius, rel=1e-3)
 
 
 def test_a_board_too_large_says_what_would_fit() -> None:
@@ -106,6 +135,9 @@ def test_the_command_writes_and_refuses(tmp_path: Path, capsys: pytest.CaptureFi
             (["chessboard", "--out", str(tmp_path / "board.png")], "must end in .pdf or .svg"),
             (["chessboard", "--square-mm", "30", "--out", str(tmp_path / "b.svg")], "does not fit on A4"),
             (["chessboard", "--paper", "B7", "--out", str(tmp_path / "b.svg")], "no paper 'B7'"),
+            (["circles", "--marker-mm", "12", "--out", str(tmp_path / "b.svg")], "belong to a ChArUco board"),
+            (["chessboard", "--tag-spacing", "0.3", "--out", str(tmp_path / "b.svg")], "belongs to an AprilGrid"),
+            (["aprilgrid", "--tag-spacing", "3", "--out", str(tmp_path / "b.svg")], "spacing of 3 is not possible"),
             (["charuco", "--dictionary", "DICT_X", "--out", str(tmp_path / "b.svg")], "no marker dictionary"),
             (["chessboard", "--out", str(tmp_path / "no" / "b.doc")], "there is no folder")):
         assert main(["target", *arguments]) == 2

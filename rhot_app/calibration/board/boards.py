@@ -1,21 +1,30 @@
-"""Calibration boards: the plain chessboard and the ChArUco board, as their printed geometry.
+"""Calibration boards as their printed geometry: chessboard, ChArUco board, AprilGrid and grid of circles.
 
-The board's frame has its origin at the first inner corner, x along a row of corners, y along a column, z into the
-paper; seen from the printed side x is right and y down, so z points away from the viewer. Inner corners are numbered
-row by row: ``id = row * cols + col``.
+The board's frame has its origin at the first corner, x along a row of corners, y along a column, z into the paper; seen
+from the printed side x is right and y down, so z points away from the viewer. Corners are numbered row by row:
+``id = row * cols + col``. They are the inner corners of a chessboard and of a ChArUco board, the corners of an
+AprilGrid's tags, and the centres of circles.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board.standard_board import BOARD, SQUARE_MM
+from rhot_app.calibration.board.standard_board import (
+    BOARD,
+    KINDS,
+    MARKER_SHARE,
+    SQUARE_MM,
+    TAG_BITS,
+    TAG_BORDER_BITS,
+    TAG_SPACING,
+)
 from rhot_app.errors import CalibrationError
 
 Array = NDArray[np.float64]
@@ -34,27 +43,49 @@ class _Sized(Protocol):
     def rows(self) -> int: ...
     @property
     def square_m(self) -> float: ...
+    @property
+    def margin_m(self) -> float: ...
+    def lines(self) -> tuple[Array, Array]: ...
+    def object_points(self) -> Array: ...
 
 
 class Lattice:
-    """What every board of `cols` x `rows` inner corners, `square_m` metres apart, has in common."""
+    """What every board of `cols` x `rows` corners has in common. `square_m` is the length that a person measures, the
+    side of what `parts` names; all others are in proportion to it."""
 
     __slots__ = ()
+    parts: ClassVar[str] = "squares"
 
     @property
     def count(self: _Sized) -> int:
-        """How many inner corners there are."""
+        """How many corners there are."""
         return self.cols * self.rows
 
+    @property
+    def margin_m(self: _Sized) -> float:
+        """How far what is printed goes beyond the outermost corners."""
+        return self.square_m
+
+    @property
+    def free_space(self) -> float:
+        """Which part of the way to the next grid line is empty around a corner, but for the four parts that meet there.
+        """
+        return 1.0
+
+    def lines(self: _Sized) -> tuple[Array, Array]:
+        """(cols,) and (rows,) m, where the lines of corners are along x and y."""
+        return self.square_m * np.arange(float(self.cols)), self.square_m * np.arange(float(self.rows))
+
     def object_points(self: _Sized) -> Array:
-        """(N, 3) m, the inner corners in the board's frame, in the order of their ids; z is 0."""
-        row, col = np.divmod(np.arange(self.cols * self.rows), self.cols)
-        return np.column_stack([col, row, np.zeros(len(row))]) * self.square_m
+        """(N, 3) m, the corners in the board's frame, in the order of their ids; z is 0."""
+        x, y = self.lines()
+        return np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x)), np.zeros(len(x) * len(y))])
 
     def outline(self: _Sized) -> Array:
-        """(4, 3) m, the corners of the outermost squares, clockwise as seen, from beside the first inner corner."""
-        right, bottom = self.cols, self.rows
-        return np.array([[-1, -1, 0], [right, -1, 0], [right, bottom, 0], [-1, bottom, 0]], float) * self.square_m
+        """(4, 3) m, the corners of what is printed, clockwise as seen, from beside the first corner."""
+        low, high = (bound(self.object_points()[:, :2], axis=0) for bound in (np.min, np.max))
+        (left, top), (right, bottom) = low - self.margin_m, high + self.margin_m
+        return np.array([[left, top, 0], [right, top, 0], [right, bottom, 0], [left, bottom, 0]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,11 +109,6 @@ class Chessboard(Lattice):
     def one_way_up(self) -> bool:
         """Whether the colours tell the board from itself turned by 180 degrees."""
         return (self.cols + self.rows) % 2 == 1
-
-    @property
-    def free_space(self) -> float:
-        """Which part of a square's side is empty around a corner, but for the four squares that meet there."""
-        return 1.0
 
     @property
     def size_text(self) -> str:
@@ -138,7 +164,7 @@ class CharucoBoard(Lattice):
 
     @property
     def free_space(self) -> float:
-        """Which part of a square's side is empty around a corner: a marker's corner is the next thing there."""
+        """A marker's corner is the next thing beside a corner."""
         return min(1.0, float(np.sqrt(2.0)) * (1.0 - self.marker_m / self.square_m))
 
     @property
@@ -174,16 +200,165 @@ class CharucoBoard(Lattice):
         return board
 
 
-Board = Chessboard | CharucoBoard
+@dataclass(frozen=True, slots=True)
+class AprilGrid(Lattice):
+    """Kalibr's board of `tag_cols` x `tag_rows` tags (36h11) with sides of `tag_m`; parts of it suffice.
+
+    Tags are `spacing` of their side apart, and black squares fill the crossings between them, so that two black corners
+    meet in every corner of a tag. The number 0 is at the lower left, numbers rise to the right and then upwards. A tag
+    has a black border of two bits. Raises CalibrationError for impossible numbers.
+    """
+
+    parts: ClassVar[str] = "tags"
+    tag_cols: int
+    tag_rows: int
+    tag_m: float
+    spacing: float
+
+    def __post_init__(self) -> None:
+        if not (2 <= self.tag_cols <= MOST // 2 and 2 <= self.tag_rows <= MOST // 2):
+            raise CalibrationError(f"An AprilGrid of {self.size_text} tags is not possible: each side has 2 to "
+                                   f"{MOST // 2}.")
+        if not SMALLEST_M <= self.tag_m <= LARGEST_M:
+            raise CalibrationError(f"A tag of {self.tag_m * 1e3:g} mm is not possible: measure the black side of one "
+                                   f"and give it in millimetres, {SMALLEST_M * 1e3:g} to {LARGEST_M * 1e3:g}.")
+        if not 0.1 <= self.spacing <= 1.0:
+            raise CalibrationError(f"A spacing of {self.spacing:g} is not possible: it is the gap between two tags as "
+                                   "a part of a tag's side, 0.3 for instance.")
+
+    @property
+    def square_m(self) -> float:
+        """The side of a tag."""
+        return self.tag_m
+
+    @property
+    def cols(self) -> int:
+        """Corners along x, two of each tag."""
+        return 2 * self.tag_cols
+
+    @property
+    def rows(self) -> int:
+        """Corners along y."""
+        return 2 * self.tag_rows
+
+    @property
+    def margin_m(self) -> float:
+        """The outermost crossings are filled, too."""
+        return self.spacing * self.tag_m
+
+    def lines(self) -> tuple[Array, Array]:
+        """(cols,) and (rows,) m: the sides of the tags."""
+        x, y = (self.tag_m * np.add.outer((1.0 + self.spacing) * np.arange(count), [0.0, 1.0]).ravel()
+                for count in (self.tag_cols, self.tag_rows))
+        return x, y
+
+    @property
+    def one_way_up(self) -> bool:
+        """True: every tag tells its own place."""
+        return True
+
+    @property
+    def free_space(self) -> float:
+        """A tag's first bit is the next thing beside a corner."""
+        bit = TAG_BORDER_BITS / (TAG_BITS + 2 * TAG_BORDER_BITS)
+        return min(1.0, float(np.sqrt(2.0)) * bit / self.spacing)
+
+    @property
+    def size_text(self) -> str:
+        """The size in tags, "6x6"."""
+        return f"{self.tag_cols}x{self.tag_rows}"
+
+    @property
+    def text(self) -> str:
+        """The board in words."""
+        return f"AprilGrid with {self.size_text} tags of {self.tag_m * 1e3:g} mm, spacing {self.spacing:g}"
+
+    def number_at(self, col: int, row: int) -> int:
+        """The tag in a column from the left and a row from the top."""
+        return (self.tag_rows - 1 - row) * self.tag_cols + col
+
+
+@dataclass(frozen=True, slots=True)
+class CircleGrid(Lattice):
+    """OpenCV's asymmetric grid of `rows` rows of `cols` circles each, with every other row moved by `square_m`.
+
+    Rows are `square_m` apart, the circles of a row twice as far: OpenCV's and Kalibr's spacing. With an odd number of
+    rows the first row tells the board's ends apart; with an even one the board turned by 180 degrees is the same.
+    Raises CalibrationError for impossible numbers.
+    """
+
+    parts: ClassVar[str] = "spacings"
+    cols: int
+    rows: int
+    square_m: float
+
+    def __post_init__(self) -> None:
+        _check(self.cols, self.rows, self.square_m)
+
+    def object_points(self) -> Array:
+        """(N, 3) m, the centres; every other row stands to the right by the spacing."""
+        row, col = np.divmod(np.arange(self.cols * self.rows), self.cols)
+        return np.column_stack([2 * col + row % 2, row, np.zeros(len(row))]) * self.square_m
+
+    @property
+    def one_way_up(self) -> bool:
+        """Whether the board is told from itself turned by 180 degrees."""
+        return self.rows % 2 == 1
+
+    @property
+    def size_text(self) -> str:
+        """The size as OpenCV has it, "4x11": circles in a row, rows."""
+        return f"{self.cols}x{self.rows}"
+
+    @property
+    def text(self) -> str:
+        """The board in words."""
+        return f"asymmetric grid of {self.size_text} circles, spacing {self.square_m * 1e3:g} mm"
+
+
+Board = Chessboard | CharucoBoard | AprilGrid | CircleGrid
 
 
 def same_pattern(first: Board, second: Board) -> bool:
     """Whether two boards differ in their lengths at most, so that what was seen of one is as good for the other."""
     if isinstance(first, CharucoBoard) and isinstance(second, CharucoBoard):
         return replace(first, square_m=second.square_m, marker_m=second.marker_m) == second
-    if isinstance(first, Chessboard) and isinstance(second, Chessboard):
-        return replace(first, square_m=second.square_m) == second
-    return False
+    return scaled(first, second.square_m) == second
+
+
+def scaled(board: Board, square_m: float) -> Board:
+    """The same board of another size."""
+    match board:
+        case AprilGrid():
+            return replace(board, tag_m=square_m)
+        case CharucoBoard():
+            return replace(board, square_m=square_m, marker_m=board.marker_m * square_m / board.square_m)
+        case _:
+            return replace(board, square_m=square_m)
+
+
+def make_board(kind: str, size: str | None = None, *, square_mm: float | None = None, marker_mm: float | None = None,
+               dictionary: str | None = None, legacy: bool = False, tag_spacing: float | None = None) -> Board:
+    """The board of one of `KINDS`, the usual one in all that is None. Raises CalibrationError for one that cannot be,
+    or for what boards of that kind do not have."""
+    if kind != "charuco" and (marker_mm is not None or dictionary is not None or legacy):
+        raise CalibrationError(f"Markers, their dictionary and the former layout belong to a ChArUco board, not to "
+                               f"{kind}.")
+    if kind != "aprilgrid" and tag_spacing is not None:
+        raise CalibrationError(f"A spacing of tags belongs to an AprilGrid, not to {kind}.")
+    usual_size, usual_mm = KINDS[kind]
+    across, down = parse_size(size or usual_size)
+    square_m = 1e-3 * (usual_mm if square_mm is None else square_mm)
+    match kind:
+        case "charuco":
+            return CharucoBoard(across, down, square_m, MARKER_SHARE * square_m if marker_mm is None
+                                else 1e-3 * marker_mm, dictionary or DEFAULT_DICTIONARY, legacy)
+        case "aprilgrid":
+            return AprilGrid(across, down, square_m, TAG_SPACING if tag_spacing is None else tag_spacing)
+        case "circles":
+            return CircleGrid(across, down, square_m)
+        case _:
+            return Chessboard(across, down, square_m)
 
 
 def parse_size(text: str) -> tuple[int, int]:

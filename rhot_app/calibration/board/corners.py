@@ -8,7 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board.boards import Board, Chessboard
+from rhot_app.calibration.board.aprilgrid import find_aprilgrid, has_spacing
+from rhot_app.calibration.board.boards import AprilGrid, Board, Chessboard, CircleGrid
+from rhot_app.calibration.board.circles import find_circles
 from rhot_app.calibration.board.saddle import FIELDS, find_charuco, fit_saddles
 
 Array = NDArray[np.float64]
@@ -64,22 +66,38 @@ def to_gray(image: NDArray[np.uint8]) -> Gray:
 def detect(image: NDArray[np.uint8], board: Board, *, thorough: bool = True, source: str = "") -> BoardView | None:
     """The board in `image`, (H, W) grey or (H, W, 3) BGR uint8; None when it is not there.
 
-    A chessboard is found whole or not at all, a ChArUco board in parts. `thorough` looks again, enlarged, where the
-    quick search fails: for pictures from files; live pictures come again.
+    Chessboards and grids of circles are found whole or not at all, ChArUco boards and AprilGrids in parts. `thorough`
+    looks again, enlarged, where the quick search fails: for pictures from files; live pictures come again.
     """
     gray = to_gray(image)
     if min(gray.shape) < SMALLEST_PX:
         return None
-    if isinstance(board, Chessboard):
-        rough = find_chessboard(gray, board, thorough=thorough)
-    else:
-        rough = find_charuco(gray, board, thorough=thorough)
+    found = _located(gray, board, thorough=thorough)
+    return None if found is None else _view(*found, gray.shape, source)
+
+
+def _located(gray: Gray, board: Board, *, thorough: bool) -> tuple[Array, float] | None:
+    """(rows, cols, 2) px, NaN for corners that are not visible, and the blur of the edges; None for another board."""
+    match board:
+        case CircleGrid():
+            centres = find_circles(gray, board, thorough=thorough)
+            return None if centres is None else (centres.grid, centres.blur_px)
+        case Chessboard():
+            rough = find_chessboard(gray, board, thorough=thorough)
+        case AprilGrid():
+            rough = find_aprilgrid(gray, board, thorough=thorough)
+        case _:
+            rough = find_charuco(gray, board, thorough=thorough)
     if rough is None:
         return None
-    grid, blur = refine(gray, rough, free=board.free_space)
-    if isinstance(board, Chessboard) and not _bordered(grid, gray.shape):
-        return None
-    return _view(grid, blur, gray.shape, source)
+    grid, blur = refine(gray, rough, board.lines(), free=board.free_space)
+    match board:
+        case Chessboard() if not _bordered(grid, gray.shape):
+            return None
+        case AprilGrid() if not has_spacing(grid, board):
+            return None
+        case _:
+            return grid, blur
 
 
 def _bordered(grid: Array, shape: tuple[int, ...]) -> bool:
@@ -101,7 +119,8 @@ def to_grid(pixels: Array, ids: NDArray[np.int64], board: Board) -> Array:
 def _view(grid: Array, blur: float, shape: tuple[int, ...], source: str) -> BoardView | None:
     height, width = shape
     flat = grid.reshape(-1, 2)
-    inside = (flat >= 0.0).all(axis=1) & (flat[:, 0] <= width - 1) & (flat[:, 1] <= height - 1)
+    off_rim = np.minimum(flat, np.array([width - 1.0, height - 1.0]) - flat).min(axis=1)
+    inside = off_rim >= NARROWEST_PX  # nearer to the rim half of a crossing is missing, and tenths of a pixel with it
     ids = np.flatnonzero(inside)
     sides = side_px(grid)
     if len(ids) < FEWEST_CORNERS or not len(sides):
@@ -202,21 +221,22 @@ _WORSE = 2.5  # times the misfit of the others
 _FAINTER = 0.6  # of the others' contrast, or the reverse: what has less is not the board
 
 
-def refine(gray: NDArray[np.uint8], grid: Array, *, free: float = 1.0) -> tuple[Array, float]:
+def refine(gray: NDArray[np.uint8], grid: Array, lines: tuple[Array, Array], *,
+           free: float = 1.0) -> tuple[Array, float]:
     """`grid` (rows, cols, 2) px, NaN where a corner is absent, moved to where the picture has the corners.
 
-    `free` says which part of the way to the next grid line is empty around a corner: less than 1 where squares hold
-    markers. Absent corners that the picture shows beside others are added. Returns the grid and the blur of the edges
-    (median SD in px, of the blurrier direction). A corner whose edges cannot be fitted becomes NaN.
+    `lines`: the board's. `free` says which part of the way to the next grid line is empty around a corner: less than 1
+    where squares hold markers. Absent corners that the picture shows beside others are added. Returns the grid and the
+    blur of the edges (median SD in px, of the blurrier direction). A corner whose edges cannot be fitted becomes NaN.
     """
-    fitted = _fit(gray, grid, grid, free)
-    expected = _expected(fitted[..., :2])
-    astray = _apart(fitted, expected) > np.maximum(_ASTRAY * clearance_px(grid), _ASTRAY_PX)
+    fitted = _fit(gray, grid, grid, lines, free)
+    expected = _expected(fitted[..., :2], lines)
+    astray = _apart(fitted, expected) > np.maximum(_ASTRAY * clearance_px(grid, lines), _ASTRAY_PX)
     again = np.logical_and(astray | np.isnan(fitted[..., 0]), np.isfinite(grid[..., 0])).reshape(*astray.shape, 1)
-    fitted = np.where(again, _fit(gray, np.where(again, expected, np.nan), grid, free), fitted)
+    fitted = np.where(again, _fit(gray, np.where(again, expected, np.nan), grid, lines, free), fitted)
     known = np.isfinite(fitted[..., 0])
     for _ in range(max(grid.shape) if known.any() and not known.all() else 0):
-        more = _beside(gray, fitted, free)
+        more = _beside(gray, fitted, lines, free)
         if not np.isfinite(more[..., 0]).any():
             break
         fitted = np.where(np.isfinite(more), more, fitted)
@@ -224,33 +244,33 @@ def refine(gray: NDArray[np.uint8], grid: Array, *, free: float = 1.0) -> tuple[
     return fitted[..., :2], float(np.nanmedian(blurs)) if np.isfinite(blurs).any() else float("nan")
 
 
-def _fit(gray: NDArray[np.uint8], starts: Array, grid: Array, free: float) -> Array:
+def _fit(gray: NDArray[np.uint8], starts: Array, grid: Array, lines: tuple[Array, Array], free: float) -> Array:
     """(rows, cols, 6) of `fit_saddles` from `starts` (rows, cols, 2) px, NaN for none, with the lines of `grid`."""
-    space = clearance_px(grid)
+    space = clearance_px(grid, lines)
     radii = np.where(np.isfinite(space), np.clip(REACH * free * space, NARROWEST_PX, WIDEST_PX), 0.0)
     fitted = fit_saddles(gray, np.ascontiguousarray(starts).reshape(-1, 2), _directions(grid).reshape(-1, 2),
                          radii.reshape(-1))
     return fitted.reshape(*grid.shape[:2], FIELDS)
 
 
-def _beside(gray: NDArray[np.uint8], fitted: Array, free: float) -> Array:
+def _beside(gray: NDArray[np.uint8], fitted: Array, lines: tuple[Array, Array], free: float) -> Array:
     """(rows, cols, 6), NaN for most: absent corners that the picture shows where their neighbours expect them.
 
     They count when they fit like the others, at the place and with the contrast that the board has there: a finger or
     the rim of a sheet does not.
     """
     known = np.isfinite(fitted[..., :1])
-    expected = np.where(known, np.nan, _expected(fitted[..., :2]))
+    expected = np.where(known, np.nan, _expected(fitted[..., :2], lines))
     inside = np.all((expected > 0.0) & (expected < np.array(gray.shape[::-1]) - 1.0), axis=-1, keepdims=True)
     expected = np.where(inside, expected, np.nan)
     filled = np.where(known, fitted[..., :2], expected)
-    found = _fit(gray, expected, filled, free)
+    found = _fit(gray, expected, filled, lines, free)
     row, col = np.indices(known.shape[:2])
     sign = (-1.0) ** (row + col)
     usual, misfit = np.median((fitted[..., 4] * sign)[known[..., 0]]), np.median(fitted[..., 5][known[..., 0]])
     contrast = found[..., 4] * sign / usual
     good = (contrast > _FAINTER) & (contrast < 1.0 / _FAINTER) & (found[..., 5] < _WORSE * misfit)
-    good &= _apart(found, expected) < np.maximum(_BESIDE * clearance_px(filled), _ASTRAY_PX)
+    good &= _apart(found, expected) < np.maximum(_BESIDE * clearance_px(filled, lines), _ASTRAY_PX)
     return np.where(good[..., None], found, np.nan)
 
 
@@ -259,20 +279,27 @@ def _apart(fitted: Array, places: Array) -> Array:
     return np.asarray(np.linalg.norm(fitted[..., :2] - places, axis=-1))
 
 
-def _expected(grid: Array) -> Array:
+def _expected(grid: Array, lines: tuple[Array, Array]) -> Array:
     """(rows, cols, 2) px, where the corners within two steps along rows and columns expect each one (median)."""
-    wide = np.pad(grid, ((2, 2), (2, 2), (0, 0)), constant_values=np.nan)
-    rows, cols = grid.shape[:2]
-
-    def at(row: int, col: int) -> Array:
-        return wide[2 + row:2 + row + rows, 2 + col:2 + col + cols]
-
-    guesses = [(at(0, -1) + at(0, 1)) / 2, (at(-1, 0) + at(1, 0)) / 2]
-    guesses += [2 * at(row, col) - at(2 * row, 2 * col) for row, col in ((0, 1), (0, -1), (1, 0), (-1, 0))]
+    guesses = []
+    for axis, places in ((1, lines[0]), (0, lines[1])):
+        for one, other in ((-1, 1), (1, 2), (-1, -2)):
+            near, far = _beyond(grid, one, axis), _beyond(grid, other, axis)
+            at_near, at_far = (_beyond(places[:, None], step, 0)[:, 0] for step in (one, other))
+            share = ((places - at_near) / (at_far - at_near)).reshape((1, -1, 1) if axis else (-1, 1, 1))
+            guesses.append(near + share * (far - near))
     ordered = np.sort(np.stack(guesses), axis=0)  # NaN last
     count = np.isfinite(ordered).sum(axis=0, keepdims=True)
     middle = [np.take_along_axis(ordered, np.maximum(place, 0), axis=0) for place in ((count - 1) // 2, count // 2)]
     return np.asarray(np.where(count > 0, (middle[0] + middle[1]) / 2.0, np.nan)[0])
+
+
+def _beyond(values: Array, step: int, axis: int) -> Array:
+    """`values` moved so that each place holds what is `step` further along an axis, NaN beyond the ends."""
+    pad = [(0, 0)] * values.ndim
+    pad[axis] = (max(-step, 0), max(step, 0))
+    start = max(step, 0)
+    return np.take(np.pad(values, pad, constant_values=np.nan), range(start, start + values.shape[axis]), axis)
 
 
 def side_px(grid: Array) -> Array:
@@ -281,20 +308,24 @@ def side_px(grid: Array) -> Array:
     return sides[np.isfinite(sides)]
 
 
-def clearance_px(grid: Array) -> Array:
-    """(rows, cols) px, how far the nearest parallel grid line is from each corner of `grid` (rows, cols, 2).
+def clearance_px(grid: Array, lines: tuple[Array, Array]) -> Array:
+    """(rows, cols) px, how far the nearest parallel grid line is from each corner of `grid` (rows, cols, 2), by the
+    part of the board beside it and by the least distance of its `lines`.
 
     inf for a corner that is absent (NaN) or has no whole square beside it.
     """
     along, down = np.diff(grid, axis=1), np.diff(grid, axis=0)
+    wide, high = (np.diff(places) for places in lines)
+    least = min(float(wide.min()), float(high.min()))
     nearest = np.full(grid.shape[:2], np.inf)
     first, last = slice(1, None), slice(None, -1)
     for rows in (first, last):  # the four squares that meet in a corner
         for cols in (first, last):
             a, d = along[rows], down[:, cols]
             area = np.abs(a[..., 0] * d[..., 1] - a[..., 1] * d[..., 0])
-            longest = np.maximum(np.linalg.norm(a, axis=-1), np.linalg.norm(d, axis=-1))
-            nearest[rows, cols] = np.fmin(nearest[rows, cols], area / np.maximum(longest, 1e-9))
+            across = area / np.maximum(np.linalg.norm(d, axis=-1), 1e-9) * (least / wide)
+            upright = area / np.maximum(np.linalg.norm(a, axis=-1), 1e-9) * (least / high)[:, None]
+            nearest[rows, cols] = np.fmin(nearest[rows, cols], np.fmin(across, upright))
     return np.where(np.isfinite(grid).all(axis=-1), nearest, np.inf)
 
 

@@ -14,8 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
-from rhot_app.calibration.board.corners import BoardView
+from rhot_app.calibration.board.aprilgrid import FEWEST_TAGS, has_spacing, measured_spacing, place_tags, read_tags
+from rhot_app.calibration.board.boards import AprilGrid, Board, CharucoBoard, Chessboard, CircleGrid
+from rhot_app.calibration.board.circles import find_circles
+from rhot_app.calibration.board.corners import BoardView, refine
 from rhot_app.calibration.board.saddle import MarkersSeen, find_charuco, negated, read_markers
 from rhot_app.calibration.verdict import Finding, Grade
 
@@ -36,8 +38,11 @@ class Beyond:
     row: bool
 
 
-def look_beyond(gray: Gray, view: BoardView, board: Chessboard) -> Beyond:
-    """Look at the ring after next around the corners of `view` in its picture."""
+def look_beyond(gray: Gray, view: BoardView, board: Board) -> Beyond | None:
+    """Look at the ring after next around the corners of `view` in its picture; None for boards whose markers or number
+    of circles tell their size."""
+    if not isinstance(board, Chessboard):
+        return None
     targets = np.column_stack(np.divmod(view.ids, board.cols)[::-1]).astype(np.float64)
     found, _ = cv2.findHomography(targets, view.pixels)
     if found is None:
@@ -57,7 +62,7 @@ def look_beyond(gray: Gray, view: BoardView, board: Chessboard) -> Beyond:
         row=any(goes_on(np.column_stack([along, np.full(len(along), y)])) for y in (-_REACH, board.rows - 1 + _REACH)))
 
 
-def size_finding(seen: Sequence[Beyond], board: Chessboard) -> Finding | None:
+def size_finding(seen: Sequence[Beyond], board: Board) -> Finding | None:
     """What the pictures say about the size of the board; None when it is as said."""
     if not seen:
         return None
@@ -103,7 +108,15 @@ def why_missing(gray: Gray, board: Board) -> str:
     """The reason in words, without a full stop, for a picture (H, W) uint8 in which `board` was not found."""
     if float(np.ptp(np.percentile(gray, (2, 98)))) < 12.0:
         return "the picture is nearly of one brightness: covered, far too dark or far too bright"
-    return _no_charuco(gray, board) if isinstance(board, CharucoBoard) else _no_chessboard(gray, board)
+    match board:
+        case CharucoBoard():
+            return _no_charuco(gray, board)
+        case AprilGrid():
+            return _no_aprilgrid(gray, board)
+        case CircleGrid():
+            return _no_circles(gray, board)
+        case _:
+            return _no_chessboard(gray, board)
 
 
 def guess_size(gray: Gray) -> tuple[int, int] | None:
@@ -153,6 +166,31 @@ def _no_charuco(gray: Gray, board: CharucoBoard) -> str:
         return (f"a board of {board.size_text} squares without markers of {board.dictionary}: wrong dictionary, a "
                 "plain chessboard, or blurred")
     return f"no markers of {board.dictionary}: not in view, too small, wrong dictionary, or blurred"
+
+
+def _no_aprilgrid(gray: Gray, board: AprilGrid) -> str:
+    seen, thin = read_tags(gray), read_tags(gray, border=1)
+    if len(thin.ids) > max(FEWEST_TAGS, len(seen.ids)):
+        return ("the tags have a black border of one bit, as other programs print them; those of Kalibr's AprilGrid "
+                "have two (rhot target aprilgrid)")
+    if len(seen.ids) < FEWEST_TAGS:
+        return "no tags of the family 36h11 as Kalibr prints them: not in view, too small, or blurred"
+    rough = place_tags(seen, board)
+    if rough is None:
+        return f"{len(seen.ids)} tags, but not as on an AprilGrid of {board.size_text} tags (columns first, then rows)"
+    grid, _ = refine(gray, rough, board.lines(), free=board.free_space)
+    if not has_spacing(grid, board):
+        return f"the tags are {measured_spacing(grid):.2f} of their side apart, not {board.spacing:g}"
+    return f"only {len(seen.ids)} of the grid's {board.count // 4} tags can be read: blurred, or hidden"
+
+
+def _no_circles(gray: Gray, board: CircleGrid) -> str:
+    turned = CircleGrid(board.rows, board.cols, board.square_m)
+    if find_circles(gray, turned, thorough=True) is not None:
+        return (f"there is a grid of {turned.size_text} circles, not of {board.size_text}: first the circles in a row "
+                "are counted, then the rows")
+    return (f"no asymmetric grid of {board.size_text} circles: all of them must be visible, with white around, and no "
+            "others beside them")
 
 
 def _marker_px(seen: MarkersSeen) -> float:

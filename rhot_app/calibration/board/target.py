@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rhot_app.calibration.board.boards import Board, CharucoBoard, Chessboard
+from rhot_app.calibration.board.aprilgrid import tag_cells
+from rhot_app.calibration.board.boards import AprilGrid, Board, CharucoBoard, Chessboard, CircleGrid, scaled
+from rhot_app.calibration.board.standard_board import CIRCLE_SHARE
 from rhot_app.errors import CalibrationError
 from rhot_node.files import write_atomically
 
@@ -45,13 +47,16 @@ def draw_target(board: Board, paper: str = "A4") -> Drawing:
     room = page_height - MARGIN_MM - _FOOT_MM - quiet
     top = MARGIN_MM + max(0.0, 0.5 * (room - MARGIN_MM - height))
     foot = page_height - MARGIN_MM - _FOOT_MM
-    boxes = tuple(Box(left + box.x, top + box.y, box.width, box.height) for box in _board_boxes(board))
+    boxes, discs = _shapes(board)
+    boxes = tuple(Box(left + box.x, top + box.y, box.width, box.height) for box in boxes)
+    discs = tuple(Disc(left + disc.x, top + disc.y, disc.radius) for disc in discs)
     text_x = MARGIN_MM + RULER_MM + 6.0
     texts = [Text(text_x, foot + 5.0, _TEXT_MM, board.text[0].upper() + board.text[1:]),
              Text(text_x, foot + 10.0, _TEXT_MM,
                   f"Print at 100 % on {paper}, glue it flat, measure the ruler: {RULER_MM:g} mm"),
              *_ruler_numbers(foot)]
-    return Drawing(page_width, page_height, boxes + tuple(_ruler_boxes(foot)), tuple(texts), board.text)
+    return Drawing(page_width, page_height, boxes + tuple(_ruler_boxes(foot)), tuple(texts), board.text,
+                   discs=discs)
 
 
 def write_target(out: Path, board: Board, paper: str = "A4") -> None:
@@ -70,8 +75,8 @@ def write_target(out: Path, board: Board, paper: str = "A4") -> None:
 
 
 def _board_size_mm(board: Board) -> tuple[float, float]:
-    square = 1e3 * board.square_m
-    return square * (board.cols + 1), square * (board.rows + 1)
+    width, height = 1e3 * np.ptp(board.outline()[:, :2], axis=0)
+    return float(width), float(height)
 
 
 def _quiet_mm(board: Board) -> float:
@@ -95,22 +100,39 @@ def _refusal(board: Board, paper: str) -> str:
     width, height = _board_size_mm(board)
     fitting = [name for name in PAPERS_MM if _fits(board, name)]
     page = _page(paper, across=width >= height)
-    squares_mm = np.arange(1.0, 1e3 * board.square_m, 0.5)
-    square = max((side for side in squares_mm if _fits(_scaled(board, 1e-3 * side), paper)), default=0.0)
+    sides_mm = np.arange(1.0, 1e3 * board.square_m, 0.5)
+    side_mm = max((side for side in sides_mm if _fits(scaled(board, 1e-3 * side), paper)), default=0.0)
     larger = f", or print it on {fitting[0]}" if fitting else ""
     return (f"The {board.text} is {width:g} x {height:g} mm large and does not fit on {paper} ({page[0]:g} x "
-            f"{page[1]:g} mm) with its margins and the ruler. Squares of {square:g} mm "
-            f"would{larger}.")
+            f"{page[1]:g} mm) with its margins and the ruler. {board.parts.capitalize()} of "
+            f"{side_mm:g} mm would{larger}.")
 
 
-def _scaled(board: Board, square_m: float) -> Board:
-    """The same board with other squares."""
-    if isinstance(board, Chessboard):
-        return replace(board, square_m=square_m)
-    return replace(board, square_m=square_m, marker_m=board.marker_m * square_m / board.square_m)
+def _shapes(board: Board) -> tuple[tuple[Box, ...], tuple[Disc, ...]]:
+    """What is black, from the upper left corner of what is printed on."""
+    match board:
+        case AprilGrid():
+            return tuple(_tag_boxes(board)), ()
+        case CircleGrid():
+            spacing = 1e3 * board.square_m
+            return (), tuple(Disc(spacing + 1e3 * x, spacing + 1e3 * y, 0.5 * CIRCLE_SHARE * spacing)
+                             for x, y, _ in board.object_points().tolist())
+        case _:
+            return tuple(_square_boxes(board)), ()
 
 
-def _board_boxes(board: Board) -> Iterator[Box]:
+def _tag_boxes(board: AprilGrid) -> Iterator[Box]:
+    """Tags, and the squares at the crossings between them and around."""
+    tag, gap = 1e3 * board.tag_m, 1e3 * board.margin_m
+    for row in range(board.tag_rows + 1):
+        for col in range(board.tag_cols + 1):
+            left, top = col * (tag + gap), row * (tag + gap)
+            yield Box(left, top, gap, gap)
+            if row < board.tag_rows and col < board.tag_cols:
+                yield from _cell_boxes(left + gap, top + gap, tag, tag_cells(board.number_at(col, row)))
+
+
+def _square_boxes(board: Chessboard | CharucoBoard) -> Iterator[Box]:
     square = 1e3 * board.square_m
     white = {(x, y) for x, y, _ in _marker_squares(board)} if isinstance(board, CharucoBoard) else _white_squares(board)
     for y in range(board.rows + 1):
@@ -118,8 +140,9 @@ def _board_boxes(board: Board) -> Iterator[Box]:
             if (x, y) not in white:
                 yield Box(x * square, y * square, square, square)
     if isinstance(board, CharucoBoard):
+        marker = 1e3 * board.marker_m
         for x, y, bits in _marker_squares(board):
-            yield from _marker_boxes(board, x, y, bits)
+            yield from _cell_boxes((x + 0.5) * square - 0.5 * marker, (y + 0.5) * square - 0.5 * marker, marker, bits)
 
 
 def _white_squares(board: Chessboard) -> set[tuple[int, int]]:
@@ -136,11 +159,10 @@ def _marker_squares(board: CharucoBoard) -> Iterator[tuple[int, int, np.ndarray]
         yield int(x), int(y), family.generateImageMarker(int(number), cells) == 0
 
 
-def _marker_boxes(board: CharucoBoard, x: int, y: int, bits: np.ndarray) -> Iterator[Box]:
-    """Black runs of each row of cells."""
-    square, marker = 1e3 * board.square_m, 1e3 * board.marker_m
-    left, top, cell = (x + 0.5) * square - 0.5 * marker, (y + 0.5) * square - 0.5 * marker, marker / len(bits)
-    for row, cells in enumerate(bits):
+def _cell_boxes(left: float, top: float, side: float, black: np.ndarray) -> Iterator[Box]:
+    """Black runs of each row of a marker's cells (N, N)."""
+    cell = side / len(black)
+    for row, cells in enumerate(black):
         edges = np.flatnonzero(np.diff(np.concatenate([[False], cells, [False]]).astype(int)))
         for begin, end in edges.reshape(-1, 2):
             yield Box(left + begin * cell, top + row * cell, (end - begin) * cell, cell)
@@ -183,6 +205,15 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True)
+class Disc:
+    """A black circle; its middle and its radius, mm, y down."""
+
+    x: float
+    y: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
 class Stroke:
     """A line through `points` (x, y), mm, `width` mm thick."""
 
@@ -205,8 +236,8 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """One page of `width` x `height` mm; everything that is not a box, a stroke or text is white. Strokes lie on the
-    boxes, text on both."""
+    """One page of `width` x `height` mm; everything that is not a box, a disc, a stroke or text is white. Strokes lie
+    on the boxes, text on both."""
 
     width: float
     height: float
@@ -214,6 +245,7 @@ class Drawing:
     texts: tuple[Text, ...]
     title: str
     strokes: tuple[Stroke, ...] = ()
+    discs: tuple[Disc, ...] = ()
 
     def to_svg(self) -> bytes:
         """The page as SVG; one user unit is one millimetre."""
@@ -226,6 +258,8 @@ class Drawing:
             *(f'<rect x="{_number(box.x)}" y="{_number(box.y)}" width="{_number(box.width)}" '
               f'height="{_number(box.height)}"{_svg_ink("fill", box.ink)}/>' for box in self.boxes),
             "</g>",
+            *(f'<circle cx="{_number(disc.x)}" cy="{_number(disc.y)}" r="{_number(disc.radius)}"/>'
+              for disc in self.discs),
             *(f'<polyline fill="none"{_svg_ink("stroke", stroke.ink) or _BLACK_STROKE} '
               f'stroke-width="{_number(stroke.width)}" '
               f'points="{_svg_points(stroke)}"/>'
@@ -250,6 +284,9 @@ class Drawing:
             lines.append(f"{_points(box.x)} {_points(self.height - box.y - box.height)} {_points(box.width)} "
                          f"{_points(box.height)} re".encode())
         lines.append(b"f")
+        if self.discs:
+            lines += [_pdf_ink(BLACK, b"rg"), *(self._pdf_disc(disc) for disc in self.discs)]
+            ink = BLACK
         for stroke in self.strokes:
             ends = [f"{_points(x)} {_points(self.height - y)} {'l' if k else 'm'}".encode()
                     for k, (x, y) in enumerate(stroke.points)]
@@ -262,6 +299,16 @@ class Drawing:
                 b"B" if text.bold else b"F", _points(text.height).encode(), _points(text.x).encode(),
                 _points(self.height - text.y).encode(), _pdf_text(text.text)))
         return b"\n".join(lines)
+
+    def _pdf_disc(self, disc: Disc) -> bytes:
+        """Four curves, a quarter each; their round is good to 3e-4 of the radius."""
+        x, y, r = disc.x, self.height - disc.y, disc.radius
+        k = 4.0 / 3.0 * (np.sqrt(2.0) - 1.0) * r
+        curves = [(r, k, k, r, 0.0, r), (-k, r, -r, k, -r, 0.0), (-r, -k, -k, -r, 0.0, -r), (k, -r, r, -k, r, 0.0)]
+        lines = [f"{_points(x + r)} {_points(y)} m"]
+        lines += [" ".join(_points(start + step) for start, step in zip((x, y) * 3, curve, strict=True)) + " c"
+                  for curve in curves]
+        return "\n".join([*lines, "f"]).encode()
 
 
 def pdf_of(pages: Sequence[Drawing], title: str) -> bytes:

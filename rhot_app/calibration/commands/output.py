@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, SQUARE_MM
+from rhot_app.calibration.board.standard_board import KINDS, SPACING_MM, SQUARE_MM, TAG_SPACING
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.errors import CalibrationError, input_file, positive_number
 
@@ -106,15 +106,24 @@ def unit_of(args: argparse.Namespace) -> float | None:
 
 # -- arguments that describe a board -----------------------------------------------------------------------------------
 
+_SIZES = {kind: size for kind, (size, _) in KINDS.items()}
+SIZE_HELP = (f"inner corners of a chessboard (default {_SIZES['chessboard']}), squares of a ChArUco board "
+             f"({_SIZES['charuco']}), tags of an AprilGrid ({_SIZES['aprilgrid']}), circles in a row and rows "
+             f"({_SIZES['circles']})")
+SQUARE_HELP = (f"side of a square or of a tag (default {SQUARE_MM:g}), distance of the rows of circles "
+               f"({SPACING_MM:g})")
+
 def add_board_arguments(parser: argparse.ArgumentParser) -> None:
     """Size, squares and markers."""
     board = parser.add_argument_group("board")
+    board.add_argument("--kind", dest="board_kind", choices=tuple(KINDS), help="what it is (default: a chessboard; with "
+                       "--marker-mm a ChArUco board)")
     board.add_argument("--board", metavar="COLSxROWS",
-                       help=f"inner corners of the chessboard (default {BOARD}); with --marker-mm squares of a ChArUco "
-                       f"board (default {CHARUCO}); or a board's file of Kalibr (.yaml) or caliscope (.toml)")
-    board.add_argument("--square-mm", type=positive_number, metavar="S",
-                       help=f"side of a square, as measured (default {SQUARE_MM:g}, as rhot target draws it; printers "
-                       "scale)")
+                       help=f"its size, or its file of Kalibr (.yaml), caliscope or anipose (.toml); {SIZE_HELP}")
+    board.add_argument("--square-mm", type=positive_number, metavar="S", help=f"as measured, for printers scale: "
+                       f"{SQUARE_HELP}")
+    board.add_argument("--tag-spacing", type=positive_number, metavar="R", help="gap between the tags of an AprilGrid, "
+                       f"as a part of their side (default {TAG_SPACING:g})")
     board.add_argument("--marker-mm", type=positive_number, metavar="M",
                        help="side of a marker: the board is a ChArUco board")
     board.add_argument("--dictionary", default="", metavar="NAME", help="its markers (default DICT_4X4_50)")
@@ -123,17 +132,14 @@ def add_board_arguments(parser: argparse.ArgumentParser) -> None:
 
 def board_of(args: argparse.Namespace) -> Board:
     """The board; raises CalibrationError for an impossible one."""
-    from rhot_app.calibration.board.boards import DEFAULT_DICTIONARY, CharucoBoard, Chessboard, parse_size
+    from rhot_app.calibration.board.boards import make_board
     from rhot_app.calibration.exchange.boards import SUFFIXES, read_board
 
     if args.board is not None and args.board.lower().endswith(SUFFIXES):
-        if args.square_mm is not None or args.marker_mm is not None:
-            raise CalibrationError(f"{args.board} says how large the board is; leave --square-mm and --marker-mm out, "
-                                   "or give the size by numbers.")
+        if any(one is not None for one in (args.board_kind, args.square_mm, args.marker_mm, args.tag_spacing)):
+            raise CalibrationError(f"{args.board} says what the board is; leave --kind, --square-mm, --marker-mm and "
+                                   "--tag-spacing out, or give the size by numbers.")
         return read_board(input_file(args.board))
-    square_m = 1e-3 * (args.square_mm or SQUARE_MM)
-    cols, rows = parse_size(args.board or (BOARD if args.marker_mm is None else CHARUCO))
-    if args.marker_mm is None:
-        return Chessboard(cols, rows, square_m)
-    return CharucoBoard(cols, rows, square_m, args.marker_mm * 1e-3,
-                        args.dictionary or DEFAULT_DICTIONARY, args.legacy_pattern)
+    kind = args.board_kind or ("chessboard" if args.marker_mm is None else "charuco")
+    return make_board(kind, args.board, square_mm=args.square_mm, marker_mm=args.marker_mm,
+                      dictionary=args.dictionary or None, legacy=args.legacy_pattern, tag_spacing=args.tag_spacing)

@@ -1,13 +1,23 @@
-"""Boards as files of other programs state them: Kalibr's target and caliscope's ``charuco.toml``."""
+"""Boards as files of other programs state them: Kalibr's target, caliscope's ``charuco.toml``, anipose's
+``config.toml``."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Final
 
-from rhot_app.calibration.board.boards import DEFAULT_DICTIONARY, Board, CharucoBoard, Chessboard
+from rhot_app.calibration.board.boards import (
+    DEFAULT_DICTIONARY,
+    AprilGrid,
+    Board,
+    CharucoBoard,
+    Chessboard,
+    CircleGrid,
+)
+from rhot_app.calibration.board.standard_board import KINDS
 from rhot_app.calibration.exchange.documents import Entry, read_table
 from rhot_app.errors import CalibrationError
+from rhot_node.errors import printable
 
 SUFFIXES: Final = (".yaml", ".yml", ".toml")
 """Of a board's file, which stands where a board's size may stand, too."""
@@ -20,23 +30,54 @@ def read_board(path: Path) -> Board:
     document = read_table(path)
     if document.has("target_type"):
         return _kalibr(document)
+    if document.has("calibration") and document["calibration"].has("board_type"):
+        return _anipose(document["calibration"])
     table = document["charuco"] if document.has("charuco") else document
     if table.has("columns") and table.has("aruco_scale"):
         return _caliscope(table)
-    raise CalibrationError(f"{path}: no board of Kalibr (target_type) or caliscope (charuco).")
+    raise CalibrationError(f"{path}: no board of Kalibr (target_type), caliscope (charuco) or anipose "
+                           "(calibration.board_type).")
 
 
-def _kalibr(target: Entry) -> Chessboard:
-    """Rows and columns of inner corners."""
+def _kalibr(target: Entry) -> Board:
+    """Rows and columns of inner corners, of tags, or of circles, in metres."""
     kind = target["target_type"].text
+    if kind == "aprilgrid":
+        return AprilGrid(target["tagCols"].whole, target["tagRows"].whole, _number(target["tagSize"]),
+                         _number(target["tagSpacing"]))
+    if kind == "circlegrid":
+        if target["asymmetricGrid"].value is not True:
+            raise _unread(target, "circlegrid with the same rows (asymmetricGrid: False), which looks the same turned")
+        return CircleGrid(target["targetCols"].whole, target["targetRows"].whole, _number(target["spacingMeters"]))
     if kind != "checkerboard":
-        raise CalibrationError(f"{target.file}: the target is of the kind {kind!r}, which is not found in pictures "
-                               "here. Print a chessboard or a ChArUco board (rhot target).")
+        raise _unread(target, repr(kind))
     across, down = (_number(target[f"{side}SpacingMeters"]) for side in ("col", "row"))
     if across != down:
         raise CalibrationError(f"{target.file}: its squares are {1e3 * across:g} x {1e3 * down:g} mm; they must be "
                                "square.")
     return Chessboard(target["targetCols"].whole, target["targetRows"].whole, across)
+
+
+def _unread(board: Entry, kind: str) -> CalibrationError:
+    return CalibrationError(f"{board.file}: the board is of the kind {printable(kind)}, which is not found in pictures "
+                            f"here. rhot target draws those that are: {', '.join(KINDS)}.")
+
+
+def _anipose(board: Entry) -> Board:
+    """`board_size` as aniposelib gives it to OpenCV: a checkerboard's inner corners, a ChArUco board's squares; mm."""
+    kind = board["board_type"].text.lower()
+    size = board["board_size"]
+    across, down = size.numbers(2).tolist()
+    if across % 1.0 or down % 1.0:
+        raise size.wrong("is not two whole numbers.")
+    if kind not in ("charuco", "checkerboard"):
+        raise _unread(board, repr(kind))
+    square_m = 1e-3 * _number(board["board_square_side_length"])
+    if kind == "checkerboard":
+        return Chessboard(int(across), int(down), square_m)
+    bits, count = board["board_marker_bits"].whole, board["board_marker_dict_number"].whole
+    return CharucoBoard(int(across), int(down), square_m, 1e-3 * _number(board["board_marker_length"]),
+                        f"DICT_{bits}X{bits}_{count}")
 
 
 def _caliscope(board: Entry) -> CharucoBoard:

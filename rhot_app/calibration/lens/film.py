@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board.boards import Board, Chessboard
+from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView, Gray, detect, to_gray
 from rhot_app.calibration.board.size_check import Beyond, look_beyond
 from rhot_app.calibration.lens.coverage import BLURRED_PX, NEW, STILL_PX, place
@@ -203,7 +203,7 @@ def _search(clip: _Clip, times: Array, board: Board,
             found[number] = None
             if view is not None:
                 moved = (_motion(gray, before[1], view) if before is not None and number == before[0] + 1 else 0.0)
-                beyond = look_beyond(gray, view, board) if isinstance(board, Chessboard) else None
+                beyond = look_beyond(gray, view, board)
                 blur = view.blur_px / BLURRED_PX if np.isfinite(view.blur_px) else 1.0
                 found[number] = FilmView(view, max(blur, moved), beyond)
             elif len(without) < UNEXPLAINED and number >= len(without) * clip.count / UNEXPLAINED:

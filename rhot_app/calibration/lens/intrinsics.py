@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board.boards import Board, CharucoBoard
+from rhot_app.calibration.board.boards import AprilGrid, Board, CharucoBoard, CircleGrid, parse_size
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.poses import BoardErrors
 from rhot_app.calibration.board.shared_views import Dropped
@@ -151,18 +151,21 @@ VERSION: Final = 1
 
 Count = Annotated[int, Meta(ge=0)]
 Millimetres = Annotated[float, Meta(gt=0, le=10_000)]
+Share = Annotated[float, Meta(gt=0, le=1)]
 NotNegative = Annotated[float, Meta(ge=0)]
 
 
 class BoardUsed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The board: `size` is in inner corners for a chessboard, in squares for a ChArUco board."""
+    """The board: `size` is in inner corners for a chessboard, in squares for a ChArUco board, in tags or circles;
+    `square_mm` the side of a square or of a tag, or the spacing of circles."""
 
-    kind: Literal["chessboard", "charuco"]
+    kind: Literal["chessboard", "charuco", "aprilgrid", "circles"]
     size: tuple[Count, Count]
     square_mm: Millimetres
     marker_mm: Millimetres | None = None
     dictionary: str | None = None
     legacy_pattern: bool = False
+    tag_spacing: Share | None = None
 
 
 class IntrinsicsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -228,7 +231,11 @@ def to_file(report: IntrinsicsReport) -> IntrinsicsFile:
 
 
 def _board(board: Board) -> BoardUsed:
-    if isinstance(board, CharucoBoard):
-        return BoardUsed("charuco", (board.squares_x, board.squares_y), board.square_m * 1e3, board.marker_m * 1e3,
-                         board.dictionary, board.legacy)
-    return BoardUsed("chessboard", (board.cols, board.rows), board.square_m * 1e3)
+    size, square_mm = parse_size(board.size_text), board.square_m * 1e3
+    match board:
+        case CharucoBoard():
+            return BoardUsed("charuco", size, square_mm, board.marker_m * 1e3, board.dictionary, board.legacy)
+        case AprilGrid():
+            return BoardUsed("aprilgrid", size, square_mm, tag_spacing=board.spacing)
+        case _:
+            return BoardUsed("circles" if isinstance(board, CircleGrid) else "chessboard", size, square_mm)

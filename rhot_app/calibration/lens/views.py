@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rhot_app.calibration.board.boards import Board, Chessboard
+from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView, Gray, detect
 from rhot_app.calibration.board.shared_views import Dropped
 from rhot_app.calibration.board.size_check import Beyond, look_beyond, size_finding, why_missing
@@ -87,8 +87,7 @@ def read_picture(path: Path, board: Board) -> Read:
     view = detect(gray, board, source=path.name)
     if view is None:
         return Read(path, None, f"the board ({board.text}) was not found", "no_board")
-    beyond = look_beyond(gray, view, board) if isinstance(board, Chessboard) else None
-    return Read(path, view, beyond=beyond)
+    return Read(path, view, beyond=look_beyond(gray, view, board))
 
 
 def open_picture(path: Path) -> tuple[Gray | None, str]:
@@ -137,8 +136,7 @@ def no_board(name: str, reads: Sequence[Read], board: Board) -> str:
 
 def size_of(reads: Sequence[Read], board: Board) -> Finding | None:
     """What the pictures say about the board's size."""
-    beyond = [each.beyond for each in reads if each.beyond is not None]
-    return size_finding(beyond, board) if isinstance(board, Chessboard) else None
+    return size_finding([each.beyond for each in reads if each.beyond is not None], board)
 
 
 def in_natural_order(files: Sequence[Path]) -> list[Path]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from rhot_app.calibration.board.boards import Board, Chessboard
+from rhot_app.calibration.board.boards import AprilGrid, Board, CharucoBoard, Chessboard, CircleGrid
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.poses import PosedView, pose_view
 from rhot_app.calibration.board.shared_views import Dropped
@@ -61,10 +61,10 @@ def explain_shot(doubt: Doubtful, shot: int, second_from_first: Array) -> Droppe
                    "between the pictures, or they are of different moments", "apart")
 
 
-def mirrored_view(view: BoardView, board: Chessboard) -> BoardView:
+def mirrored_view(view: BoardView, board: Chessboard | CircleGrid) -> BoardView:
     """The view as it would be in the picture flipped left to right, with the corners counted as the board says."""
     row, col = np.divmod(view.ids, board.cols)
-    if board.rows % 2 == 0:  # the flip that keeps black squares black
+    if isinstance(board, CircleGrid) or board.rows % 2 == 0:  # the flip that keeps the pattern
         row = board.rows - 1 - row
     else:
         col = board.cols - 1 - col
@@ -77,8 +77,8 @@ def mirrored_view(view: BoardView, board: Chessboard) -> BoardView:
 def _one_mirrored(doubt: Doubtful) -> Finding | None:
     """Whether the pictures of one camera, flipped, make one rig with the other's."""
     board = doubt.board
-    if not isinstance(board, Chessboard):
-        return None  # a mirrored ChArUco board is not found at all
+    if isinstance(board, CharucoBoard | AprilGrid):
+        return None  # mirrored, these are not found at all
     for which in (1, 0):
         flipped = [_flip(view, board, doubt.lenses[which]) for view in doubt.views[which]]
         sides = list(doubt.views)
@@ -104,7 +104,7 @@ def _culprit(names: tuple[str, str], flipped: int, found: Link) -> str:
     return names[flipped] if offset < 0.0 else names[1 - flipped]
 
 
-def _flip(posed: PosedView | None, board: Chessboard, lens: LensStart) -> PosedView | None:
+def _flip(posed: PosedView | None, board: Chessboard | CircleGrid, lens: LensStart) -> PosedView | None:
     if posed is None:
         return None
     flipped = lens.mirrored() if lens.origin == "views" else lens

@@ -63,7 +63,9 @@ def measure_squares(used: Sequence[Sequence[BoardView | None]], board: Board, st
 
     `noise_px` of the corners per axis.
     """
-    sides, spans, off, expected = [np.empty(0)], [(0.0, 0)], [np.empty(0)], [np.empty(0)]
+    sides, spans, off, expected = [np.empty(0)], [(0.0, 0.0)], [np.empty(0)], [np.empty(0)]
+    drawn = board.object_points().reshape(board.rows, board.cols, 3) / board.square_m
+    drawn_lines = (*drawn, *drawn.transpose(1, 0, 2))
     for those in used:
         pixels = np.full((len(those), board.count, 2), np.nan)
         for camera, view in enumerate(those):
@@ -72,8 +74,9 @@ def measure_squares(used: Sequence[Sequence[BoardView | None]], board: Board, st
         points, covariances = locate_with_covariance(pixels, state)
         grid = points.reshape(board.rows, board.cols, 3)
         lines = (*grid, *grid.transpose(1, 0, 2))
-        sides += [np.linalg.norm(np.diff(line, axis=0), axis=1) for line in lines]
-        spans += [_span(line) for line in lines]
+        for line, of in zip(lines, drawn_lines, strict=True):
+            sides.append(np.linalg.norm(np.diff(line, axis=0), axis=1) / np.linalg.norm(np.diff(of, axis=0), axis=1))
+            spans.append(_span(line, of))
         distances, normal = _off_plane(points)
         off.append(distances)
         expected.append(noise_px**2 * np.einsum("i,nij,j->n", normal, covariances, normal))
@@ -106,12 +109,14 @@ def epipolar_px(used: Sequence[Sequence[BoardView | None]], state: BundleState, 
     return float(np.sqrt(np.nanmean(np.concatenate(squares)))) if squares else float("nan")
 
 
-def _span(line: Array) -> tuple[float, int]:
-    """Distance in m between the first and the last located corner of a line (N, 3), and how many squares that is."""
+def _span(line: Array, drawn: Array) -> tuple[float, float]:
+    """Distance in m between the first and the last located corner of a line (N, 3), and how many squares that is on the
+    board, by its corners `drawn` (N, 3) in squares."""
     located = np.flatnonzero(np.isfinite(line).all(axis=1))
     if len(located) < 2:
-        return 0.0, 0
-    return float(np.linalg.norm(line[located[-1]] - line[located[0]])), int(located[-1] - located[0])
+        return 0.0, 0.0
+    first, last = located[0], located[-1]
+    return float(np.linalg.norm(line[last] - line[first])), float(np.linalg.norm(drawn[last] - drawn[first]))
 
 
 def _homogeneous(pixels: Array, lens: Array) -> tuple[Array, Array]:

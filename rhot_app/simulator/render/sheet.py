@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board.boards import Board, CharucoBoard
+from rhot_app.calibration.board.boards import CharucoBoard, Chessboard
 from rhot_app.objects.object_file import Tag
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ class Sheet:
         return np.asarray(self.outline.mean(axis=0))
 
 
-def board_sheet(board: Board) -> Sheet:
+def board_sheet(board: Chessboard | CharucoBoard) -> Sheet:
     """The printed board on white paper."""
     squares_x, squares_y = board.cols + 1, board.rows + 1
     rows, columns = np.indices((squares_y, squares_x))

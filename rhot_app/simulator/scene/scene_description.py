@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 from msgspec import Meta
 
-from rhot_app.calibration.board.boards import DEFAULT_DICTIONARY, Board, CharucoBoard, Chessboard, parse_size
+from rhot_app.calibration.board.boards import DEFAULT_DICTIONARY, CharucoBoard, Chessboard, parse_size
 from rhot_app.calibration.board.standard_board import BOARD, MARKER_SHARE, SQUARE_MM
 
 NEAREST_M: Final = 0.15
@@ -57,7 +57,7 @@ class BoardShow(_Show, frozen=True, tag="board"):
     legacy: bool = False
     on_table: bool = False
 
-    def board(self) -> Board:
+    def board(self) -> Chessboard | CharucoBoard:
         """The board itself; raises CalibrationError when there can be none like it."""
         across, down = parse_size(self.size)
         square_m = 1e-3 * self.square_mm

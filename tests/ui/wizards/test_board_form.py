@@ -12,10 +12,11 @@ from fake_engine import synthetic_rig
 from msgspec.structs import replace as replace_fields
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QLabel
 from wizard_rig import FakeMemory
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.board.boards import STANDARD_BOARD, CharucoBoard, Chessboard
+from rhot_app.calibration.board.boards import STANDARD_BOARD, AprilGrid, CharucoBoard, Chessboard, CircleGrid
 from rhot_app.calibration.board.size_check import Beyond
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
 from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep, fields_from, remembered_fields
@@ -42,6 +43,8 @@ def test_fields_make_boards():
     assert BoardFields(square_mm=24.6).to_print() == STANDARD_BOARD
     charuco = BoardFields("charuco", 8, 6, 25.0, 20.0, "DICT_5X5_100", True).board()
     assert charuco == CharucoBoard(8, 6, 0.025, 0.02, "DICT_5X5_100", legacy=True)
+    assert BoardFields("aprilgrid", 6, 6, 88.0, tag_spacing=0.25).board() == AprilGrid(6, 6, 0.088, 0.25)
+    assert BoardFields("circles", 4, 11).board() == CircleGrid(4, 11, 0.02)
 
 
 def test_fields_are_remembered_and_nonsense_is_forgotten():
@@ -136,6 +139,19 @@ def test_the_page_hides_what_a_chessboard_has_not_and_undoes(qtbot, page, memory
         pass
     page.show_view(step.view())
     assert page.square.text() == "" and page.kind.currentData() == "chessboard"
+
+
+@pytest.mark.parametrize(("kind", "board", "measured", "has_gap"), [
+    ("aprilgrid", AprilGrid(7, 5, 0.024, 0.3), "Tag", True), ("circles", CircleGrid(4, 11, 0.024), "Spacing", False)])
+def test_other_boards_are_chosen_measured_and_remembered(qtbot, page, memory, kind, board, measured, has_gap):
+    page.kind.setCurrentIndex(page.kind.findData(kind))
+    qtbot.keyClicks(page.square, "24")
+    assert page.step.board == board and remembered_fields(memory[MEMORY]).kind == kind
+    labels = [label.text() for label in page.findChildren(QLabel) if label.isVisible()]
+    assert any(text.startswith(measured) for text in labels)
+    assert page.spacing.isVisible() is has_gap and not page.marker.isVisible()
+    qtbot.mouseClick(page.print_button, Qt.MouseButton.LeftButton)
+    assert f"{kind}_{board.size_text}" in page.note.text()
 
 
 def test_what_was_measured_last_is_offered_and_not_filled_in(qtbot, page, memory):

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 from platformdirs import user_documents_path
 from PySide6.QtCore import QLocale, QRegularExpression, QUrl
 from PySide6.QtGui import QDesktopServices, QRegularExpressionValidator
-from PySide6.QtWidgets import QCheckBox, QComboBox, QFormLayout, QLabel, QLineEdit, QPushButton, QSpinBox, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QSpinBox,
+    QWidget,
+)
 
-from rhot_app.calibration.board.standard_board import BOARD, SQUARE_MM
+from rhot_app.calibration.board.standard_board import BOARD, KINDS, SQUARE_MM
 from rhot_app.calibration.board.target import write_target
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.framework.page import Page
@@ -26,9 +37,32 @@ from rhot_app.ui.wizards.models.board_form import (
 from rhot_app.ui.wizards.models.step import StepView
 
 MEMORY = "board"
-_KINDS = (("chessboard", "Chessboard"), ("charuco", "ChArUco board"))
-_NOTE = ("Measure ten squares with a ruler and divide by ten: printers scale. The scale of everything that is measured "
-         "later comes from this number.")
+_NOTE = ("Measure ten with a ruler and divide by ten: printers scale. The scale of everything that is measured later "
+         "comes from this number.")
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    """How the form speaks of one kind of board: its name, what is counted and how, and what is measured."""
+
+    name: str
+    counted: str
+    counting: str
+    measured: str
+    measuring: str
+
+
+_WORDS = {
+    "chessboard": _Words("Chessboard", "Inner corners", "Count the points where four squares meet: a board of 10 × 7 "
+                         "squares has 9 × 6.", "Square, mm", "The side of one square as it came out of the printer."),
+    "charuco": _Words("ChArUco board", "Squares", "Count the squares.", "Square, mm",
+                      "The side of one square as it came out of the printer."),
+    "aprilgrid": _Words("AprilGrid (Kalibr)", "Tags", "Count the tags: tagCols, tagRows of Kalibr's file.", "Tag, mm",
+                        "The side of a tag's black square, tagSize in Kalibr's file (which has metres)."),
+    "circles": _Words("Circles, asymmetric", "Circles", "Count the circles in one row, and then the rows: 4 × 11 is "
+                      "usual.", "Spacing, mm", "From one row of circles to the next, which is half as far as from one "
+                      "circle to the next in its row."),
+}
 
 
 class BoardPage(Page):
@@ -41,26 +75,29 @@ class BoardPage(Page):
         self._filling = False
         self._shown: BoardFields | None = None
         self.kind = QComboBox()
-        for value, text in _KINDS:
-            self.kind.addItem(text, value)
+        for value, words in _WORDS.items():
+            self.kind.addItem(words.name, value)
         self.cols, self.rows = _count(), _count()
         self.square, self.marker = LengthField(), LengthField()
-        self.square.setToolTip("The side of one square as it came out of the printer, in mm.")
+        self.spacing = QDoubleSpinBox()
+        self.spacing.setRange(0.1, 1.0)
+        self.spacing.setSingleStep(0.05)
+        self.spacing.setToolTip("The gap between two tags as a part of their side, tagSpacing in Kalibr's file.")
         self.dictionary = QComboBox()
         self.dictionary.addItems(DICTIONARIES)
         self.legacy = QCheckBox("printed with OpenCV before 4.6")
         self.legacy.setToolTip("Older programs began ChArUco boards with an even number of rows with a white square.")
         self._form = QFormLayout()
         self._form.setSpacing(8)
-        self._cols_label, self._rows_label = QLabel(), QLabel()
+        self._cols_label, self._rows_label, self._square_label = QLabel(), QLabel(), QLabel()
         for label, field in (("Board", self.kind), (self._cols_label, self.cols), (self._rows_label, self.rows),
-                             ("Square, mm", self.square), ("Marker, mm", self.marker), ("Family", self.dictionary)):
+                             (self._square_label, self.square), ("Gap, of a tag", self.spacing),
+                             ("Marker, mm", self.marker), ("Family", self.dictionary)):
             self._form.addRow(label, field)
         self._form.addRow(self.legacy)
         self.print_button = QPushButton("Print this board")
         self.print_button.setAutoDefault(False)
-        self.print_button.setToolTip(f"Writes it as a PDF with squares of {SQUARE_MM:g} mm and a ruler, and opens that "
-                                     "to be printed.")
+        self.print_button.setToolTip("Writes it as a PDF of the usual size with a ruler, and opens that to be printed.")
         self.print_button.clicked.connect(self._print)
         self.note = QLabel(_NOTE)
         self.note.setWordWrap(True)
@@ -81,7 +118,7 @@ class BoardPage(Page):
         self.kind.currentIndexChanged.connect(self._kind_changed)
         self.dictionary.currentIndexChanged.connect(self._take)
         self.legacy.toggled.connect(self._take)
-        for box in (self.cols, self.rows):
+        for box in (self.cols, self.rows, self.spacing):
             box.valueChanged.connect(self._take)
         for field in (self.square, self.marker):
             field.textChanged.connect(self._take)
@@ -110,7 +147,8 @@ class BoardPage(Page):
             return
         fields = BoardFields(kind=self.kind.currentData(), cols=self.cols.value(), rows=self.rows.value(),
                              square_mm=self.square.value, marker_mm=self.marker.value,
-                             dictionary=self.dictionary.currentText(), legacy=self.legacy.isChecked())
+                             dictionary=self.dictionary.currentText(), legacy=self.legacy.isChecked(),
+                             tag_spacing=self.spacing.value())
         self._board.change(fields)
         self._remember(fields)
         self._show_kind(fields)
@@ -130,6 +168,7 @@ class BoardPage(Page):
         self.rows.setValue(fields.rows)
         self.square.set_value(fields.square_mm)
         self.marker.set_value(fields.marker_mm)
+        self.spacing.setValue(fields.tag_spacing)
         self.dictionary.setCurrentText(fields.dictionary)
         self.legacy.setChecked(fields.legacy)
         self._filling = False
@@ -142,21 +181,23 @@ class BoardPage(Page):
         charuco = fields.kind == "charuco"
         for widget in (self.marker, self.dictionary):
             self._form.setRowVisible(widget, charuco)
+        self._form.setRowVisible(self.spacing, fields.kind == "aprilgrid")
         self.legacy.setVisible(charuco and fields.rows % 2 == 0)
         usual = "" if fields.square_mm is None else f"{usual_marker_mm(fields.square_mm):g}"
         self.marker.setPlaceholderText(usual or "three quarters of a square")
-        what = "Squares" if charuco else "Inner corners"
-        self._cols_label.setText(f"{what} across")
-        self._rows_label.setText(f"{what} down")
-        tip = ("Count the squares." if charuco else
-               "Count the points where four squares meet: a board of 10 × 7 squares has 9 × 6.")
+        words = _WORDS[fields.kind]
+        self._cols_label.setText(f"{words.counted} across")
+        self._rows_label.setText("Rows of circles" if fields.kind == "circles" else f"{words.counted} down")
+        self._square_label.setText(words.measured)
+        self.square.setToolTip(words.measuring)
         for box in (self.cols, self.rows):
-            box.setToolTip(tip)
+            box.setToolTip(words.counting)
 
     def _print(self) -> None:
         """Write the board beside the recordings and open it, so that the desktop's own program prints it."""
         board = self._board.fields.to_print()
-        path = user_documents_path() / "RHOT" / f"board_{board.size_text}_{SQUARE_MM:g}mm.pdf"
+        kind = self._board.fields.kind
+        path = user_documents_path() / "RHOT" / f"{kind}_{board.size_text}_{KINDS[kind][1]:g}mm.pdf"
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_target(path, board, _paper())
@@ -196,7 +237,7 @@ class LengthField(QLineEdit):
 
 def _count() -> QSpinBox:
     box = QSpinBox()
-    box.setRange(3, 60)
+    box.setRange(2, 60)
     return box
 
 

@@ -9,17 +9,10 @@ from typing import Literal
 
 import msgspec
 
-from rhot_app.calibration.board.boards import (
-    DEFAULT_DICTIONARY,
-    Board,
-    CharucoBoard,
-    Chessboard,
-    parse_size,
-    same_pattern,
-)
+from rhot_app.calibration.board.boards import DEFAULT_DICTIONARY, Board, make_board, parse_size, same_pattern
 from rhot_app.calibration.board.corners import BoardView, detect, to_gray
 from rhot_app.calibration.board.size_check import Beyond, look_beyond, size_finding, why_missing
-from rhot_app.calibration.board.standard_board import BOARD, CHARUCO, MARKER_SHARE, SQUARE_MM
+from rhot_app.calibration.board.standard_board import KINDS, MARKER_SHARE, TAG_SPACING
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.models.drawing import board_marks
@@ -29,14 +22,15 @@ DICTIONARIES = (DEFAULT_DICTIONARY, "DICT_4X4_250", "DICT_5X5_100", "DICT_5X5_25
                 "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_36h11")
 _WHY_S = 2.0  # between looks into why no board is seen
 _JUDGED, _JUDGED_LEAST = 30, 4  # views that judge the board's size
-UNMEASURED = "Next waits for the size of a square: every length that is measured later comes from it."
-Kind = Literal["chessboard", "charuco"]
-SIZES: dict[Kind, tuple[int, int]] = {"chessboard": parse_size(BOARD), "charuco": parse_size(CHARUCO)}
+UNMEASURED = "Next waits for this size: every length that is measured later comes from it."
+Kind = Literal["chessboard", "charuco", "aprilgrid", "circles"]
+SIZES: dict[str, tuple[int, int]] = {kind: parse_size(size) for kind, (size, _) in KINDS.items()}
 """Of the boards that are printed where nobody says otherwise."""
 
 
 class BoardFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What stands in the form: `cols` x `rows` are inner corners of a chessboard, squares of a ChArUco board.
+    """What stands in the form: `cols` x `rows` are inner corners of a chessboard, squares of a ChArUco board, tags of
+    an AprilGrid, or circles in a row and rows; `square_mm` the side of a square or tag, or the spacing of circles.
 
     `square_mm` is None until a person has measured it: a number that stood there already would be believed. Without
     `marker_mm` a marker is the usual share of its square.
@@ -49,15 +43,16 @@ class BoardFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     marker_mm: float | None = None
     dictionary: str = DEFAULT_DICTIONARY
     legacy: bool = False
+    tag_spacing: float = TAG_SPACING
 
     def board(self) -> Board:
         """The board described, of the usual size as long as it is not measured; raises CalibrationError for one that
         cannot be."""
-        square_mm = SQUARE_MM if self.square_mm is None else self.square_mm
-        if self.kind == "chessboard":
-            return Chessboard(self.cols, self.rows, 1e-3 * square_mm)
-        marker_mm = usual_marker_mm(square_mm) if self.marker_mm is None else self.marker_mm
-        return CharucoBoard(self.cols, self.rows, 1e-3 * square_mm, 1e-3 * marker_mm, self.dictionary, self.legacy)
+        charuco, tags = self.kind == "charuco", self.kind == "aprilgrid"
+        return make_board(self.kind, f"{self.cols}x{self.rows}", square_mm=self.square_mm,
+                          marker_mm=self.marker_mm if charuco else None,
+                          dictionary=self.dictionary if charuco else None, legacy=charuco and self.legacy,
+                          tag_spacing=self.tag_spacing if tags else None)
 
     def to_print(self) -> Board:
         """The same board as it is drawn: with squares of the usual size, whatever came out of the printer."""
@@ -116,9 +111,8 @@ class BoardSearch:
         now_s = time.monotonic()
         if seen:
             self._next_why_s = now_s + _WHY_S
-            beyond = tuple(look_beyond(to_gray(pictures[name].bgr), view, board) for name, view in seen.items()
-                           ) if isinstance(board, Chessboard) else ()
-            return BoardObservation(board, pictures, views, beyond, "")
+            beyond = (look_beyond(to_gray(pictures[name].bgr), view, board) for name, view in seen.items())
+            return BoardObservation(board, pictures, views, tuple(one for one in beyond if one is not None), "")
         if now_s < self._next_why_s or not pictures:
             return BoardObservation(board, pictures, views)
         self._next_why_s = now_s + _WHY_S
@@ -140,7 +134,7 @@ class BoardSearch:
 
     def size_finding(self, board: Board | None) -> Finding | None:
         """What the pictures say against the board's size."""
-        if not isinstance(board, Chessboard) or len(self._beyond) < _JUDGED_LEAST:
+        if board is None or len(self._beyond) < _JUDGED_LEAST:
             return None
         return size_finding(tuple(self._beyond), board)
 
@@ -223,7 +217,7 @@ class BoardStep(Step):
             return StepView("Count the corners again.", hint=f"{wrong.figure} {wrong.cause}", annotated=annotated)
         if self._fields.square_mm is None:
             hint = " ".join(filter(None, (UNMEASURED, self._hint())))
-            return StepView("Measure the squares and type their size.", hint=hint, annotated=annotated)
+            return StepView(f"Measure the {self.board.parts} and type their size.", hint=hint, annotated=annotated)
         return StepView(self._sentence(found), done=search.recognised, passable=True,
                         hint=self._hint(), annotated=annotated)
 
@@ -236,9 +230,9 @@ class BoardStep(Step):
     def _hint(self) -> str:
         if self._search.missing:
             return self._search.missing
-        if isinstance(self.board, Chessboard) and not self.board.one_way_up:
+        if self.board is not None and not self.board.one_way_up:
             return ("This board looks the same turned by 180°: hold it the same way up all the time, or use one with "
-                    "an even and an odd number of corners.")
+                    "an even and an odd number of corners, or with an odd number of rows of circles.")
         return ""
 
 
