@@ -31,7 +31,7 @@ CIRCLES: Final = "4x11"
 SPACING_MM: Final = 20.0
 """Between two rows of circles."""
 
-CIRCLE_SHARE: Final = 1.0
+CIRCLE_DIAMETER: Final = 1.0
 """Diameter of a circle as drawn, as a share of the spacing. It is measured in the pictures."""
 
 SQUARE_MM: Final = 25.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from rhot_app.calibration.board.aprilgrid import tag_cells
 from rhot_app.calibration.board.boards import AprilGrid, Board, CharucoBoard, Chessboard, CircleGrid, scaled
-from rhot_app.calibration.board.standard_board import CIRCLE_SHARE
+from rhot_app.calibration.board.standard_board import CIRCLE_DIAMETER
 from rhot_app.errors import CalibrationError
 from rhot_node.files import write_atomically
 
@@ -115,7 +115,7 @@ def _shapes(board: Board) -> tuple[tuple[Box, ...], tuple[Disc, ...]]:
             return tuple(_tag_boxes(board)), ()
         case CircleGrid():
             spacing = 1e3 * board.square_m
-            return (), tuple(Disc(spacing + 1e3 * x, spacing + 1e3 * y, 0.5 * CIRCLE_SHARE * spacing)
+            return (), tuple(Disc(spacing + 1e3 * x, spacing + 1e3 * y, 0.5 * CIRCLE_DIAMETER * spacing)
                              for x, y, _ in board.object_points().tolist())
         case _:
             return tuple(_square_boxes(board)), ()

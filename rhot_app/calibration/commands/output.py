@@ -116,8 +116,8 @@ SQUARE_HELP = (f"side of a square or of a tag (default {SQUARE_MM:g}), distance 
 def add_board_arguments(parser: argparse.ArgumentParser) -> None:
     """Size, squares and markers."""
     board = parser.add_argument_group("board")
-    board.add_argument("--kind", dest="board_kind", choices=tuple(KINDS), help="what it is (default: a chessboard; with "
-                       "--marker-mm a ChArUco board)")
+    board.add_argument("--kind", dest="board_kind", choices=tuple(KINDS),
+                       help="what it is (default: a chessboard; with --marker-mm a ChArUco board)")
     board.add_argument("--board", metavar="COLSxROWS",
                        help=f"its size, or its file of Kalibr (.yaml), caliscope or anipose (.toml); {SIZE_HELP}")
     board.add_argument("--square-mm", type=positive_number, metavar="S", help=f"as measured, for printers scale: "
