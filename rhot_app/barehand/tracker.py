@@ -39,8 +39,9 @@ from rhot_app.barehand.start import (
 )
 from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, PALM, SHAPE, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
-from rhot_app.estimation.filter import IteratedFilter, Knot, Partial, update
+from rhot_app.estimation.filter import Knot, Partial, update
 from rhot_app.estimation.residual import Residual
+from rhot_app.estimation.track import TrackFilter
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import build_model, with_locked
@@ -143,14 +144,14 @@ class BareHandTracker:
         self.process = HandProcess(self.surface.dh, self.model.limits, prior.mean,
                                    np.asarray(np.linalg.inv(prior.information)), PALM_SPREAD, self.slowest, FASTEST,
                                    self.shape_covariance, self.shape_s)
-        self.filter = IteratedFilter(self.process)
+        self.filter = TrackFilter(self.process)
         self.constraints: list[Residual] = [JointLimits(self.model.limits)]
         if self.plane is not None:
             self.constraints.append(self.plane)
         self.tracking = False
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
-        self._sequence, self._epoch_ns, self._first_update = 0, 0, False
+        self._sequence, self._first_update = 0, False
         self.relocaliser = Relocaliser(self.model, self.surface, self.cameras, self.plane)
         self.start_pose = shown_pose(rig, self.cameras, self.model, self.plane, lateral_m)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
@@ -159,11 +160,10 @@ class BareHandTracker:
         """Start a track at a pose whose position, rotation and angles have standard deviations `place_sd`, m, rad and
         rad. Contours also fit what is no hand, so something
         else must have shown the pose: a person who has taken `start_pose`, or markers."""
-        self._epoch_ns = t_ns
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, place_sd[:2])
         known = np.linalg.inv(covariance[6:POSE, 6:POSE]) + np.eye(POSE - 6) / place_sd[2] ** 2
         covariance[6:POSE, 6:POSE] = np.linalg.inv(known)
-        self.filter.start(0.0, state, covariance)
+        self.filter.begin(t_ns, state, covariance)
         self.tracking = self._first_update = True
         self._taken_s = [-np.inf] * len(self.cameras)
         self.relocaliser.restart()
@@ -213,7 +213,7 @@ class BareHandTracker:
                late_s: Mapping[int, float] | None = None) -> Knot:
         """Update the state at master time `t_ns` by the images of some cameras and by `extra` residuals of the same
         state. `late_s`: each image's time less that instant, s; 0 by default."""
-        t_s, late = 1e-9 * (t_ns - self._epoch_ns), late_s or {}
+        t_s, late = self.filter.seconds(t_ns), late_s or {}
         prediction, since_s = self.filter.predict(t_s), t_s - self.filter.newest.t_s
         self.prepare_update(images, t_s)
         self.frames = [frame if c in images else None for c, frame in enumerate(self.frames)]
@@ -360,7 +360,7 @@ class BareHandTracker:
             joints[1:], angles[:] = int(Knowledge.GUESSED), int(Knowledge.GUESSED)
         turn_sd, pose = float(np.sqrt(np.trace(covariance[3:6, 3:6]))), pose_of(state)
         self._sequence += 1
-        nowhere = no_hand(self._epoch_ns + round(1e9 * knot.t_s),
+        nowhere = no_hand(self.filter.newest_ns,
                           Condition.TRACKING if np.all(observing[[*range(6)]] >= 1) else Condition.PARTIAL, self.names,
                           time.perf_counter() - begun, markers)
         return replace(

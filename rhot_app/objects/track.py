@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics, Part
-from rhot_app.estimation.filter import FilteredState, IteratedFilter, Knot
+from rhot_app.estimation.filter import FilteredState, Knot
 from rhot_app.estimation.residual import Residual
+from rhot_app.estimation.track import PREDICTED_NS, Life, TrackFilter
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.objects.motion import SIZE, TWIST, VELOCITY, CameraArrays, ObjectProcess, StatePrior, pose_of
 from rhot_app.objects.object_file import ObjectModel, require_distinct
@@ -43,9 +44,6 @@ chi-squared."""
 
 REJECTIONS = 3
 """Frames rejected in a row that are no outliers: most corners of three frames are rejected with a chance of 1e-9."""
-
-PREDICTED_AFTER_NS, LOST_AFTER_NS = 100_000_000, 500_000_000
-"""No accepted observation for so long: the state is predicted, and lost (as a hand, `estimator.LOST_AFTER_NS`)."""
 
 FORGET = 1e-4
 """Probability under which a hypothesis is dropped: a hundredth of an ambiguous one's."""
@@ -150,7 +148,7 @@ def _innovation_cost(error: Array, jacobian: Array, covariance: Array) -> float:
 
 @dataclass(slots=True)
 class _Hypothesis:
-    filter: IteratedFilter
+    filter: TrackFilter
     log_weight: float
 
 
@@ -160,46 +158,45 @@ class ObjectTrack:
     def __init__(self, name: str) -> None:
         self.name, self._process = name, ObjectProcess()
         self._hypotheses: list[_Hypothesis] = []
-        self._epoch_ns = self._accepted_ns = 0
-        self._rejected, self._ever = 0, False
+        self._life, self._rejected = Life(), 0
 
     def take(self, measurement: Measurement) -> bool:
         """Weigh a measurement; whether it was accepted. One from before the oldest knot is not."""
         t_ns = measurement.t_ns
-        if self._hypotheses and t_ns - self._accepted_ns > LOST_AFTER_NS:
+        if self._life.lost(t_ns):
             self._hypotheses.clear()
         if not self._hypotheses:
             return self._start(measurement)
-        t_s = 1e-9 * (t_ns - self._epoch_ns)
-        if t_s < self._hypotheses[0].filter.knots[0].t_s:
+        if self._hypotheses[0].filter.forgot(t_ns):
             return False
-        if self._update(measurement, t_s):
-            self._accepted_ns, self._rejected = max(self._accepted_ns, t_ns), 0
+        if self._update(measurement):
+            self._life.observe(t_ns)
+            self._rejected = 0
             return True
         self._rejected += 1
         return self._rejected >= REJECTIONS and self._start(measurement)
 
     def predicts(self, measurement: Measurement) -> bool:
         """Whether a hypothesis accepts a measurement; False without a track."""
-        t_s = 1e-9 * (measurement.t_ns - self._epoch_ns)
-        return measurement.t_ns - self._accepted_ns <= LOST_AFTER_NS and any(
-            t_s >= one.filter.knots[0].t_s and measurement.gate(*one.filter.predict(t_s)).residual is not None
+        t_ns = measurement.t_ns
+        return not self._life.lost(t_ns) and any(
+            not one.filter.forgot(t_ns) and measurement.gate(*one.filter.predict_ns(t_ns)).residual is not None
             for one in self._hypotheses)
 
     def state(self, t_ns: int) -> ObjectState:
         """The state at master time `t_ns` by the measurements before it. The newest ones are kept for that: at an
         earlier time than all of them it is that of the oldest."""
-        if not self._hypotheses or t_ns - self._accepted_ns > LOST_AFTER_NS:
-            return unknown_object(self.name, t_ns, Validity.LOST if self._ever else Validity.SEARCHING)
+        if not self._hypotheses or self._life.lost(t_ns):
+            return unknown_object(self.name, t_ns, Validity.LOST if self._life.ever else Validity.SEARCHING)
         best = self._hypotheses[0]
-        t_s = max(1e-9 * (t_ns - self._epoch_ns), best.filter.knots[0].t_s)
+        t_s = max(best.filter.seconds(t_ns), best.filter.knots[0].t_s)
         state, covariance = best.filter.predict(t_s)
         validity = Validity.TRACKED
         if len(self._hypotheses) > 1 and math.exp(self._hypotheses[1].log_weight) >= AMBIGUOUS:
             validity = Validity.AMBIGUOUS
-        elif t_ns - self._accepted_ns > PREDICTED_AFTER_NS:
+        elif self._life.predicted(t_ns):
             validity = Validity.PREDICTED
-        return ObjectState(self.name, self._epoch_ns + round(1e9 * t_s), validity, pose_of(state),
+        return ObjectState(self.name, best.filter.time_ns(t_s), validity, pose_of(state),
                            covariance[:TWIST, :TWIST], state[VELOCITY:])
 
     def estimate(self) -> tuple[int, FilteredState] | None:
@@ -209,32 +206,31 @@ class ObjectTrack:
             return None
         best = self._hypotheses[0].filter
         knot = best.newest
-        return (self._epoch_ns + round(1e9 * knot.t_s),
-                FilteredState(knot.t_s, knot.state, knot.covariance, self._process, id(best)))
+        return best.newest_ns, FilteredState(knot.t_s, knot.state, knot.covariance, self._process, id(best))
 
     def _start(self, measurement: Measurement) -> bool:
         modes = measurement.modes()
         if not modes:
             return False
-        self._epoch_ns = self._accepted_ns = measurement.t_ns
-        self._rejected, self._ever = 0, True
+        self._life.begin(measurement.t_ns)
+        self._rejected = 0
         self._hypotheses.clear()
         for mode in modes:
-            started = IteratedFilter(self._process)
-            started.start(0.0, mode.state, mode.covariance)
+            started = TrackFilter(self._process)
+            started.begin(measurement.t_ns, mode.state, mode.covariance)
             self._hypotheses.append(_Hypothesis(started, math.log(max(mode.probability, 1e-300))))
         self._normalise()
         return True
 
-    def _update(self, measurement: Measurement, t_s: float) -> bool:
+    def _update(self, measurement: Measurement) -> bool:
         """Update every hypothesis that accepts the measurement; for the others it is an outlier. False, and nothing is
         changed, when none does."""
         accepting, rejecting, younger = [], [], []
         for hypothesis in self._hypotheses:
-            if t_s < hypothesis.filter.knots[0].t_s:  # it began with a later frame of another camera
+            if hypothesis.filter.forgot(measurement.t_ns):  # it began with a later frame of another camera
                 younger.append(hypothesis)
                 continue
-            prediction = hypothesis.filter.predict(t_s)
+            prediction = hypothesis.filter.predict_ns(measurement.t_ns)
             gated = measurement.gate(*prediction)
             if gated.residual is None:
                 rejecting.append(hypothesis)
@@ -244,7 +240,7 @@ class ObjectTrack:
         kept: list[_Hypothesis] = []
         for hypothesis, residual, cost, prediction in accepting:
             try:
-                knot = hypothesis.filter.add(t_s, [residual], prediction)
+                knot = hypothesis.filter.add(hypothesis.filter.seconds(measurement.t_ns), [residual], prediction)
             except np.linalg.LinAlgError:  # the estimate contradicts itself
                 continue
             hypothesis.log_weight -= 0.5 * min(cost, least + REJECTION)
@@ -267,7 +263,7 @@ class ObjectTrack:
         pair = measurement.pair(knot.state, prediction)
         if pair is None:
             return []
-        second = IteratedFilter(self._process)
+        second = TrackFilter(self._process, first.filter.begun_ns)
         second.start(knot.t_s, pair[1].state, pair[1].covariance)
         return [_Hypothesis(second, first.log_weight + log_mass(pair[1]) - log_mass(pair[0]))]
 
@@ -352,7 +348,7 @@ class ObjectTracker:
         if view is None:
             return frame.t_row0_master_ns
         others = [other for camera, other in newest.items()
-                  if camera != view.camera and abs(view.t_ns - other.t_ns) < PREDICTED_AFTER_NS]
+                  if camera != view.camera and abs(view.t_ns - other.t_ns) < PREDICTED_NS]
         newest[view.camera] = view
         track.take(PointMeasurement(self._points[number], self._cameras, view, others))
         return view.t_ns

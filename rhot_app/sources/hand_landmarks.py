@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.estimation.track import LOST_NS
 from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.project import OTHER_HAND, Rig
 from rhot_app.tracking.tracker import CameraObservations
@@ -30,9 +31,6 @@ PROBABILITY_MAX: Final = 0.98
 
 ASSOCIATION_GATE: Final = 0.5
 """Mean distance of landmarks from where a hand is predicted, as a part of its extent, from which it is another one."""
-
-TRACK_TIMEOUT_NS: Final = 500_000_000
-"""A hand that was not seen for so long is another one when it comes (`estimator.LOST_AFTER_NS`)."""
 
 HYSTERESIS: Final = 1.0
 """Log odds by which another hand must be likelier to take a hand's place: 73 to 27 %."""
@@ -152,7 +150,7 @@ class LandmarkMarkers:
 
     def _followed(self, found: Sequence[LandmarkedHand], t_ns: int) -> list[_Track]:
         """The track of each hand of a frame: the nearest one, or a new one."""
-        self._tracks = [track for track in self._tracks if abs(t_ns - track.t_ns) < TRACK_TIMEOUT_NS]
+        self._tracks = [track for track in self._tracks if abs(t_ns - track.t_ns) < LOST_NS]
         hands = []
         for one in found:
             points = np.array(one.points)

@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics
+from rhot_app.estimation.track import LOST_NS
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays
@@ -31,8 +32,9 @@ from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
 
-LOST_AFTER_S = 0.5
-"""No marker measured for this long: the hand is lost, not merely hidden."""
+LOST_S = 1e-9 * LOST_NS
+"""A hand without any marker keeps its last pose this long, as a guess. Fingertips carry a hand whose wrist is out of
+sight, but after this long the rest of it is a guess as well."""
 
 
 class ClassicTracker:
@@ -154,7 +156,7 @@ class ClassicTracker:
     def _condition(self, t_s: float, paired: Paired) -> Condition:
         if self._measured_s is None:
             return Condition.SEARCHING
-        if np.count_nonzero(paired.live) < 2 or t_s - self._measured_s > LOST_AFTER_S:
+        if np.count_nonzero(paired.live) < 2 or t_s - self._measured_s > LOST_S:
             return Condition.LOST
         return Condition.TRACKING if self._all_measured else Condition.PARTIAL
 
@@ -214,10 +216,6 @@ _ANGLES_OF = np.array([(angles.start, angles.stop) for angles in ANGLE_SLICES])
 TARGET_SD_M = 1e-3
 """What a located marker is worth at working distance: a nearly stretched finger is not bent to meet noise."""
 
-FORGET_S = 0.5
-"""A hand without any marker keeps its last pose this long, as a guess. Fingertips carry a hand whose wrist is out of
-sight, but after this long the rest of it is a guess as well."""
-
 
 @dataclass(frozen=True, slots=True)
 class SolvedHand:
@@ -264,9 +262,9 @@ class HandSolver:
     def solve(self, t_s: float, wrist: Array, tips: Array, wrist_knowledge: int, tip_knowledge: Codes) -> SolvedHand:
         """The hand whose wrist and finger markers are at `wrist` (3,) and `tips` (5, 3), m; NaN where unknown."""
         wrist_seen = bool(np.isfinite(wrist[0]))
-        lost = self._wrist_s is None or t_s - self._wrist_s > FORGET_S
+        lost = self._wrist_s is None or t_s - self._wrist_s > LOST_S
         # What the tips alone made of the palm meanwhile may be far off: begin anew with the wrist.
-        if self.pose is not None and (t_s - self._solved_s > FORGET_S or (wrist_seen and lost)):
+        if self.pose is not None and (t_s - self._solved_s > LOST_S or (wrist_seen and lost)):
             self.reset()
         if wrist_seen:
             self._wrist_s = t_s

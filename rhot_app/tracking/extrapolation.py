@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.estimation.track import LOST_NS
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, VELOCITY
 from rhot_app.hand.skeleton import JOINT_SLICES
@@ -27,9 +28,6 @@ Indices = NDArray[np.intp]
 
 FARTHEST_AHEAD_S = 0.1
 """s: a third of the longest correlation time of a hand's motion (`hand_process.SLOWEST`)."""
-
-GONE_AFTER_S = 0.5
-"""s: as long after a state its hand is lost (`estimator.LOST_AFTER_NS`)."""
 
 _FINGERTIPS = np.array([joints.stop - 1 for joints in JOINT_SLICES])
 
@@ -47,12 +45,12 @@ class Extrapolator:
 
     def at(self, state: HandState, t_ns: int) -> HandState | None:
         """The state predicted to master time `t_ns`, at most FARTHEST_AHEAD_S ahead; before the state's own time, the
-        state. None while there is no hand, and GONE_AFTER_S after the state.
+        state. None while there is no hand, and LOST_NS after the state.
 
         Condition, and how each value is known, are the state's.
         """
         ahead_s = 1e-9 * (t_ns - state.t_master_ns)
-        if ahead_s > GONE_AFTER_S or not (state.tracked or (state.other is not None and state.other.tracked)):
+        if ahead_s > 1e-9 * LOST_NS or not (state.tracked or (state.other is not None and state.other.tracked)):
             return None
         dt_s = min(max(ahead_s, 0.0), FARTHEST_AHEAD_S)
         moved = replace(self._hands[0].moved(state, dt_s), objects=tuple(_later(one, dt_s) for one in state.objects))

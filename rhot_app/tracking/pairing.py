@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.track import SESSION_NS
 from rhot_app.tracking import tracks
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
@@ -128,7 +129,6 @@ def newest_instant(frames: Times, book: Times, newest: Times, live: Mask) -> tup
 
 Flags = NDArray[np.uint16]
 
-_NEW_TIMELINE_NS = 1_000_000_000
 _ADVANCE_FRACTION = 0.6  # of a frame period; see `Pairing.due`
 _SIGMA_FLOOR_PX = 0.01
 _LOST = int(MarkerFlag.LOST)
@@ -262,7 +262,7 @@ def _pair(all_tracks: _Tracks, live: Mask, pixels: Array, covariances: Array, fl
     if instant < 0:
         return -1
     advance = instant - marks[_LAST_STATE]
-    if marks[_LAST_STATE] < 0 or advance < -_NEW_TIMELINE_NS:
+    if marks[_LAST_STATE] < 0 or advance < -SESSION_NS:
         advance = period + 1
     if advance <= 0 or not (all_new or (period > 0 and advance >= _ADVANCE_FRACTION * period)):
         return -1

@@ -17,6 +17,7 @@ from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import ImageFrame, SliceRequest
 from rhot_app.diagnostics import Diagnostics, diagnostics_of
 from rhot_app.estimation.filter import AHEAD_S, FilteredState, smooth
+from rhot_app.estimation.track import LOST_NS, PREDICTED_NS, comes_late
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.objects.contact import ContactMonitor, FingertipPads, fingertip_pads
@@ -25,7 +26,7 @@ from rhot_app.objects.observations import MarkerPoints, MeasuredPose, ObjectFram
 from rhot_app.objects.shape import shape_of
 from rhot_app.objects.state import ObjectState, Validity, unknown_object
 from rhot_app.objects.stream import PoseMeasurement
-from rhot_app.objects.track import LOST_AFTER_NS, PREDICTED_AFTER_NS, ObjectTracker
+from rhot_app.objects.track import ObjectTracker
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
 from rhot_app.tracking.markers.marker_model import scaled_table
@@ -39,7 +40,6 @@ _PER_OBSERVATION = ("pixels", "covariances", "diameters", "qualities", "flags")
 _UNKNOWN: dict[str, Any] = {
     "marker_positions": np.nan, "marker_raw_positions": np.nan, "marker_covariances": np.nan,
     "marker_knowledge": int(Knowledge.UNKNOWN), "epipolar_error_px": np.nan}
-_JUMP_NS = 1_000_000_000
 
 
 class RigObjects:
@@ -221,7 +221,7 @@ class MarkersBeside:
         if self.all_of_hand:
             return frame
         last = self.newest[frame.camera]
-        if last is None or not 0 <= last.t_row0_master_ns - frame.t_row0_master_ns < _JUMP_NS:
+        if last is None or not comes_late(frame.t_row0_master_ns, last.t_row0_master_ns):
             self.newest[frame.camera] = frame
         further = None if frame.further is None else frame.further.of(self._own)
         return replace(frame, further=further, **{name: getattr(frame, name)[self._own] for name in _PER_OBSERVATION})
@@ -320,10 +320,10 @@ class _History:
             return unknown_object(self.name, t_ns, Validity.SEARCHING)
         here = self._smoothed[place]
         late_ns = round(1e9 * (t_s - here.t_s))
-        if late_ns > LOST_AFTER_NS:
+        if late_ns > LOST_NS:
             return unknown_object(self.name, t_ns, Validity.LOST)
         state, covariance = here.process.predict(here.state, here.covariance, t_s - here.t_s)
-        return ObjectState(self.name, t_ns, Validity.PREDICTED if late_ns > PREDICTED_AFTER_NS else Validity.TRACKED,
+        return ObjectState(self.name, t_ns, Validity.PREDICTED if late_ns > PREDICTED_NS else Validity.TRACKED,
                            pose_of(state), covariance[:TWIST, :TWIST], state[VELOCITY:])
 
     def _smooth(self, t_s: float) -> None:
@@ -332,7 +332,7 @@ class _History:
         del self._filtered[:first]
         runs: list[list[FilteredState]] = []
         for one in self._filtered:
-            if runs and one.label == runs[-1][-1].label and one.t_s - runs[-1][-1].t_s < 1e-9 * LOST_AFTER_NS:
+            if runs and one.label == runs[-1][-1].label and one.t_s - runs[-1][-1].t_s < 1e-9 * LOST_NS:
                 runs[-1].append(one)
             else:
                 runs.append([one])

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rhot_app.diagnostics import diagnostics_of
 from rhot_app.estimation.filter import ChunkedSmoother, FilteredState, Knot
+from rhot_app.estimation.track import comes_late
 from rhot_app.hand.motion.hand_process import HandProcess
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.objects.observations import ObjectFrame
@@ -44,7 +45,6 @@ CONTRADICTED = "Smoothing contradicts what was tracked. The states there are fil
 """What is said of a frame whose state could not be smoothed."""
 
 _RECENT = 16  # frames: those that an estimator weighs again when it starts are fewer
-_STEP_BACK_NS = 1_000_000_000  # times that are farther back are of another session
 
 _Key = tuple[int, int]  # camera, time of row 0
 
@@ -192,7 +192,7 @@ class RecordingEstimator(Estimator):
         instant = self._instants.get(_key(frame.observations))
         process = None if instant is None else instant.process
         if instant is not None:
-            instant.filtered, instant.t_ns = knot, self._time_ns(knot.t_s)
+            instant.filtered, instant.t_ns = knot, self._filter.time_ns(knot.t_s)
         self._conclude(self._smoother.add(FilteredState(
             knot.t_s, knot.state, knot.covariance, _copied(self._process) if process is None else process, instant,
             inflated, residuals=knot.residuals)))
@@ -302,7 +302,7 @@ class SmoothedTracker:
         """The states that have become final."""
         for state in self._tracker.smoothed():
             before_ns, self._last_ns = self._last_ns, state.t_master_ns
-            if before_ns is not None and 0 < before_ns - state.t_master_ns < _STEP_BACK_NS:
+            if before_ns is not None and state.t_master_ns != before_ns and comes_late(state.t_master_ns, before_ns):
                 self._last_ns = before_ns
                 continue  # a frame without a hand that was late
             other = None if state.other is None else replace(state.other, sequence=self._sequence)

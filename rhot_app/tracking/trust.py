@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.track import LOST_NS
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -21,7 +23,7 @@ JUMP_FLOOR_M = 0.02
 CONFIRMATIONS = 3
 """A jump is accepted when the marker stays at the new place for this many states."""
 
-FORGET_S = 0.5
+FORGET_S = 1e-9 * LOST_NS
 """After this long any place is as likely as any other."""
 
 PREDICT_S = 0.25

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics
+from rhot_app.estimation.track import comes_late
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, no_hand
 from rhot_app.tracking.extrapolation import Extrapolator
@@ -26,8 +27,6 @@ _PER_MARKER = ("marker_positions", "marker_raw_positions", "marker_covariances",
 _PER_CAMERA = ("camera_pixels", "camera_flags")
 _WORK = ("triangulate", "filter", "solve")
 """Stages that are gone through for one hand after the other."""
-
-_JUMP_NS = 1_000_000_000
 
 
 class TwoHands:
@@ -57,7 +56,7 @@ class TwoHands:
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; each hand gets the observations of its own markers."""
         last = self._newest[observations.camera]
-        if last is None or not 0 <= last.t_row0_master_ns - observations.t_row0_master_ns < _JUMP_NS:
+        if last is None or not comes_late(observations.t_row0_master_ns, last.t_row0_master_ns):
             self._newest[observations.camera] = observations
         for tracker, own in zip((self._hand, self._other), self._own, strict=True):
             further = None if observations.further is None else observations.further.of(own)

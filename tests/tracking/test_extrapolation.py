@@ -7,9 +7,10 @@ import pytest
 from modelled_hand import model_rig, moving, observations_of, states_of
 from synthetic_rig import EPOCH_NS, seconds
 
+from rhot_app.estimation.track import LOST_NS
 from rhot_app.project import with_tracker
 from rhot_app.state import Condition
-from rhot_app.tracking.extrapolation import FARTHEST_AHEAD_S, GONE_AFTER_S, Extrapolator
+from rhot_app.tracking.extrapolation import FARTHEST_AHEAD_S, Extrapolator
 
 RIG = model_rig()
 AHEAD_NS = 20_000_000
@@ -77,7 +78,7 @@ def test_there_is_no_prediction_far_ahead_and_of_a_hand_that_is_gone(fast):
     assert extrapolator.at(state, state.t_master_ns - 10**7).t_master_ns == state.t_master_ns
     far = extrapolator.at(state, state.t_master_ns + 3 * 10**8)
     assert seconds(far) == pytest.approx(seconds(state) + FARTHEST_AHEAD_S)
-    assert extrapolator.at(state, state.t_master_ns + round(1.01e9 * GONE_AFTER_S)) is None
+    assert extrapolator.at(state, state.t_master_ns + round(1.01 * LOST_NS)) is None
     assert extrapolator.at(replace(state, condition=Condition.LOST), state.t_master_ns) is None
     assert extrapolator.at(fast[0], EPOCH_NS) is None, "before a hand is found"
 

@@ -15,10 +15,10 @@ from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.barehand.relocalisation import SAME_POSE_M
 from rhot_app.barehand.start import MAJORITY, joints_on_foreground
 from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.estimation.track import LOST_NS, LOST_PERIODS, NEVER, WRONG_NS, WRONG_PERIODS
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.tracking.contours.requests import NEVER, CameraFrames
-from rhot_app.tracking.markers.estimator import LOST_AFTER_NS, LOST_AFTER_PERIODS, WRONG_AFTER_NS, WRONG_AFTER_PERIODS
+from rhot_app.tracking.contours.requests import CameraFrames
 
 Array = NDArray[np.float64]
 
@@ -88,8 +88,8 @@ class Evidence:
         """Whether the track is lost at `t_ns`: no camera has observed the hand for too long, or one contradicts it. The
         limit is longer until it is confirmed."""
         period_ns = min(camera.period_ns for camera in self._cameras)
-        silent_ns = max(LOST_AFTER_NS, 2 * LOST_AFTER_PERIODS * period_ns)
-        wrong_ns = max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns) if self.confirmed else silent_ns
+        silent_ns = max(LOST_NS, 2 * LOST_PERIODS * period_ns)
+        wrong_ns = max(WRONG_NS, WRONG_PERIODS * period_ns) if self.confirmed else silent_ns
         return bool(t_ns - self.observed_ns > silent_ns + 2 * period_ns
                     or self._checked_ns - self.observed_ns > wrong_ns)
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from rhot_app.barehand.joints import add_lengths
 from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, SHAPE, sized_table
 from rhot_app.barehand.tracker import BareHandTracker
-from rhot_app.estimation.filter import IteratedFilter
 from rhot_app.estimation.residual import Rows
+from rhot_app.estimation.track import TrackFilter
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.landmarks import LASTING_S
@@ -51,7 +51,7 @@ class MarkersOfHand:
             hand.surface.dh, hand.model.limits, prior.mean, np.asarray(np.linalg.inv(prior.information)),
             PALM_SPREAD, hand.slowest, FASTEST, np.concatenate([self._shape, np.zeros((count, 3, 3))]),
             np.concatenate([hand.shape_s, lasting]))
-        hand.process, hand.filter = self._process, IteratedFilter(self._process)
+        hand.process, hand.filter = self._process, TrackFilter(self._process)
         self._hand = hand
         self.reset()
 
@@ -59,7 +59,6 @@ class MarkersOfHand:
         """Discard all frames."""
         self._starter.reset()
         self._association.reset()
-        self._epoch_ns = 0
 
     def locate(self, frame: CameraObservations) -> tuple[HandPose, int] | None:
         """The pose that the markers of the last frames determine without contours, and its time, master ns; None
@@ -69,22 +68,20 @@ class MarkersOfHand:
         pose = None if located is None else self._starter.pose_of(located.positions)
         return None if located is None or pose is None else (pose, located.t_ns)
 
-    def start(self, epoch_ns: int) -> None:
-        """Start with a track of master time `epoch_ns`: lasting errors are unknown, with their stationary
-        covariance."""
+    def start(self) -> None:
+        """Start with a track: lasting errors are unknown, with their stationary covariance."""
         knot = self._hand.filter.newest
         self._set_lasting_errors(knot.state)
         own = slice(MOTION + SHAPE, None)
         knot.covariance[own, own] = self._process.stationary[own, own]
         self.reset()
-        self._epoch_ns = epoch_ns
 
     def update(self, frame: CameraObservations) -> bool:
         """Update the state by the markers of one frame; False without any. Raises LinAlgError when they contradict the
         estimate."""
         hand, reported = self._hand, MarkerFrame(self._markers, frame)
-        t_s = 1e-9 * (reported.t_ns - self._epoch_ns)
-        if t_s < hand.filter.knots[0].t_s or not reported.seen.any():
+        t_s = hand.filter.seconds(reported.t_ns)
+        if hand.filter.forgot(reported.t_ns) or not reported.seen.any():
             return False
         hand.prepare_update((), t_s)
         prediction = hand.filter.predict(t_s)

@@ -17,19 +17,13 @@ from rhot_app.barehand.contours import STEP_M, ContourPoints
 from rhot_app.barehand.observations import EdgeFrame, SliceRequest
 from rhot_app.barehand.start import STEP
 from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.estimation.track import NEVER, SESSION_NS, WRONG_PERIODS
 from rhot_app.tracking.contours.occlusion import Capsules, visible
-from rhot_app.tracking.markers.estimator import WRONG_AFTER_PERIODS
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.detect.edges import Edges
 from rhot_node.wire.slices import SLICES_MAX, pack_slices, unpack_slices
 
 Array = NDArray[np.float64]
-
-JUMP_NS = 1_000_000_000
-"""ns: frames farther apart in time belong to different sessions."""
-
-NEVER = -(1 << 62)
-"""ns: the time of an event that has not happened."""
 
 RENEW_NS = 300_000_000
 """ns: interval of the requests for a map alone: a node gets three before the first one expires."""
@@ -62,18 +56,18 @@ class CameraFrames:
     def take(self, frame: CameraObservations) -> None:
         """Take the time of one frame."""
         since_ns = 0 if self.newest is None else frame.t_row0_master_ns - self.newest.t_row0_master_ns
-        if 0 < since_ns < JUMP_NS:
+        if 0 < since_ns < SESSION_NS:
             self.period_ns += 0.1 * (since_ns - self.period_ns)
         self.newest = frame
 
     def delivers(self, t_ns: int) -> bool:
         """Whether the camera delivers frames about `t_ns`."""
         return (self.newest is not None
-                and abs(t_ns - self.newest.t_row0_master_ns) < WRONG_AFTER_PERIODS * self.period_ns)
+                and abs(t_ns - self.newest.t_row0_master_ns) < WRONG_PERIODS * self.period_ns)
 
     def returns_edges(self, t_ns: int) -> bool:
         """Whether edges of the hand about `t_ns` can be expected from the camera."""
-        return self.has_slices and t_ns - self.answered_ns < WRONG_AFTER_PERIODS * self.period_ns
+        return self.has_slices and t_ns - self.answered_ns < WRONG_PERIODS * self.period_ns
 
     def overdue(self, t_ns: int) -> bool:
         """Whether the requested edges are missing at a frame of `t_ns`."""

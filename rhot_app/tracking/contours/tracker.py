@@ -23,6 +23,7 @@ from rhot_app.barehand.overlay import seen_contour
 from rhot_app.barehand.start import MIN_DWELL_NS
 from rhot_app.barehand.tracker import AMBIGUOUS_PX, BareHandTracker
 from rhot_app.diagnostics import Diagnostics
+from rhot_app.estimation.track import NEVER, SESSION_NS
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, SeenContour, no_hand
@@ -30,12 +31,7 @@ from rhot_app.tracking.contours.evidence import Evidence, same_hand
 from rhot_app.tracking.contours.finder import SAME_MAPS_NS, Finder, Maps, NewestMaps
 from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.contours.occlusion import Capsules
-from rhot_app.tracking.contours.requests import (
-    JUMP_NS,
-    NEVER,
-    Requests,
-    requested_contour,
-)
+from rhot_app.tracking.contours.requests import Requests, requested_contour
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.slices import SLICES_MAX
 
@@ -82,7 +78,7 @@ class ContourEstimator:
         self._unverified: Maps | None = None
         self._waiting: dict[int, tuple[EdgeFrame, ContourFrame]] = {}
         self._used = self._waiting  # by the last update
-        self._epoch_ns, self.overlaps = 0, [False] * len(self._names)
+        self.overlaps = [False] * len(self._names)
         self._agreed_ns = NEVER
         self._tracking = self._was_confirmed = False
         self._latest: CameraObservations | EdgeFrame | None = None
@@ -180,8 +176,8 @@ class ContourEstimator:
         self._finder.reset()
         self.key_frames.clear()
         if self._markers is not None:
-            self._markers.start(t_ns)
-        self._epoch_ns, self._agreed_ns = t_ns, NEVER
+            self._markers.start()
+        self._agreed_ns = NEVER
         self._tracking, self._waiting, self._unverified = True, {}, None
         self._used = {}
         self._evidence.start(t_ns)
@@ -221,15 +217,15 @@ class ContourEstimator:
         camera = self._cameras[frame.camera]
         if camera.newest is not None:
             since_ns = frame.t_row0_master_ns - camera.newest.t_row0_master_ns
-            if -JUMP_NS < since_ns <= 0:
+            if -SESSION_NS < since_ns <= 0:
                 return False
-            if since_ns <= -JUMP_NS:  # another session, or a clock that was set
+            if since_ns <= -SESSION_NS:  # another session, or a clock that was set
                 self._clear()
                 camera = self._cameras[frame.camera]
         camera.take(frame)
         self._hand.row_s[frame.camera] = 1e-9 * frame.row_time_ns
         t_ns = frame.t_row0_master_ns
-        if self._tracking and (self._time_ns() - t_ns > JUMP_NS or self._evidence.lost(t_ns)):
+        if self._tracking and (self._hand.filter.newest_ns - t_ns > SESSION_NS or self._evidence.lost(t_ns)):
             self.drop_track()
         marked = self._markers is not None and self._take_markers(frame, self._markers)
         if not self._tracking:
@@ -283,7 +279,7 @@ class ContourEstimator:
         """Update the state by the edges of some cameras, by number. Every pass has the same edges, and expects the
         contour with half the standard deviation. Raises LinAlgError when they contradict the estimate."""
         hand, edges = self._hand, [contour for _, contour in waiting.values()]
-        times_s = [self._seconds(one.t_row0_master_ns + _middle_ns(one)) for one, _ in waiting.values()]
+        times_s = [self._hand.filter.seconds(one.t_row0_master_ns + _middle_ns(one)) for one, _ in waiting.values()]
         t_s, spreads = max(*times_s, hand.filter.knots[0].t_s), [contour.expected_sd for contour in edges]
         for contour, one_s in zip(edges, times_s, strict=True):
             contour.late_s = contour.late_s + (one_s - t_s)
@@ -318,12 +314,12 @@ class ContourEstimator:
         self._unverified = None
         # Overlapping hands are not verified: whose foreground it is, is ambiguous.
         if not any(self.overlaps) and self._finder.verify(
-                maps, self._seconds(maps.t_ns), 1e-9 * min(one.period_ns for one in self._cameras)):
+                maps, self._hand.filter.seconds(maps.t_ns), 1e-9 * min(one.period_ns for one in self._cameras)):
             self._requests.restart()
         observed_ns = self._evidence.observed_ns
-        held = observed_ns - self._epoch_ns >= MIN_DWELL_NS
+        held = observed_ns - self._hand.filter.begun_ns >= MIN_DWELL_NS
         if self._evidence.confirmed or observed_ns <= max(
-                self._epoch_ns, maps.t_ns - max(SAME_MAPS_NS, self._maps.simultaneous_ns)):
+                self._hand.filter.begun_ns, maps.t_ns - max(SAME_MAPS_NS, self._maps.simultaneous_ns)):
             return
         if maps.t_ns - self._agreed_ns < SAME_MAPS_NS or (
                 held and self._hand.verified(maps.probabilities, self._predict(maps.t_ns)[0])):
@@ -358,14 +354,8 @@ class ContourEstimator:
 
     # -- times and states ----------------------------------------------------------------------------------------------
 
-    def _seconds(self, t_ns: int) -> float:
-        return 1e-9 * (t_ns - self._epoch_ns)
-
     def _predict(self, t_ns: int) -> Estimate:
-        return self._hand.filter.predict(self._seconds(t_ns))
-
-    def _time_ns(self) -> int:
-        return self._epoch_ns + round(1e9 * self._hand.filter.newest.t_s)
+        return self._hand.filter.predict_ns(t_ns)
 
     def _state(self, frame: CameraObservations | EdgeFrame, begun: float) -> HandState:
         """The state of the hand after `frame`, with the pixels and flags of its markers; their positions in space are

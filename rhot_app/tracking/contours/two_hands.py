@@ -21,6 +21,7 @@ from rhot_app.barehand.silhouette import CORRELATED, score
 from rhot_app.barehand.start import LATERAL_M, START_SD, STEP
 from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.estimation.track import NEVER, SESSION_NS, comes_late
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
@@ -30,7 +31,6 @@ from rhot_app.state import HandState, SeenContour
 from rhot_app.tracking.contours.evidence import joints_of
 from rhot_app.tracking.contours.finder import Maps
 from rhot_app.tracking.contours.occlusion import Capsules, capsules_in, occluded_pixels, visible
-from rhot_app.tracking.contours.requests import JUMP_NS, NEVER
 from rhot_app.tracking.contours.tracker import ContourEstimator
 from rhot_app.tracking.two_hands import TwoHands
 from rhot_node.detect.edges import Edges
@@ -91,7 +91,7 @@ class TwoBareHands(TwoHands):
         self._maps[frame.camera] = frame
         t_ns = frame.t_row0_master_ns
         apart_ns = [abs(t_ns - one.t_row0_master_ns) for one in self._maps if one is not None]
-        simultaneous = not any(self._both[0].simultaneous_ns < apart < JUMP_NS for apart in apart_ns)
+        simultaneous = not any(self._both[0].simultaneous_ns < apart < SESSION_NS for apart in apart_ns)
         if simultaneous and self._both[0].tracking and self._both[1].tracking:
             self._resolve_duplicate(t_ns)
         masked = [self._masked_for(number, frame) for number in range(2)]
@@ -119,8 +119,8 @@ class TwoBareHands(TwoHands):
         """The foreground for one hand: NaN, not known, where the other one may occlude it."""
         hand, t_ns = self._both[number], frame.t_row0_master_ns
         other = self._occluder(hand, t_ns)
-        if other is None:  # a lost one is assumed to be there for JUMP_NS more
-            if not 0 <= t_ns - self._occluder_ns[number] < JUMP_NS:
+        if other is None:  # a lost one is assumed to be there for SESSION_NS more
+            if not 0 <= t_ns - self._occluder_ns[number] < SESSION_NS:
                 hand.overlaps[frame.camera] = False
             return frame
         self._occluder_ns[number] = t_ns
@@ -221,7 +221,7 @@ class TwoBareHands(TwoHands):
         if any(state.tracked and not one.confirmed for state, one in zip((hand, other), self._both, strict=True)):
             return None  # its track was dropped; its next state says so
         t_ns = max(state.t_master_ns for state in (hand, other) if state.tracked >= tracked)
-        if tracked and 0 <= self._published_ns - t_ns < JUMP_NS:
+        if tracked and comes_late(t_ns, self._published_ns):
             return None
         self._published_ns = t_ns
         received_ns = max(hand.t_receive_ns, other.t_receive_ns)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics
-from rhot_app.estimation.filter import IteratedFilter
+from rhot_app.estimation.track import LOST_NS, SESSION_NS, Life, TrackFilter
 from rhot_app.hand.landmarks import LASTING_S
 from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
@@ -44,13 +44,6 @@ CONFUSION = 0.01
 REJECTIONS = 2
 """Observations rejected in a row that are no outliers: of one in ten mistaken, two in a row have a chance of 1 %."""
 
-LOST_AFTER_NS, LOST_AFTER_PERIODS = 500_000_000, 5.0
-"""No accepted observation for this long, or for so many frame periods: the hand is lost."""
-
-WRONG_AFTER_NS, WRONG_AFTER_PERIODS = 100_000_000, 3.0
-"""Most observations rejected for this long, or for so many frame periods: the estimate is wrong."""
-
-_JUMP_NS = 1_000_000_000  # frames farther apart are of different sessions
 _PENDING = 16
 
 
@@ -69,7 +62,7 @@ class Estimator:
         self._process = self._markers.process()
         plane = rig.tracker.palm_plane
         self._plane = None if plane is None else PalmOnPlane(plane)
-        self._filter = IteratedFilter(self._process)
+        self._filter, self._life = TrackFilter(self._process), Life()
         self._starter = Starter(self._rig, self._markers)
         self._association = MarkerAssociation(self._rig)  # without a prediction, by rays
         self._observations = RecentObservations(self._rig, self._markers)
@@ -86,9 +79,7 @@ class Estimator:
         if self._size is not None:
             self._size.reset()
             self._resize(*self._size.known)
-        self._tracking = self._ever = False
-        self._by_one = False
-        self._epoch_ns = self._accepted_ns = self._plausible_ns = 0
+        self._life, self._by_one = Life(), False
         self._rejections = Rejections(len(self._rig.cameras), self._markers)
 
     def ingest(self, observations: CameraObservations) -> None:
@@ -111,30 +102,24 @@ class Estimator:
             self._size.work()
             self._resize(*self._size.follow(taken[-1].t_row0_master_ns))
         self._sequence += 1
-        if not self._tracking:
-            return self._states.none(self._sequence - 1, Condition.LOST if self._ever else Condition.SEARCHING,
+        if not self._life.alive:
+            return self._states.none(self._sequence - 1, Condition.LOST if self._life.ever else Condition.SEARCHING,
                                      taken[-1], begun)
         knot = self._filter.newest
-        return self._states.describe(self._time_ns(knot.t_s), knot.state, knot.covariance, self._sequence - 1,
+        return self._states.describe(self._filter.newest_ns, knot.state, knot.covariance, self._sequence - 1,
                                       taken[-1], begun, by_one=self._by_one)
-
-    def _seconds(self, t_ns: int) -> float:
-        return 1e-9 * (t_ns - self._epoch_ns)
-
-    def _time_ns(self, t_s: float) -> int:
-        return self._epoch_ns + round(1e9 * t_s)
 
     def _take(self, observations: CameraObservations) -> bool:
         """Weigh one frame; False when it came before."""
         frame = MarkerFrame(self._markers, observations)
-        if self._tracking and abs(frame.t_ns - self._time_ns(self._filter.newest.t_s)) > _JUMP_NS:
+        if self._life.alive and abs(frame.t_ns - self._filter.newest_ns) > SESSION_NS:
             self._give_up()
             self._observations.reset()
-        too_late = self._tracking and self._seconds(frame.t_ns) < self._filter.knots[0].t_s
+        too_late = self._life.alive and self._filter.forgot(frame.t_ns)
         if too_late or not self._observations.enter(frame):
             return False
         self._starter.ingest(self._association.select(observations))
-        if not self._tracking or self._by_one:
+        if not self._life.alive or self._by_one:
             located = self._starter.locate()
             scale = 1.0 if self._size is None else self._size.scale
             pose = None if located is None else self._starter.pose_of(located.positions, scale)
@@ -142,7 +127,7 @@ class Estimator:
                 self._by_one = False
                 self._start(located.t_ns, pose, located)
                 return True
-        if not self._tracking:
+        if not self._life.alive:
             if self._plane is not None:
                 pose = pose_on_plane(self._plane, frame, self._process)
                 if pose is not None:
@@ -157,32 +142,28 @@ class Estimator:
         if self._size is not None and (located := self._starter.locate()) is not None:
             state = self._filter.newest.state
             self._size.look(located, np.vstack([state[:ANGLES].reshape(3, 4), np.eye(4)[3]]), state[ANGLES:VELOCITY])
-        newest_ns = self._time_ns(self._filter.newest.t_s)
-        period_ns = 1e9 * self._observations.shortest_period_s
-        if (newest_ns - self._accepted_ns > max(LOST_AFTER_NS, LOST_AFTER_PERIODS * period_ns)
-                or newest_ns - self._plausible_ns > max(WRONG_AFTER_NS, WRONG_AFTER_PERIODS * period_ns)):
+        newest_ns, period_ns = self._filter.newest_ns, 1e9 * self._observations.shortest_period_s
+        if self._life.lost(newest_ns, period_ns) or self._life.wrong(newest_ns, period_ns):
             self._give_up()
         return True
 
     def _alone_with(self, frame: MarkerFrame) -> bool:
         """Whether this camera alone sees landmarks: another one would show how far they are."""
         others = [one for camera, one in enumerate(self._observations.newest) if one is not None
-                  and camera != frame.camera and abs(one.t_row0_master_ns - frame.t_ns) < LOST_AFTER_NS]
+                  and camera != frame.camera and abs(one.t_row0_master_ns - frame.t_ns) < LOST_NS]
         lost = int(MarkerFlag.LOST)
         return bool((frame.seen & self._markers.landmark).any()) and all((one.flags & lost).all() for one in others)
 
     def _start(self, t_ns: int, pose: HandPose, located: Located | None = None) -> None:
         """Start at a pose and weigh again what was seen since."""
-        self._epoch_ns = t_ns
         if self._size is not None:
             self._size.settle()
             if located is not None:
                 self._size.look(located, pose.world_from_palm, pose.angles)
             self._resize(*self._size.known)
         self._note_bias(self._process.start(pose.world_from_palm, pose.angles, START_SD)[0])
-        self._filter.start(0.0, *self._process.start(pose.world_from_palm, pose.angles, START_SD))
-        self._tracking = self._ever = True
-        self._accepted_ns = self._plausible_ns = t_ns
+        self._filter.begin(t_ns, *self._process.start(pose.world_from_palm, pose.angles, START_SD))
+        self._life.begin(t_ns)
         for frame in self._observations.recent(t_ns):
             self._update(frame)
 
@@ -193,12 +174,12 @@ class Estimator:
         self._states.resize(math.exp(log_scale), math.sqrt(variance))
 
     def _give_up(self) -> None:
-        self._tracking = False
+        self._life.end()
         self._starter.reset()
 
     def _update(self, frame: MarkerFrame) -> None:
         """Associate a frame with the prediction, and weigh it."""
-        t_s = self._seconds(frame.t_ns)
+        t_s = self._filter.seconds(frame.t_ns)
         candidates = np.count_nonzero(frame.seen)
         prediction = self._filter.predict(t_s)
         self._observations.note_sizes(frame, prediction[0])
@@ -220,11 +201,8 @@ class Estimator:
             for part, factor in wrong:
                 self._process.inflate(inflated, part, factor)
             self._filter.start(knot.t_s, knot.state, inflated)  # so that no late frame undoes it
-        accepted = np.count_nonzero(inliers)
-        if accepted:
-            self._accepted_ns = max(self._accepted_ns, frame.t_ns)
-        if 2 * accepted >= candidates:
-            self._plausible_ns = max(self._plausible_ns, frame.t_ns)
+        accepted = int(np.count_nonzero(inliers))
+        self._life.observe(frame.t_ns, accepted=accepted > 0, plausible=bool(2 * accepted >= candidates))
 
     def _weighed(self, frame: MarkerFrame) -> None:
         """A frame has its knot; covariances are not inflated yet. A recording is smoothed from here (`smoothing`)."""

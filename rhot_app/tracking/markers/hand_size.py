@@ -15,6 +15,7 @@ from itertools import chain, combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.estimation.track import comes_late
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.limits import PosePrior
 from rhot_app.tracking.markers.acquisition import Located
@@ -45,8 +46,6 @@ _PLACE_SD_M = 5e-4
 """What is wrong with a located marker beside its noise, at the least."""
 
 _LONGEST_S = 0.1
-_ANEW_NS = 1_000_000_000
-"""So far back in time begins another timeline."""
 
 
 class HandSize:
@@ -83,7 +82,7 @@ class HandSize:
 
     def follow(self, t_ns: int) -> tuple[float, float]:
         """`known` at `t_ns`, master ns, a while later; cameras that take turns are not always in the order of time."""
-        if not 0 <= self._t_ns - t_ns < _ANEW_NS:
+        if not comes_late(t_ns, self._t_ns):
             dt = min(max(1e-9 * (t_ns - self._t_ns), 0.0), _LONGEST_S)
             self._log_scale += (self._aim - self._log_scale) * -math.expm1(-dt / FOLLOW_S)
             self._t_ns = t_ns

@@ -1,0 +1,110 @@
+"""The life of a track: when it is predicted only, wrong, or lost; and its filter, in master time.
+
+A track begins with a state that something has shown, and lives by accepted observations. Hands and objects, by
+markers, landmarks, contours or tags, live by the same rules.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhot_app.estimation.filter import IteratedFilter
+from rhot_app.estimation.residual import Process
+
+Array = NDArray[np.float64]
+
+NEVER: Final = -(1 << 62)
+"""ns: the time of what has not happened."""
+
+LOST_NS: Final = 500_000_000
+"""ns without an accepted observation: a hand at 1 m/s may be anywhere before the cameras."""
+
+LOST_PERIODS, WRONG_PERIODS = 5.0, 3.0
+"""Frame periods that must pass as well, with slow cameras: until it is lost, and until it is wrong."""
+
+WRONG_NS: Final = 100_000_000
+"""ns in which most observations are rejected: the estimate is wrong."""
+
+PREDICTED_NS: Final = 100_000_000
+"""ns without an accepted observation: the state is a prediction."""
+
+SESSION_NS: Final = 1_000_000_000
+"""ns: frames whose times are farther apart or back are of different sessions, or a clock was set."""
+
+
+def comes_late(t_ns: int, newest_ns: int) -> bool:
+    """Whether a frame comes after a newer one of its camera, in the same session."""
+    return 0 <= newest_ns - t_ns < SESSION_NS
+
+
+class Life:
+    """When a track was begun, and when its observations were last accepted, and plausible; master times, ns."""
+
+    def __init__(self) -> None:
+        self.ever = self.alive = False
+        self.accepted_ns = self.plausible_ns = NEVER
+
+    def begin(self, t_ns: int) -> None:
+        """It begins, by what shows it at `t_ns`."""
+        self.ever = self.alive = True
+        self.accepted_ns = self.plausible_ns = t_ns
+
+    def end(self) -> None:
+        """It is lost, or wrong."""
+        self.alive = False
+
+    def observe(self, t_ns: int, *, accepted: bool = True, plausible: bool = True) -> None:
+        """Observations of `t_ns` were weighed. `accepted`: some; `plausible`: most."""
+        if accepted:
+            self.accepted_ns = max(self.accepted_ns, t_ns)
+        if plausible:
+            self.plausible_ns = max(self.plausible_ns, t_ns)
+
+    def predicted(self, t_ns: int) -> bool:
+        """Whether the state of `t_ns` is a prediction."""
+        return t_ns - self.accepted_ns > PREDICTED_NS
+
+    def lost(self, t_ns: int, period_ns: float = 0.0) -> bool:
+        """Whether nothing was accepted for too long, by cameras with this frame period."""
+        return t_ns - self.accepted_ns > max(LOST_NS, LOST_PERIODS * period_ns)
+
+    def wrong(self, t_ns: int, period_ns: float = 0.0) -> bool:
+        """Whether most observations were rejected for too long."""
+        return t_ns - self.plausible_ns > max(WRONG_NS, WRONG_PERIODS * period_ns)
+
+
+class TrackFilter(IteratedFilter):
+    """A filter whose times are counted from the master time at which its track began."""
+
+    def __init__(self, process: Process, begun_ns: int = 0) -> None:
+        super().__init__(process)
+        self.begun_ns = begun_ns
+
+    def begin(self, t_ns: int, state: Array, covariance: Array) -> None:
+        """Begin a track with a prior of master time `t_ns`."""
+        self.begun_ns = t_ns
+        self.start(0.0, state, covariance)
+
+    def seconds(self, t_ns: int) -> float:
+        """Master time `t_ns` as the filter counts it."""
+        return 1e-9 * (t_ns - self.begun_ns)
+
+    def forgot(self, t_ns: int) -> bool:
+        """Whether `t_ns` is before the oldest knot."""
+        return self.seconds(t_ns) < self.knots[0].t_s
+
+    def predict_ns(self, t_ns: int) -> tuple[Array, Array]:
+        """`predict` at master time `t_ns`."""
+        return self.predict(self.seconds(t_ns))
+
+    def time_ns(self, t_s: float) -> int:
+        """The master time of `t_s`."""
+        return self.begun_ns + round(1e9 * t_s)
+
+    @property
+    def newest_ns(self) -> int:
+        """Master time of the newest knot."""
+        return self.time_ns(self.newest.t_s)
