@@ -104,6 +104,7 @@ class RigNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     data_port: Port = 0  # the master's: observations; 0 takes any free port and tells the node
     text_datagrams: bool = False  # accept the thesis's text datagrams on data_port (untrusted)
     time_offset_s: Annotated[float, Meta(ge=-10, le=10)] = 0.0  # calibrated correction added to this camera's times
+    time_offset_sd_s: Annotated[float, Meta(ge=0, le=10)] | None = None  # of that; None: nobody has measured it
     pairing_port: Port = 47803  # the node's: who it is, pairing
     public_key: PublicKey = ""  # the node's; empty: the node is not paired, and what it says is untrusted
     pose_known: bool = True  # whether `pose` was measured or set; without, the camera is shown and not tracked with

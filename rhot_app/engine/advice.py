@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rhot_app.calibration.check.camera_calibration import NOT_CALIBRATED, calibration_finding
+from rhot_app.calibration.check.camera_calibration import NOT_CALIBRATED, calibration_finding, times_unknown
 from rhot_app.engine.node_meter import RECENT_NS, Recent
 from rhot_app.engine.status import Advice, Level, NodeStatus
 from rhot_app.project import Intrinsics, Rig
@@ -242,6 +242,21 @@ def calibration_advice(rig: Rig) -> list[Advice]:
         return []
     level: Level = "warning" if found.finding.figure == NOT_CALIBRATED else "info"
     return [Advice(level, found.finding.sentence, found.mender, lasting=True, subject="calibration")]
+
+
+def times_advice(rig: Rig, rates_hz: Sequence[float]) -> list[Advice]:
+    """That nobody has compared the times of the cameras of this computer, which are not synchronised, and by how much
+    they may be apart; said once lenses and poses are known. `rates_hz`: of the nodes, 0 where nothing comes."""
+    unknown, finding = times_unknown(rig), calibration_finding(rig)
+    if (not unknown or not all(is_loopback(node.address) for node in rig.nodes)
+            or (finding is not None and finding.finding.figure == NOT_CALIBRATED)):
+        return []
+    rates = [rate_hz for rate_hz in rates_hz if rate_hz > 0.0]
+    most = f" ({500.0 / min(rates):.0f} ms)" if rates else ""
+    names = " and ".join(unknown)
+    return [Advice("info", f"The times of {names} against {rig.nodes[0].name} are not known: cameras that are not "
+                   f"synchronised may be up to half a frame apart{most}. Calibrate the times with a waving hand.",
+                   "time", lasting=True, subject="calibration")]
 
 
 def one_camera_advice(rig: Rig) -> list[Advice]:

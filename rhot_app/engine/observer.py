@@ -19,6 +19,7 @@ from rhot_app.engine.advice import (
     node_advice,
     one_camera_advice,
     start_pose_advice,
+    times_advice,
 )
 from rhot_app.engine.node_meter import RECENT_NS, NodeMeter
 from rhot_app.engine.pipeline import Pipeline
@@ -118,7 +119,8 @@ class Observer:
         found += [Advice(one.level, one.sentence, subject="tracking" if one.level == "error" else "sight")
                   for one in self._diagnosed(now_ns)]
         notices = [Advice("info", text, subject="information") for text in self._source.notices()]
-        return [*found, *nowhere, *calibration_advice(self.rig), *one_camera_advice(self.rig), *notices]
+        return [*found, *nowhere, *calibration_advice(self.rig), *one_camera_advice(self.rig),
+                *times_advice(self.rig, [node.rate_hz for node in nodes]), *notices]
 
     def _facts(self, camera: int, status: NodeStatus, now_ns: int) -> NodeFacts:
         meter = self._meters[camera]

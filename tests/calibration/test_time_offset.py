@@ -44,6 +44,7 @@ def test_offsets_come_back(wave, late_s: float) -> None:
     assert abs(camera.correction_s - late_s) < 4.0 * camera.sd_s < 0.2e-3
     assert report.verdict.grade is Grade.GOOD and report.row_times_agree
     assert report.apply(RIG).nodes[1].time_offset_s == pytest.approx(late_s, abs=0.1e-3)
+    assert report.apply(RIG).nodes[1].time_offset_sd_s == camera.sd_s > 0.0
     assert report.cameras[0].reference and report.apply(RIG).nodes[0].time_offset_s == 0.0
 
 

@@ -13,6 +13,7 @@ from rhot_app.engine.advice import (
     no_marker_advice,
     node_advice,
     one_camera_advice,
+    times_advice,
 )
 from rhot_app.engine.node_meter import Recent
 from rhot_app.engine.status import Advice, NodeStatus, most_urgent_first
@@ -180,3 +181,22 @@ def test_what_one_camera_cannot_know_is_said() -> None:
         apart.nodes[1], intrinsics=calibrated.intrinsics)))).verdict.findings
     codes = {finding.code for finding in findings}
     assert "unknown_poses" in codes and "coincident" not in codes
+
+
+def test_times_that_nobody_compared_are_unknown_up_to_half_a_frame() -> None:
+    rig = load_rig(resource_path("rigs", "two_pis.json"))
+    lens = Intrinsics(640, 480, 533.0, 533.5, 320.1, 238.0)
+    turned = CameraPose((0.99995, 0.01, 0.0, 0.0), (0.075, 0.0, 0.0))
+    left, right = (msgspec.structs.replace(node, intrinsics=lens, address="127.0.0.1") for node in rig.nodes)
+    right = msgspec.structs.replace(right, pose=turned)
+    here = msgspec.structs.replace(rig, nodes=(left, right), calibration=CameraCalibration("board", "ruler", 5e-4))
+    (advice,) = times_advice(here, [30.0, 15.0])
+    assert "33 ms" in advice.text and (advice.mender, advice.level) == ("time", "info")
+    (advice,) = times_advice(here, [0.0, 0.0])
+    assert "half a frame" in advice.text and " ms" not in advice.text
+    timed = msgspec.structs.replace(right, time_offset_sd_s=1e-4)
+    assert times_advice(msgspec.structs.replace(here, nodes=(left, timed)), [30.0, 30.0]) == []
+    for other in (rig, msgspec.structs.replace(here, calibration=CameraCalibration("exact", error_m=0.0)),
+                  msgspec.structs.replace(here, calibration=None, nodes=rig.nodes),
+                  msgspec.structs.replace(here, nodes=(left, msgspec.structs.replace(right, pose_known=False)))):
+        assert times_advice(other, [30.0, 30.0]) == []

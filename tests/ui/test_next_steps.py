@@ -39,9 +39,9 @@ def placed(rig: Rig) -> Rig:
 
 def test_a_bare_hand_before_two_cameras_needs_everything_in_order():
     rig = first_rig(TWO, bare=True)
-    assert list(ticks(rig)) == ["networks", "tracker", "board", "lens", "stereo", "measured"]
+    assert list(ticks(rig)) == ["networks", "tracker", "board", "lens", "stereo", "time", "measured"]
     assert ticks(rig) == {"networks": False, "tracker": True, "board": False, "lens": False, "stereo": False,
-                          "measured": False}
+                          "time": False, "measured": False}
 
 
 def test_each_tick_comes_from_what_the_rig_says():
@@ -56,6 +56,21 @@ def test_each_tick_comes_from_what_the_rig_says():
     outdated = msgspec.structs.replace(done, calibration=CameraCalibration("outdated"))
     assert not ticks(outdated)["stereo"]
     assert ticks(msgspec.structs.replace(done, hand=scaled_hand(done.hand, 1.05)))["measured"]
+
+
+def test_the_cameras_times_are_unknown_until_they_are_measured():
+    rig = placed(with_lenses(first_rig(TWO, bare=True)))
+
+    def step(rig: Rig):
+        return next(one for one in next_steps(answers_of(rig), rig, networks=True, printed=True, reasons=())
+                    if one.action == "time")
+    assert not step(rig).done and "half a frame" in step(rig).meaning
+    left, right = rig.nodes
+    measured = (left, msgspec.structs.replace(right, time_offset_s=0.0032, time_offset_sd_s=2e-4))
+    timed = msgspec.structs.replace(rig, nodes=measured)
+    assert step(timed).done and "3.20 ± 0.20 ms" in step(timed).meaning
+    of_the_reference = (msgspec.structs.replace(left, time_offset_sd_s=0.0), right)
+    assert not step(msgspec.structs.replace(rig, nodes=of_the_reference)).done
 
 
 def test_paint_needs_colours_and_one_camera_needs_no_other():
@@ -102,7 +117,8 @@ def test_the_page_is_there_by_itself_comes_back_and_can_be_closed_for_ever(camer
     bench.until(lambda: dialogs.next_steps is not None and dialogs.next_steps.isVisible())
     page = dialogs.next_steps
     check("next-steps", page.grab().toImage(), 12)
-    assert [step.action for step in page.steps] == ["tracker", "board", "lens", "stereo", "colours", "bones"]
+    assert [step.action for step in page.steps] == ["tracker", "board", "lens", "stereo", "time", "colours",
+                                                       "bones"]
     bench.click(page.counts[1])
     assert "stereo" not in [step.action for step in page.steps]
     bench.click(page.counts[2])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.check.health import HealthFinding
 from rhot_app.calibration.verdict import Finding, Grade
-from rhot_app.project import Intrinsics, Rig
+from rhot_app.project import Intrinsics, Rig, RigNode
 
 Array = NDArray[np.float64]
 
@@ -73,6 +73,31 @@ def calibration_text(rig: Rig) -> str:
     error = "" if record.error_m is None else f", ± {1e3 * record.error_m:.2f} mm at {record.distance_m:g} m"
     how = "refined from a moving hand" if record.method == "refined" else "with a board"
     return f"{how}{error}; lengths {lengths_text(rig)}"
+
+
+def times_unknown(rig: Rig) -> list[str]:
+    """Names of the tracked cameras whose times nobody has compared with the first one's. None of a simulated rig."""
+    if rig.calibration is not None and rig.calibration.method == "exact":
+        return []
+    used = [node for node, tracked in zip(rig.nodes, rig.tracked_with, strict=True) if tracked]
+    return [node.name for node in used[1:] if node.time_offset_sd_s is None]
+
+
+def offset_text(node: RigNode) -> str:
+    """What is added to a camera's times, and how well that is known."""
+    sd_s = node.time_offset_sd_s
+    return f"{1e3 * node.time_offset_s:.2f}" + (" ms, not measured" if sd_s is None else f" ± {1e3 * sd_s:.2f} ms")
+
+
+def times_text(rig: Rig) -> str:
+    """How far apart the cameras' times are, in a sentence."""
+    unknown, first = times_unknown(rig), rig.nodes[0].name
+    if unknown:
+        return (f"Not known for {' and '.join(unknown)}: cameras that are not synchronised may be up to half a frame "
+                "apart.")
+    if rig.calibration is not None and rig.calibration.method == "exact":
+        return "As simulated."
+    return " ".join(f"{node.name} against {first}: {offset_text(node)}." for node in rig.nodes[1:])
 
 
 def lengths_text(rig: Rig) -> str:

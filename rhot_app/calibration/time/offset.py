@@ -23,7 +23,7 @@ from rhot_app.calibration.time.tracks import build_tracks
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress, silent
-from rhot_app.project import Rig
+from rhot_app.project import Rig, RigNode
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class TimeReport:
 
     def apply(self, rig: Rig) -> Rig:
         """The rig with corrected `time_offset_s`, right for nodes that go on saying the row times they say now."""
-        nodes = tuple(msgspec.structs.replace(node, time_offset_s=node.time_offset_s + camera.correction_s)
+        nodes = tuple(camera.applied(node, camera.correction_s)
                       for node, camera in zip(rig.nodes, self.cameras, strict=True))
         return msgspec.structs.replace(rig, nodes=nodes)
 
@@ -195,6 +195,13 @@ class CameraTime:
     speed_px_s: float
     samples: int
     direction: str
+
+    def applied(self, node: RigNode, correction_s: float) -> RigNode:
+        """The node of this camera with corrected times; the reference as it is."""
+        if self.reference:
+            return node
+        return msgspec.structs.replace(node, time_offset_s=node.time_offset_s + correction_s,
+                                       time_offset_sd_s=self.sd_s)
 
     @property
     def row_time_observed(self) -> bool:

@@ -33,7 +33,7 @@ from rhot_node.landmarks.install import installed_folder
 
 LOOK_MS = 700
 _WIDTH_PX = 620
-_MOST_STEPS = 7
+_MOST_STEPS = 8
 _PRINTED = "board printed"
 _WEARS: tuple[tuple[Wear, str], ...] = (
     ("paint", "Paint or tape in six colours"), ("bare", "A bare hand"),

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
-from rhot_app.calibration.check.camera_calibration import calibration_finding
+from rhot_app.calibration.check.camera_calibration import calibration_finding, times_text, times_unknown
 from rhot_app.hand.anatomy import is_shipped
 from rhot_app.project import Rig
 
@@ -62,6 +62,8 @@ def next_steps(answers: Answers, rig: Rig, *, networks: bool, printed: bool, rea
     if two:
         steps.append(Step("Put the cameras together", "Where they stand to each other, from the board before both.",
                           _together(rig), "stereo"))
+        steps.append(Step("Compare the cameras' times", times_text(rig), _together(rig) and not times_unknown(rig),
+                          "time"))
     if answers.wear == "paint":
         steps.append(Step("Teach the colours", "Which colour each marker has in this light.",
                           exact or _noted(reasons, "colour calibration"), "colours"))

@@ -9,7 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, CalibrationAccuracy, calibration_text
+from rhot_app.calibration.check.camera_calibration import (
+    KNOWN_EXACTLY,
+    CalibrationAccuracy,
+    calibration_text,
+    offset_text,
+)
 from rhot_app.engine.status import NodeStatus
 from rhot_app.geometry.transforms import rotation_from_quaternion
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, RigNode
@@ -239,7 +244,7 @@ def _cameras(rig: Rig) -> Iterator[tuple[str, str]]:
     for node in rig.nodes:
         yield from lens_figures(node).items()
         yield from place_figures(node).items()
-        yield f"{node.name}: time offset", f"{1e3 * node.time_offset_s:.2f} ms"
+        yield f"{node.name}: time offset", offset_text(node)
         yield f"{node.name}: address", f"{node.address}:{node.control_port}"
     yield "cameras calibrated", calibration_text(rig)
 

@@ -104,7 +104,7 @@ def propose(report: TimeReport | None, rig: Rig, path: Path | None,
                                       {"camera": {"row_time_us": found_us}}))
             rows.append(Row(f"{node.name}: row time", f"{said_us:.1f} µs", f"{found_us:.1f} µs"))
             correction_s = camera.with_row_time_s
-        nodes.append(msgspec.structs.replace(node, time_offset_s=node.time_offset_s + correction_s))
+        nodes.append(camera.applied(node, correction_s))
     after = msgspec.structs.replace(rig, nodes=tuple(nodes))
     return Proposal(REASON, report.verdict, (*rig_rows(rig, after), *rows),
                     (*changes, RigChange(rig, after, path, REASON)))
