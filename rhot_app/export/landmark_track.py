@@ -32,9 +32,10 @@ from rhot_app.hand.landmarks import DISAGREEMENT_M
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Intrinsics, Rig, RigNode, landmark_markers
 from rhot_app.recording.landmark_log import FIRST_NS, HandFilm, landmark_order, write_hand_log
-from rhot_app.recording.raw_log import LogReader
+from rhot_app.recording.raw_log import FILMS, LogReader, filmed_at
 from rhot_app.rig_history import accept_hand
-from rhot_app.sources.films import FILMS, NamedFilm
+from rhot_app.sources.film_offset import filmed
+from rhot_app.sources.films import NamedFilm
 from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out, picture_size
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
@@ -195,7 +196,7 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: boo
         if unknown_size and rig.hand == base.hand:
             rig = msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, float_scale=True))
         if kept is not None:
-            write_hand_log(kept, rig, films, {FILMS: _names(videos, films, first_s)})
+            write_hand_log(kept, rig, films, {FILMS: _names(videos, films, first_s), **_taken(videos, films, first_s)})
         progress("tracking", 0.92)
         seen = _seen(rig, log)
         states = list(_one_of_each_instant(states_of_log(rig, log, smooth), round(1e9 * half_s)))
@@ -241,6 +242,15 @@ def _names(videos: Sequence[CameraVideo], films: Sequence[HandFilm], first_s: fl
     return msgspec.to_builtins({video.camera: NamedFilm(
         str(video.path.absolute()), FIRST_NS + round(1e9 * (float(film.times_s[0]) - first_s)),
         None if video.stamped else 1e9 / video.period_ns) for video, film in zip(videos, films, strict=True)})
+
+
+def _taken(videos: Sequence[CameraVideo], films: Sequence[HandFilm], first_s: float) -> dict[str, Any]:
+    """When the films were taken, by the first one that says it; nothing where none does."""
+    for video, film in zip(videos, films, strict=True):
+        when = None if video.stamped or video.pictures or video.path.is_dir() else filmed(video.path)
+        if when is not None:
+            return filmed_at(when, FIRST_NS + round(1e9 * (float(film.times_s[0]) - first_s)))
+    return {}
 
 
 def _side_of(films: Sequence[HandFilm]) -> str:

@@ -238,7 +238,8 @@ class _Outputs:
         if self._osc is not None:
             from rhot_app.outputs.osc import bundles, mouse_messages
 
-            for datagram in bundles(mouse_messages(mouse.cursor, mouse.pressed)):
+            t_unix_ns = time.time_ns() - round(1e6 * age_ms) if live else None
+            for datagram in bundles(mouse_messages(mouse.cursor, mouse.pressed), t_unix_ns):
                 self._osc.send(datagram)
         if self._pointer is not None:
             self._pointer.write(mouse)

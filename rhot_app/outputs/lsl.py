@@ -55,6 +55,8 @@ class LslSink:
         names = channel_names(sample, hand)
         info = self._lsl.StreamInfo(f"{self._name} {hand.name}", "MoCap", len(names), 0.0, self._lsl.cf_float32,
                                     f"rhot {self._name} {hand.name} {sample.joint_set}")
+        # Readers that know another clock: LSL has its own, and its stamps cannot be of the wall clock.
+        info.desc().append_child_value("unix_minus_lsl_s", f"{time.time() - self._lsl.local_clock():.6f}")
         listed = info.desc().append_child("channels")
         for name in names:
             quantity = name.rpartition("_")[2]

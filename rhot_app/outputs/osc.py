@@ -20,7 +20,8 @@ from rhot_app.outputs.joints import HandSample, Sample
 from rhot_app.outputs.spec import host_and_port
 from rhot_app.project import OutputSettings
 
-BUNDLE: Final = b"#bundle\0" + struct.pack(">Q", 1)  # the time tag 1: now
+NOW: Final = 1  # the time tag of what is meant for now (OSC 1.0)
+NTP_S: Final = 2_208_988_800  # from NTP's epoch, 1900, to 1970 (RFC 5905)
 DATAGRAM_MAX: Final = 1432  # bytes: what passes through Ethernet in one piece, with IPv6
 _WORD: Final = re.compile(r"[^A-Za-z0-9_.-]")  # OSC's addresses have no spaces and no wild cards
 Argument = int | float | str
@@ -34,13 +35,20 @@ def osc_message(address: str, *arguments: Argument) -> bytes:
                                   for value in arguments)) + values
 
 
-def bundles(messages: Iterator[bytes]) -> Iterator[bytes]:
-    """Messages in as few bundles as DATAGRAM_MAX allows."""
-    parts, length = [BUNDLE], len(BUNDLE)
+def time_tag(t_unix_ns: int | None) -> int:
+    """The time tag of an instant by the wall clock, ns since 1970: seconds since 1900 and their fraction, 32 bits each;
+    `NOW` where it is unknown."""
+    return NOW if t_unix_ns is None else ((t_unix_ns << 32) // 1_000_000_000 + (NTP_S << 32)) % (1 << 64)
+
+
+def bundles(messages: Iterator[bytes], t_unix_ns: int | None = None) -> Iterator[bytes]:
+    """Messages of one instant, ns since 1970 or unknown, in as few bundles as DATAGRAM_MAX allows."""
+    head = b"#bundle\0" + struct.pack(">Q", time_tag(t_unix_ns))
+    parts, length = [head], len(head)
     for message in messages:
         if length + 4 + len(message) > DATAGRAM_MAX:
             yield b"".join(parts)
-            parts, length = [BUNDLE], len(BUNDLE)
+            parts, length = [head], len(head)
         parts += [struct.pack(">i", len(message)), message]
         length += 4 + len(message)
     yield b"".join(parts)
@@ -131,10 +139,10 @@ class OscSink(UdpSink):
     def write(self, sample: Sample) -> None:
         """Send one state."""
         for hand in sample.hands:
-            for datagram in bundles(hand_messages(sample, hand)):
+            for datagram in bundles(hand_messages(sample, hand), sample.t_unix_ns):
                 self.send(datagram)
         if sample.objects:
-            for datagram in bundles(object_messages(sample)):
+            for datagram in bundles(object_messages(sample), sample.t_unix_ns):
                 self.send(datagram)
 
 

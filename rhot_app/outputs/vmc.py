@@ -85,7 +85,7 @@ class VmcSink(UdpSink):
 
     def write(self, sample: Sample) -> None:
         """Send one state; a hand that is unknown is left out, so that the avatar keeps the last one."""
-        for datagram in bundles(self._messages(sample)):
+        for datagram in bundles(self._messages(sample), sample.t_unix_ns):
             self.send(datagram)
 
     def _messages(self, sample: Sample) -> Iterator[bytes]:

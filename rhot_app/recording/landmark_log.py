@@ -180,7 +180,7 @@ def _write(path: Path, rig: Rig, times_s: Sequence[Array], frames: Callable[[int
         stated += frames(c, times_ns[c])
     try:
         with replacing(path) as file:
-            file.writelines(encode_log(rig, {**begun_now(_BEGIN_NS), **(about or {})},
+            file.writelines(encode_log(rig, {**begun_now(_BEGIN_NS), "created_t_master_ns": None, **(about or {})},
                                        sorted(stated, key=lambda record: record.t_master_ns)))
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be written ({exc.strerror}). Choose another --out.") from exc

@@ -134,12 +134,24 @@ def begun_now(t_master_ns: int) -> dict[str, Any]:
     return {"created": datetime.now(UTC).isoformat(timespec="milliseconds"), "created_t_master_ns": t_master_ns}
 
 
+FILMS: Final = "films"
+"""In the header of a log that was made of films: what they were."""
+
+
+def filmed_at(when: datetime, t_master_ns: int) -> dict[str, Any]:
+    """What the header of a log that was made of a film says of the film's own time: `when` it was taken, which is
+    `t_master_ns` by the log's clock."""
+    return {"filmed": when.astimezone(UTC).isoformat(timespec="milliseconds"), "filmed_t_master_ns": t_master_ns}
+
+
 def wall_clock_offset_ns(about: dict[str, Any], first_t_master_ns: int) -> int | None:
     """ns since 1970, UTC, less the master's clock, by a log's header; None when it does not say when it was begun.
-    `first_t_master_ns`: of its first record, which stands for its beginning in older logs."""
-    at_ns = about.get("created_t_master_ns", first_t_master_ns)
+    `first_t_master_ns`: of its first record, which stands for its beginning in older logs. Of a log that was made of
+    films, `created` says when it was made, and only `filmed` when its hands were there."""
+    key = "filmed" if FILMS in about else "created"
+    at_ns = about.get(f"{key}_t_master_ns", first_t_master_ns)
     try:
-        created = datetime.fromisoformat(about.get("created", ""))
+        created = datetime.fromisoformat(about.get(key, ""))
     except (ValueError, TypeError):
         return None
     since = (created if created.tzinfo else created.replace(tzinfo=UTC)) - datetime.fromtimestamp(0, UTC)

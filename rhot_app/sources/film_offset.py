@@ -8,6 +8,7 @@ Either must stand out from chance, and from every other place, or it is refused.
 from __future__ import annotations
 
 import contextlib
+from datetime import UTC, datetime
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any, Final
@@ -144,6 +145,22 @@ def _decoded(film: Any, av: Any) -> tuple[Array, float]:
     pictures = film.streams.video
     first = float(pictures[0].start_time * pictures[0].time_base) if pictures and pictures[0].start_time else 0.0
     return np.nan_to_num(np.concatenate([*parts, np.zeros(0, np.float32)]).astype(np.float64)), (begin or 0.0) - first
+
+
+def filmed(path: Path) -> datetime | None:
+    """When a film began, as its file says (`creation_time`, mostly to a second); None where it does not, and where the
+    package av, which reads that, is missing."""
+    try:
+        import av
+    except ImportError:
+        return None
+    try:
+        require_file(path)
+        with av.open(str(path), options={"format_whitelist": _DEMUXERS}) as film:
+            found = datetime.fromisoformat(film.metadata.get("creation_time", ""))
+    except (OSError, ValueError):  # av's errors are both
+        return None
+    return found if found.tzinfo else found.replace(tzinfo=UTC)
 
 
 # -- light -------------------------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
-from rhot_app.recording.raw_log import LogReader
+from rhot_app.recording.raw_log import FILMS, LogReader
 from rhot_app.recording.video import video_path
 from rhot_app.sources.frame_sets import CameraVideo, on_master_clock, open_video
 from rhot_node.errors import PictureError
@@ -29,9 +29,6 @@ from rhot_node.pictures import open_video as decoder
 from rhot_node.video.avi import pictures_of
 
 Image = NDArray[np.uint8]
-
-FILMS: Final = "films"
-"""In the header of a log that was made of films: `NamedFilm` by camera."""
 
 _PERIODS: Final = 2.0
 """Farther from a picture than this many of its periods there is none: frames were lost."""

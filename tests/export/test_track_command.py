@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 
 import cv2
@@ -21,7 +22,7 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.project import TrackerSettings, landmark_markers, load_rig, save_rig
 from rhot_app.recording.landmark_log import write_landmark_log
-from rhot_app.recording.raw_log import LogReader
+from rhot_app.recording.raw_log import LogReader, wall_clock_offset_ns
 from rhot_app.rig_history import versions
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
 from rhot_app.sources.films import recorded_films
@@ -85,15 +86,20 @@ def test_a_hand_is_tracked_with_its_own_bones_and_the_films_times(drawn, capsys)
     assert int(film.get(cv2.CAP_PROP_FRAME_COUNT)) == len(times)
 
 
-def test_the_log_that_is_kept_is_replayed_beside_the_films(drawn):
-    """Tracked again, it gives what the table has; a moment finds its picture."""
+def test_the_log_that_is_kept_is_replayed_beside_the_films(drawn, monkeypatch):
+    """Tracked again, it gives what the table has; a moment finds its picture, and the time at which it was taken, by
+    the film that says it."""
     use, words, folder = drawn
     use()
+    taken = datetime(2024, 5, 1, 12, 0, 0, tzinfo=UTC)
+    monkeypatch.setattr(landmark_track, "filmed", lambda path: taken if path.stem == RIG.nodes[1].name else None)
     assert main([*words, "--out", str(folder / "hand.csv"), "--log", str(folder / "hand.rhotlog")]) == 0
     _, places = table_of(folder / "hand.csv")
     with contextlib.closing(LogReader(folder / "hand.rhotlog")) as reader:
         rig = reader.rig
+        offset_ns = wall_clock_offset_ns(reader.about, 0)
     films = recorded_films(folder / "hand.rhotlog", rig)
+    assert int(films[1].video.times_ns[0]) + offset_ns == round(1e9 * taken.timestamp())
     assert [film.camera for film in films] == [0, 1] and rig.hand != RIG.hand, "its bones are measured"
     use()
     states = {state.t_master_ns: state for state in states_of_log(rig, folder / "hand.rhotlog")}

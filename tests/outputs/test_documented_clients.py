@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import threading
+import time
 import types
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -141,8 +142,11 @@ def test_lsl_streams_are_described(rig: Rig, monkeypatch: pytest.MonkeyPatch) ->
         def append_child_value(self, key: str, value: str) -> None:
             if key == "label":
                 self.labels.append(value)
+            if key == "unix_minus_lsl_s":
+                wall.append(float(value))
 
     labels: list[str] = []
+    wall: list[float] = []
     fake = types.SimpleNamespace(
         cf_float32=1, local_clock=lambda: 1000.0,
         StreamInfo=lambda *args: made.append(args) or types.SimpleNamespace(desc=lambda: Element(labels)),
@@ -156,6 +160,7 @@ def test_lsl_streams_are_described(rig: Rig, monkeypatch: pytest.MonkeyPatch) ->
     assert len(values) == len(labels) == 26 * 9
     assert labels[:9] == [f"palm_{part}" for part in ("x", "y", "z", "qx", "qy", "qz", "qw", "radius", "knowledge")]
     assert 999.0 < stamp <= 1000.0
+    assert wall == [pytest.approx(time.time() - 1000.0, abs=60.0)]
 
 
 @pytest.mark.parametrize(("module", "spec", "sentence"), [

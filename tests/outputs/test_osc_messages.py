@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import select
 import socket
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,6 +12,7 @@ import pytest
 from patience import PATIENCE_S
 from pythonosc.osc_bundle import OscBundle
 from pythonosc.osc_message import OscMessage
+from pythonosc.parsing.osc_types import IMMEDIATELY
 from streams import palm_before_cameras, state_of, unknown
 
 from rhot_app.hand.model import neutral_pose
@@ -56,6 +58,28 @@ def test_golden_bytes() -> None:
     assert osc_message("/a", 0.5, "abc") == b"/a\0\0,fs\0\x3f\0\0\0abc\0"
     (bundle,) = bundles(iter([osc_message("/a", 1)]))
     assert bundle == b"#bundle\0\0\0\0\0\0\0\0\x01\0\0\0\x0c/a\0\0,i\0\0\0\0\0\x01"
+    (timed,) = bundles(iter([osc_message("/a", 1)]), 1_500_000_000)  # 1.5 s after 1970
+    assert timed == bundle[:8] + b"\x83\xaa\x7e\x81\x80\0\0\0" + bundle[16:]
+
+
+@pytest.mark.parametrize(("kind", "joints"), [("osc", "own"), ("vmc", "openxr")])
+def test_bundles_have_the_wall_clocks_time_of_the_state(rig: Rig, receiver: socket.socket, kind: str,
+                                                        joints: str) -> None:
+    sink = {"osc": OscSink, "vmc": VmcSink}[kind](OutputSettings(kind, target(receiver), joints))
+    state = state_of(rig, neutral_pose(palm_before_cameras()))
+    replayed = replace(state, t_master_ns=1)
+    for one in (state, replayed):
+        sample = JointConverter(rig).sample(one, joints)
+        sink.open()
+        sink.write(sample)
+        sink.close()
+        bundle = OscBundle(receiver.recv(65536))
+        if one is replayed:
+            assert bundle.timestamp == IMMEDIATELY
+        else:
+            assert bundle.timestamp == pytest.approx(1e-9 * sample.t_unix_ns, abs=1e-5)
+        while select.select([receiver], [], [], 0.02)[0]:
+            receiver.recv(65536)
 
 
 def test_a_hand_is_read_by_another_library(rig: Rig, receiver: socket.socket) -> None:

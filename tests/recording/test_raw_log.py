@@ -324,6 +324,10 @@ def test_a_command_tells_losses_from_nothing_read(tmp_path: Path, capsys: pytest
     ({}, None), ({"created": "today"}, None), ({"created": 5}, None), ({"created": "0001-01-01T00:00:00"}, None),
     ({"created": "9999-01-01T00:00:00"}, None), ({"created": "1970-01-02", "created_t_master_ns": "0"}, None),
     ({"created": "1970-01-02", "created_t_master_ns": -1}, None),
+    ({"created": "1970-01-02", "created_t_master_ns": None}, None),  # made of a table, whose hands nobody dated
+    ({"created": "1970-01-02", "created_t_master_ns": 0, "films": {}}, None),  # the time of tracking is not the film's
+    ({"created": "1970-01-02", "films": {}, "filmed": "1970-01-01T00:01:40+00:00", "filmed_t_master_ns": 7},
+     100_000_000_000 - 7),
 ])
 def test_the_wall_clock_is_known_by_the_logs_beginning(about: dict[str, object], offset: int | None) -> None:
     assert wall_clock_offset_ns(about, 1_000_000_000) == offset

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import UTC, datetime
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rhot_app.__main__ import main
+from rhot_app.sources.film_offset import filmed
 
 FPS, SOUND_HZ = 30.0, 16_000
 LATER_S = 1.3371  # of the second film, no whole number of frames
@@ -33,10 +35,11 @@ def heard(sound: Array, begin_s: float, seconds: float, seed: int, noise: float 
     return part + np.random.default_rng(seed).normal(0.0, noise, len(part))
 
 
-def film_of(path: Path, sound: Array | None, seconds: float = 6.0) -> Path:
+def film_of(path: Path, sound: Array | None, seconds: float = 6.0, **metadata: str) -> Path:
     """A film of small grey pictures with AAC sound."""
     av = pytest.importorskip("av", reason="the extra `films` is not installed")
     with av.open(str(path), "w") as film:
+        film.metadata.update(metadata)
         pictures = film.add_stream("mpeg4", rate=Fraction(30))
         pictures.width, pictures.height, pictures.pix_fmt = 64, 48, "yuv420p"
         voice = None if sound is None else film.add_stream("aac", rate=SOUND_HZ, layout="mono")
@@ -132,3 +135,11 @@ def test_one_film_or_two_of_one_name_have_no_offset(tmp_path: Path, capsys: pyte
     films = [lit(tmp_path / name, (2.0,), 0.0, 0.5) for name in ("a.avi", "x/a.avi")]
     assert "two or more" in refused(capsys, str(films[0]))
     assert "two films" in refused(capsys, *map(str, films))
+
+
+def test_a_film_says_when_it_was_taken_or_nothing(tmp_path: Path) -> None:
+    dated = film_of(tmp_path / "dated.mp4", None, 0.2, creation_time="2024-05-01T12:00:03.000000Z")
+    assert filmed(dated) == datetime(2024, 5, 1, 12, 0, 3, tzinfo=UTC)
+    assert filmed(film_of(tmp_path / "plain.mp4", None, 0.2)) is None
+    (tmp_path / "none.mp4").write_bytes(b"no film")
+    assert filmed(tmp_path / "none.mp4") is None and filmed(tmp_path / "gone.mp4") is None

@@ -13,10 +13,10 @@ from film_writing import LEVELS, level_of, write_film
 
 from rhot_app.errors import RecordingError
 from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
-from rhot_app.recording.raw_log import LogReader, encode_log
+from rhot_app.recording.raw_log import FILMS, LogReader, encode_log
 from rhot_app.recording.video import video_path
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.sources.films import FILMS, FilmReader, recorded_films
+from rhot_app.sources.films import FilmReader, recorded_films
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.tracker import CameraObservations
 
