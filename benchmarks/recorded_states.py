@@ -21,13 +21,12 @@ import msgspec
 import numpy as np
 from tables import arguments, publish, table
 
-from rhot_app.engine.offline.replay_summary import replay_states, smoothed_states
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.errors import RecordingError, RhotError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
-from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.trackers import make_tracker
 
 SAME_M = 1e-6
@@ -49,10 +48,7 @@ def states_of(log: Path, tracker: str) -> Iterator[HandState]:
         validator = LogValidator(rig)
         if tracker == "smoothed" and not rig.tracker.smooths:
             raise RecordingError("this rig's tracker does not smooth")
-        if tracker == "smoothed":
-            yield from smoothed_states(reader, validator, SmoothedTracker(rig))
-        else:
-            yield from replay_states(reader, validator, make_tracker(rig))
+        yield from replay_states(reader, validator, make_tracker(rig, smooth=tracker == "smoothed"))
 
 
 def columns(states: list[HandState]) -> dict[str, Any]:

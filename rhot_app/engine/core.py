@@ -32,7 +32,7 @@ from rhot_app.rig_history import accept
 from rhot_app.sources.links import new_session
 from rhot_app.sources.source import ObservationSource, same_network
 from rhot_app.state import SeenContour
-from rhot_app.tracking.tracker import ShowsContours, Tracker
+from rhot_app.tracking.tracker import Tracker
 from rhot_node.threads import complaints
 
 _REPORT = "If that goes on, start the engine again, and send us a report (`rhot report`)."
@@ -265,8 +265,7 @@ class Engine:
 
     def contours(self) -> list[SeenContour]:
         """What the tracker has seen of a bare hand since this was asked last."""
-        tracker = self._pipeline.work.tracker
-        found = tracker.seen() if isinstance(tracker, ShowsContours) else []
+        found = self._pipeline.work.tracker.seen()
         fresh = [one for one in found if self._shown.get((one.camera, one.hand)) != one.t_master_ns]
         self._shown |= {(one.camera, one.hand): one.t_master_ns for one in fresh}
         return fresh

@@ -29,7 +29,6 @@ from rhot_app.tracking.markers.marker_model import points_on
 from rhot_app.tracking.tracker import (
     CameraFrame,
     CameraObservations,
-    ImageTracking,
     Tracker,
     feed,
     frame_part,
@@ -107,9 +106,8 @@ class Pipeline:
                 return
             with self.diagnostics.part("frames on their way", work.tracker.reset):
                 state = self._process(work, frames)
-                if isinstance(work.tracker, ImageTracking):
-                    for request in work.tracker.requests():
-                        work.source.search(request)
+                for request in work.tracker.requests():
+                    work.source.search(request)
                 if state is not None:
                     self._after_state()
 
@@ -131,7 +129,7 @@ class Pipeline:
                 feed(tracker, frame)
                 # Live, only the newest instant matters to anybody; a replay leaves none out.
                 if may_be_due(frame) and (not live or frame is last):
-                    if not live and isinstance(tracker, ImageTracking):
+                    if not live:
                         tracker.wait()
                     solved = tracker.solve()
             if solved is not None:
@@ -246,8 +244,7 @@ def warm_up(tracker: Tracker, rig: Rig) -> None:
                 encode(state)
                 if extrapolator is not None:
                     extrapolator.at(state, state.t_master_ns + _PERIOD_NS)  # windows find it compiled
-    if isinstance(tracker, ImageTracking):
-        tracker.warm_up()
+    tracker.warm_up()
     tracker.reset()
     _read_one(rig)
 

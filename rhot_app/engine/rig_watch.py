@@ -35,7 +35,7 @@ from rhot_app.tracking.refinement.refined_rig import (
     verdict_of,
 )
 from rhot_app.tracking.refinement.rig_refinement import Gathered, RigRefiner
-from rhot_app.tracking.tracker import CameraObservations, KeepsKeyFrames, Tracker
+from rhot_app.tracking.tracker import CameraObservations, Tracker
 from rhot_node.threads import OneShotThread
 
 log = logging.getLogger(__name__)
@@ -240,7 +240,7 @@ def _apart_mm(report: BonesReport, hand: HandAnatomy) -> float:
 
 def _kept(tracker: Tracker) -> list[KeyFrame]:
     """The tracker's key frames, none while they tell too little."""
-    found = tracker.key_frames if isinstance(tracker, KeepsKeyFrames) else None
+    found = tracker.key_frames
     return list(found.kept) if found is not None and found.sufficient else []
 
 

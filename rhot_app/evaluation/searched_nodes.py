@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.state import HandState
-from rhot_app.tracking.tracker import CameraFrame, CameraObservations, ImageTracking, Tracker, feed, may_be_due
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker, feed, may_be_due
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import Foreground, foreground_map
 from rhot_node.wire.messages import MarkerFlag
@@ -34,7 +34,6 @@ class SearchedNodes:
                  forget: bool = False, rounded_ns: int = 0) -> None:
         """`foreground`: what each camera has learnt. `markers`: of the rig's set. `forget`: requests are given back as
         a log has them. `rounded_ns`: by which the times of edges and maps differ from those of the markers."""
-        assert isinstance(tracker, ImageTracking)
         tracker.warm_up()
         self.tracker, self.foreground, self.markers, self.forget = tracker, list(foreground), markers, forget
         self.rounded_ns = rounded_ns
@@ -69,7 +68,6 @@ class SearchedNodes:
 
     def give(self, frame: CameraFrame) -> None:
         """Hand one frame to the tracker, keep its state if one is due, and note what it asks for."""
-        assert isinstance(self.tracker, ImageTracking)
         feed(self.tracker, frame)
         self.tracker.wait()
         state = self.tracker.solve() if may_be_due(frame) else None

@@ -23,6 +23,7 @@ from rhot_app.barehand.overlay import draw_skeleton
 from rhot_app.calibration.hand.landmark_bones import are_landmarks, measure_bones
 from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.calibration.recorded_observations import read_instants
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.errors import CalibrationError, RecordingError, input_file, note_loss
 from rhot_app.export.bare_hand import check_outputs, closing_sentences, lost_intervals, open_table
 from rhot_app.export.pictures import side_by_side, whole_pictures
@@ -40,7 +41,6 @@ from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
 from rhot_app.tracking.rig_arrays import rigs_of_hands
-from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
@@ -282,22 +282,8 @@ def _seen(rig: Rig, log: Path) -> list[NDArray[np.bool_]]:
 
 def states_of_log(rig: Rig, log: Path, smooth: bool = False) -> Iterator[HandState]:
     """The states of a log by the rig's estimator, one after every frame."""
-    validator, smoother, tracker = LogValidator(rig), SmoothedTracker(rig) if smooth else None, make_tracker(rig)
     with contextlib.closing(LogReader(log)) as reader:
-        for record in reader:
-            frame = validator.feed(record)
-            if not isinstance(frame, CameraObservations):
-                continue
-            if smoother is not None:
-                smoother.ingest(frame)
-                yield from smoother.states()
-                continue
-            tracker.ingest(frame)
-            state = tracker.solve()
-            if state is not None:
-                yield state
-    if smoother is not None:
-        yield from smoother.finish()
+        yield from replay_states(reader, LogValidator(rig), make_tracker(rig, smooth=smooth))
 
 
 def summarise(rig: Rig, states: Sequence[HandState]) -> dict[str, Any]:

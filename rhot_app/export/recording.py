@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 
 import numpy as np
 
-from rhot_app.barehand.observations import ImageFrame, SliceRequest
 from rhot_app.calibration.recorded_observations import why_none
 from rhot_app.diagnostics import Diagnostic, diagnostics_of
-from rhot_app.engine.offline.replay_summary import replay_states, smoothed_states
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.errors import ExportError, RecordingError, take_losses
 from rhot_app.export.states import HandStates, in_blocks
-from rhot_app.objects.observations import ObjectFrame
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, TrackerKind, load_rig, with_tracker
 from rhot_app.recording.raw_log import LogReader, Record, wall_clock_offset_ns
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
-from rhot_app.tracking.tracker import CameraObservations, ImageTracking, ObjectTracking, Tracker
+from rhot_app.tracking.smoothing import NOT_SMOOTHED
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 
 RATE_AFTER_S = 5.0
@@ -57,8 +55,8 @@ class TrackedLog:
             self.rig = own if tracker is None else with_tracker(own, tracker)
             if smooth and not self.rig.tracker.smooths:
                 raise ExportError(NOT_SMOOTHED)
-            self.tracker = make_tracker(self.rig)
-            self._frames = _FrameCount(SmoothedTracker(self.rig) if smooth else self.tracker, len(self.rig.nodes))
+            self.tracker = make_tracker(self.rig, smooth=smooth)
+            self._frames = _FrameTimes(len(self.rig.nodes))
         except BaseException:
             self._reader.close()
             raise
@@ -82,9 +80,7 @@ class TrackedLog:
 
     def blocks(self) -> Iterator[HandStates]:
         """The states, some hundred at a time. Raises RecordingError when there is none."""
-        frames, records = self._frames, self._records()
-        for block in in_blocks(smoothed_states(records, self._door, frames) if frames.smooths
-                               else replay_states(records, self._door, frames)):
+        for block in in_blocks(replay_states(self._records(), self._door, self.tracker, self._frames.note)):
             self.count += len(block)
             self.tracked += int(np.count_nonzero(block.tracked))
             yield block
@@ -100,7 +96,7 @@ class TrackedLog:
         return [one.sentence for one in self._diagnosed("warning")]
 
     def _diagnosed(self, level: str) -> list[Diagnostic]:
-        return [one for one in self._frames.diagnostics.all() if one.level == level]
+        return [one for one in diagnostics_of(self.tracker).all() if one.level == level]
 
     def _records(self) -> Iterator[Record]:
         """All that can be read; a broken log ends where it breaks."""
@@ -141,53 +137,21 @@ class TrackedLog:
         self.close()
 
 
-class _FrameCount:
-    """A tracker whose frames are noted, to tell the cameras' rate."""
+class _FrameTimes:
+    """Counts frames, and notes when the first of them were, to tell the cameras' rate."""
 
-    def __init__(self, tracker: Tracker | SmoothedTracker, cameras: int) -> None:
+    def __init__(self, cameras: int) -> None:
         self.count = 0
-        self.diagnostics = diagnostics_of(tracker)
-        self.smooths = isinstance(tracker, SmoothedTracker)
-        self.reset = tracker.reset
-        if isinstance(tracker, SmoothedTracker):
-            self.states, self.finish = tracker.states, tracker.finish
-        else:
-            self.solve, self.newest_frames = tracker.solve, tracker.newest_frames
-        self._inner = tracker
-        self._take: Callable[[CameraObservations], None] = tracker.ingest
         self._times_ns: list[list[int]] = [[] for _ in range(cameras)]  # of the first seconds
 
-    def ingest(self, observations: CameraObservations) -> None:
-        """Note one frame and pass it on."""
+    def note(self, frame: CameraFrame) -> None:
+        """Note one frame with markers."""
+        if not isinstance(frame, CameraObservations):
+            return
         self.count += 1
-        times, t_ns = self._times_ns[observations.camera], observations.t_row0_master_ns
+        times, t_ns = self._times_ns[frame.camera], frame.t_row0_master_ns
         if not times or t_ns - times[0] < 1e9 * RATE_AFTER_S:
             times.append(t_ns)
-        self._take(observations)
-
-    def ingest_objects(self, frame: ObjectFrame) -> None:
-        """Pass the tags of one frame on to a tracker of objects."""
-        if isinstance(self._inner, ObjectTracking):
-            self._inner.ingest_objects(frame)
-
-    def ingest_image(self, frame: ImageFrame) -> None:
-        """Pass edges or foreground on to a tracker that searches images."""
-        if isinstance(self._inner, ImageTracking):
-            self._inner.ingest_image(frame)
-
-    def requests(self) -> list[SliceRequest]:
-        """What such a tracker asks for."""
-        return self._inner.requests() if isinstance(self._inner, ImageTracking) else []
-
-    def warm_up(self) -> None:
-        """See `ImageTracking`."""
-        if isinstance(self._inner, ImageTracking):
-            self._inner.warm_up()
-
-    def wait(self) -> None:
-        """Until such a tracker has found what it looks for."""
-        if isinstance(self._inner, ImageTracking):
-            self._inner.wait()
 
     @property
     def rate_hz(self) -> float:

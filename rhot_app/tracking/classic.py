@@ -28,7 +28,7 @@ from rhot_app.tracking.association import MarkerAssociation
 from rhot_app.tracking.locate import LocateArrays
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig, filter_settings
-from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.tracker import CameraObservations, Tracker
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ LOST_S = 1e-9 * LOST_NS
 sight, but after this long the rest of it is a guess as well."""
 
 
-class ClassicTracker:
+class ClassicTracker(Tracker):
     """Implements `Tracker` for one rig. `solve` is due work; `ingest` only stores."""
 
     def __init__(self, rig: Rig) -> None:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import ImageFrame, SliceRequest
 from rhot_app.diagnostics import Diagnostics, diagnostics_of
 from rhot_app.estimation.filter import AHEAD_S, FilteredState, smooth
@@ -30,7 +29,7 @@ from rhot_app.objects.track import ObjectTracker
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
 from rhot_app.tracking.markers.marker_model import scaled_table
-from rhot_app.tracking.tracker import CameraObservations, ImageTracking, KeepsKeyFrames, ShowsContours, Tracker
+from rhot_app.tracking.tracker import CameraObservations, Tracker
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -123,13 +122,13 @@ def _scaled(pads: FingertipPads, scale: float) -> FingertipPads:
     return pads if scale == 1.0 else FingertipPads(scaled_table(pads.dh, scale), scale * pads.radii)
 
 
-class WithObjects:
+class WithObjects(Tracker):
     """Implements `Tracker` for a rig with objects: the states of a hand's tracker, with the objects."""
 
     def __init__(self, rig: Rig, hand: Tracker, own: Indices) -> None:
         """`hand`: of the markers `own`, numbers in the rig. Raises RigError as `RigObjects`."""
         self.diagnostics = diagnostics_of(hand)
-        self._objects, self._hand = RigObjects(rig, self.diagnostics), hand
+        self._objects, self._hand, self.key_frames = RigObjects(rig, self.diagnostics), hand, hand.key_frames
         self._markers = MarkersBeside(rig, own)
         self._latest: CameraObservations | None = None
         self._names, self._own = tuple(node.name for node in rig.nodes), tuple(rig.markers.ids[row] for row in own)
@@ -154,31 +153,23 @@ class WithObjects:
 
     def ingest_image(self, frame: ImageFrame) -> None:
         """Take one frame's edges or foreground in, where the hand's tracker searches images."""
-        if isinstance(self._hand, ImageTracking):
-            self._hand.ingest_image(frame)
+        self._hand.ingest_image(frame)
 
     def seen(self) -> list[SeenContour]:
         """What the hand's tracker has seen of a bare hand."""
-        return self._hand.seen() if isinstance(self._hand, ShowsContours) else []
-
-    @property
-    def key_frames(self) -> KeyFrames | None:
-        """See `KeepsKeyFrames`."""
-        return self._hand.key_frames if isinstance(self._hand, KeepsKeyFrames) else None
+        return self._hand.seen()
 
     def requests(self) -> list[SliceRequest]:
         """What the nodes shall search for the hand."""
-        return self._hand.requests() if isinstance(self._hand, ImageTracking) else []
+        return self._hand.requests()
 
     def warm_up(self) -> None:
-        """See `ImageTracking`."""
-        if isinstance(self._hand, ImageTracking):
-            self._hand.warm_up()
+        """See `Tracker`."""
+        self._hand.warm_up()
 
     def wait(self) -> None:
         """Until the hand that is being looked for is found or not."""
-        if isinstance(self._hand, ImageTracking):
-            self._hand.wait()
+        self._hand.wait()
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, of all markers, None before its first."""

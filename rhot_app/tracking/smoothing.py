@@ -30,8 +30,7 @@ from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObs
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.rig_arrays import without_objects
 from rhot_app.tracking.rig_objects import MarkersBeside, SmoothedObjects
-from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import require_estimator
+from rhot_app.tracking.tracker import CameraObservations, Tracker
 from rhot_app.tracking.two_hands import TwoHands
 
 Array = NDArray[np.float64]
@@ -265,13 +264,14 @@ class TwoRecordingEstimators(TwoHands):
         return self._hand, self._other
 
 
-class SmoothedTracker:
+class SmoothedTracker(Tracker):
     """Takes the frames of a recording in the order of arrival, and gives smoothed states in the order of time."""
 
+    smooths = True
+
     def __init__(self, rig: Rig) -> None:
-        """Raises RigError as `make_tracker` does; the rig's tracker must be the estimator of markers."""
+        """Raises RigError as `Estimator` does; the rig's tracker must be the estimator of markers."""
         assert rig.tracker.smooths
-        require_estimator(rig)
         hand, own = without_objects(rig)
         self._tracker = RecordingEstimator(hand) if rig.other_hand is None else TwoRecordingEstimators(hand)
         self.diagnostics = diagnostics_of(self._tracker)

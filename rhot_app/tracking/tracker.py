@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,73 +69,63 @@ class CameraObservations:
     t_row0_node_ns: int = 0
 
 
-class Tracker(Protocol):
-    """Fed with every frame as it arrives, asked for a state when one may be due. One thread only."""
+class Tracker:
+    """Fed with every frame as it arrives, asked for a state when one may be due. One thread only.
+
+    What a tracker has nothing to do with, as objects, images or smoothing, it leaves as it is here.
+    """
+
+    smooths: ClassVar[bool] = False
+    """Whether its states use the whole recording; they come late, by `states` and `finish` only."""
+
+    key_frames: KeyFrames | None = None
+    """What tells most of a bare hand's shape, of a tracker by contours. Any thread may read."""
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in. Cheap: called for every datagram even when flooded."""
-        ...
-
-    def solve(self) -> HandState | None:
-        """The state at the newest instant that is due and not yet published, or None."""
-        ...
-
-    def newest_frames(self) -> tuple[CameraObservations | None, ...]:
-        """Each camera's newest frame, None before its first. May be called by another thread."""
-        ...
+        raise NotImplementedError
 
     def reset(self) -> None:
         """Forget everything: a new session, or a node's clock was set."""
-        ...
+        raise NotImplementedError
 
+    def solve(self) -> HandState | None:
+        """The state at the newest instant that is due and not yet published, or None."""
+        return None
 
-@runtime_checkable
-class ShowsContours(Protocol):
-    """A tracker that can say what it has seen of a bare hand."""
+    def states(self) -> Iterator[HandState]:
+        """All states that are due."""
+        state = self.solve()
+        if state is not None:
+            yield state
 
-    def seen(self) -> list[SeenContour]:
-        """The newest image of each camera and hand; none while there is no hand. Any thread may ask."""
-        ...
+    def finish(self) -> Iterator[HandState]:
+        """A recording is over: the rest of the states."""
+        return iter(())
 
-
-@runtime_checkable
-class KeepsKeyFrames(Protocol):
-    """A tracker that keeps what tells most of a bare hand's shape."""
-
-    @property
-    def key_frames(self) -> KeyFrames | None:
-        """The key frames, None while no bare hand is tracked by its contours. Any thread may read them."""
-        ...
-
-
-@runtime_checkable
-class ObjectTracking(Protocol):
-    """A tracker that tracks objects as well."""
+    def newest_frames(self) -> tuple[CameraObservations | None, ...]:
+        """Each camera's newest frame, None before its first. May be called by another thread."""
+        return ()
 
     def ingest_objects(self, frame: ObjectFrame) -> None:
         """Take the fiducial tags of one frame, or a pose of another tracker, in."""
-        ...
-
-
-@runtime_checkable
-class ImageTracking(Protocol):
-    """A tracker that has the nodes search their images."""
 
     def ingest_image(self, frame: ImageFrame) -> None:
         """Take the edges or the foreground of one frame in."""
-        ...
 
     def requests(self) -> list[SliceRequest]:
-        """What the nodes shall search now; asked for after every `solve`."""
-        ...
+        """What the nodes shall search in their images now; asked for after every `solve`."""
+        return []
+
+    def seen(self) -> list[SeenContour]:
+        """What is seen of a bare hand: the newest image of each camera and hand. Any thread may ask."""
+        return []
 
     def warm_up(self) -> None:
-        """Have everything compiled that a search needs, then forget."""
-        ...
+        """Have everything compiled that frames like those of the start do not reach, then forget."""
 
     def wait(self) -> None:
         """Until what is being looked for beside the frames is found or not. A replay calls it; live, nobody waits."""
-        ...
 
 
 CameraFrame = CameraObservations | ObjectFrame | ImageFrame
@@ -149,14 +139,12 @@ def may_be_due(frame: CameraFrame) -> bool:
 
 
 def feed(tracker: Tracker, frame: CameraFrame) -> None:
-    """Have `tracker` take a frame in. Tags and poses are for those that track objects, edges and foreground for
-    those that search images."""
+    """Have `tracker` take a frame in."""
     if isinstance(frame, CameraObservations):
         tracker.ingest(frame)
     elif isinstance(frame, ImageFrame):
-        if isinstance(tracker, ImageTracking):
-            tracker.ingest_image(frame)
-    elif isinstance(tracker, ObjectTracking):
+        tracker.ingest_image(frame)
+    else:
         tracker.ingest_objects(frame)
 
 
@@ -167,10 +155,9 @@ def frame_part(diagnostics: Diagnostics, tracker: Tracker, frame: CameraFrame, c
     return diagnostics.part(name, tracker.reset, among="frames")
 
 
-def solve_after(tracker: Tracker, frame: CameraFrame) -> HandState | None:
-    """The state after one frame of a recording, if the frame completes one; nothing is left for later."""
+def states_after(tracker: Tracker, frame: CameraFrame) -> list[HandState]:
+    """The states after one frame of a recording, if the frame completes any; nothing is left for later."""
     feed(tracker, frame)
-    if isinstance(tracker, ImageTracking):
-        tracker.wait()
-        tracker.requests()  # nobody searches again
-    return tracker.solve() if may_be_due(frame) else None
+    tracker.wait()
+    tracker.requests()  # nobody searches again
+    return list(tracker.states()) if may_be_due(frame) else []

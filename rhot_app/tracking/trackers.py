@@ -12,13 +12,18 @@ from rhot_app.tracking.contours.two_hands import TwoBareHands
 from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.rig_arrays import without_objects
 from rhot_app.tracking.rig_objects import WithObjects
+from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.tracker import Tracker
 from rhot_app.tracking.two_hands import TwoHands
 
 
-def make_tracker(rig: Rig) -> Tracker:
-    """A new tracker for `rig` and its objects. Raises RigError when the estimator cannot work with its markers, cameras
-    or nodes, or the mesh of an object cannot be used."""
+def make_tracker(rig: Rig, *, smooth: bool = False) -> Tracker:
+    """A new tracker for `rig` and its objects. `smooth`: one for recordings, whose states use all frames; the rig's
+    tracker must be one that smooths. Raises RigError when the estimator cannot work with its markers, cameras or nodes,
+    or the mesh of an object cannot be used."""
+    if smooth:
+        require_estimator(rig)
+        return SmoothedTracker(rig)
     if rig.tracker.kind == "classic":
         own = np.arange(len(rig.markers.markers))  # it locates markers wherever they are
         tracker: Tracker = ClassicTracker(rig)

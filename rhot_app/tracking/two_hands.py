@@ -29,7 +29,7 @@ _WORK = ("triangulate", "filter", "solve")
 """Stages that are gone through for one hand after the other."""
 
 
-class TwoHands:
+class TwoHands(Tracker):
     """Implements `Tracker` for a rig with an `other_hand`: states of its `hand`, whose `other` is of the other one.
 
     The arrays of a state's markers are those of the whole rig; its `other` has its own markers only.

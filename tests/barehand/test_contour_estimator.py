@@ -25,7 +25,7 @@ from rhot_app.hand.skeleton import FLEXIONS, JOINTS, HandPose
 from rhot_app.project import Rig, TrackerSettings, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.contours.finder import Finder
-from rhot_app.tracking.tracker import CameraFrame, ShowsContours
+from rhot_app.tracking.tracker import CameraFrame
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
@@ -92,7 +92,6 @@ class Run:
 def run(film, request) -> Run:
     nodes = shown_nodes(film, forget=request.param)
     nodes.show(film[0][2], 3)
-    assert isinstance(nodes.tracker, ShowsContours)
     waiting = nodes.tracker.seen()
     follow(nodes, film)
     followed, drawn, asked, before = nodes.states[-1], nodes.tracker.seen(), list(nodes.asked), len(nodes.states)

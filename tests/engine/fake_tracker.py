@@ -6,10 +6,10 @@ import numpy as np
 
 from rhot_app.project import Rig
 from rhot_app.state import LATENCY_STAGES, UNESTIMATED, Condition, HandState, Knowledge
-from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.tracker import CameraObservations, Tracker
 
 
-class FakeTracker:
+class FakeTracker(Tracker):
     """A state for every frame of the last camera; notes what it was asked."""
 
     def __init__(self, rig: Rig) -> None:

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot_app.engine.offline.replay_summary import SmoothedReplay, replay_states, smoothed_states
+from rhot_app.engine.offline.replay_summary import SmoothedReplay, replay_states
 from rhot_app.engine.pipeline import warm_up
 from rhot_app.errors import EngineError, RecordingError
 from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
@@ -14,7 +14,7 @@ from rhot_app.project import with_tracker
 from rhot_app.recording.raw_log import LogReader, encode_header
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.smoothing import SmoothedTracker
+from rhot_app.tracking.trackers import make_tracker
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def log(tmp_path_factory):
 
 def test_every_pass_gives_the_smoothed_states(log):
     rig = with_tracker(LogReader(log).rig, "estimator")
-    expected = list(smoothed_states(LogReader(log), LogValidator(rig), SmoothedTracker(rig)))
+    expected = list(replay_states(LogReader(log), LogValidator(rig), make_tracker(rig, smooth=True)))
     tracker = SmoothedReplay(log, rig).for_rig(rig)
     warm_up(tracker, rig)
     for first in (0, len(expected)):

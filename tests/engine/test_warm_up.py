@@ -8,10 +8,11 @@ from synthetic_rig import make_rig
 from rhot_app.engine.pipeline import warm_up
 from rhot_app.project import OTHER_HAND, CameraPose
 from rhot_app.state import Condition
+from rhot_app.tracking.tracker import Tracker
 from rhot_app.tracking.trackers import make_tracker
 
 
-class Spy:
+class Spy(Tracker):
     """A tracker that remembers what it said."""
 
     def __init__(self, tracker):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from linear_motion import ConstantVelocity, kalman_update, place
 
-from rhot_app.engine.offline.replay_summary import replay_states, smoothed_states
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.estimation.filter import ChunkedSmoother, FilteredState, IteratedFilter, smooth
 from rhot_app.evaluation import fault_injection as alter
 from rhot_app.evaluation.compare import MOTIONS
@@ -16,7 +16,6 @@ from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition
-from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 
@@ -112,7 +111,7 @@ def both(one, records):
     """Filtered and smoothed states of the records."""
     rig = with_tracker(one.rig, "estimator")
     return (list(replay_states(records, LogValidator(rig), make_tracker(rig))),
-            list(smoothed_states(records, LogValidator(rig), SmoothedTracker(rig))))
+            list(replay_states(records, LogValidator(rig), make_tracker(rig, smooth=True))))
 
 
 def tips(one, states):

@@ -22,7 +22,6 @@ from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettin
 from rhot_app.recording.landmark_log import LandmarkTable, read_landmark_table, write_landmark_log
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
@@ -163,7 +162,7 @@ def _states(rig, tables, smooth):
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "hand.log"
         write_landmark_log(log, rig, tables)
-        validator, tracker, first_ns = LogValidator(rig), SmoothedTracker(rig) if smooth else make_tracker(rig), None
+        validator, tracker, first_ns = LogValidator(rig), make_tracker(rig, smooth=smooth), None
         with contextlib.closing(LogReader(log)) as reader:
             for record in reader:
                 frame = validator.feed(record)
@@ -171,7 +170,5 @@ def _states(rig, tables, smooth):
                     continue
                 first_ns = frame.t_row0_master_ns if first_ns is None else first_ns
                 tracker.ingest(frame)
-                states = tracker.states() if smooth else [tracker.solve()]
-                yield from ((first_ns, state) for state in states if state is not None)
-        if smooth:
-            yield from ((first_ns, state) for state in tracker.finish())
+                yield from ((first_ns, state) for state in tracker.states())
+        yield from ((first_ns, state) for state in tracker.finish())

@@ -29,7 +29,6 @@ from rhot_app.state import Condition
 from rhot_app.tracking.markers import acquisition
 from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
-from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 
@@ -281,11 +280,11 @@ def test_a_hand_that_one_camera_has_begun_is_begun_anew_by_two(smooth):
                         1.0, FPS, 1)
     frames = [frame for frame in detected_landmarks(RIG, small, 1)
               if frame.camera == 1 or frame.t_row0_master_ns > EPOCH_NS + 400_000_000]
-    tracker, states = SmoothedTracker(RIG) if smooth else make_tracker(RIG), []
+    tracker, states = make_tracker(RIG, smooth=smooth), []
     for frame in frames:
         tracker.ingest(frame)
-        states += tracker.states() if smooth else [tracker.solve()]
-    states += tracker.finish() if smooth else []
+        states += tracker.states()
+    states += tracker.finish()
     joints = small.joints()
     off_mm = {condition: [1e3 * np.median(np.linalg.norm(state.joint_positions - joints[round(
         1e-9 * (state.t_master_ns - EPOCH_NS) * FPS)], axis=1)) for state in states if state.condition is condition]

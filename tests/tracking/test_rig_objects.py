@@ -28,7 +28,6 @@ from rhot_app.project import Rig, with_object, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.markers.estimator import Estimator
-from rhot_app.tracking.smoothing import SmoothedTracker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_app.tracking.trackers import make_tracker
 
@@ -108,12 +107,11 @@ def test_objects_are_there_without_a_hand_that_is_failed_over(rig: Rig, smoothed
             raise FloatingPointError("overflow")
         return state
     monkeypatch.setattr(Estimator, "solve", fail)
-    tracker, states = SmoothedTracker(rig) if smoothed else make_tracker(rig), list[HandState]()
+    tracker, states = make_tracker(rig, smooth=smoothed), list[HandState]()
     for frame in seen:
         tracker.ingest(frame)
-        if not isinstance(tracker, SmoothedTracker):
-            states += [state] if (state := tracker.solve()) is not None else []
-    states += list(tracker.finish()) if isinstance(tracker, SmoothedTracker) else []
+        states += tracker.states()
+    states += tracker.finish()
     assert [state.sequence for state in states] == list(range(len(states)))
     lost = [state for state in states[20:] if state.condition is Condition.LOST]
     assert len(lost) == (0 if smoothed else 3) and len(states) == len(seen)

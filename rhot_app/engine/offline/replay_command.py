@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.project import load_rig, with_tracker
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogReplay
-    from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
+    from rhot_app.tracking.smoothing import NOT_SMOOTHED
     from rhot_app.tracking.trackers import make_tracker
     from rhot_node.logs import log_to_stderr
 
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         raise RecordingError(NOT_SMOOTHED)
     announce_compilation()
     if args.json:
-        print(json.dumps(summarise(reader, rig, SmoothedTracker(rig) if args.smooth else make_tracker(rig))))
+        print(json.dumps(summarise(reader, rig, make_tracker(rig, smooth=args.smooth))))
         return 0
     reader.close()
     trackers: MakeTracker = make_tracker

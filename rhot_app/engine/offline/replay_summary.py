@@ -5,49 +5,30 @@ from __future__ import annotations
 import contextlib
 import tempfile
 from array import array
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from rhot_app.diagnostics import diagnostics_of
 from rhot_app.engine.status import TOPIC_STATE, decode, encode
 from rhot_app.errors import EngineError, RecordingError
-from rhot_app.objects.observations import ObjectFrame
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState, Knowledge
-from rhot_app.tracking.smoothing import SmoothedTracker
-from rhot_app.tracking.tracker import CameraObservations, ObjectTracking, Tracker, frame_part, solve_after
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker, frame_part, states_after
+from rhot_app.tracking.trackers import make_tracker
 
 
-class FrameSmoother(Protocol):
-    """What `smoothed_states` asks of a `SmoothedTracker`, or of what stands before one."""
-
-    def reset(self) -> None:
-        """A new session, or a clock was set."""
-        ...
-
-    def ingest(self, observations: CameraObservations) -> None:
-        """Take one frame in."""
-        ...
-
-    def states(self) -> Iterator[HandState]:
-        """The states that have become final."""
-        ...
-
-    def finish(self) -> Iterator[HandState]:
-        """The rest of them."""
-        ...
-
-
-def replay_states(records: Iterable[Record], door: LogValidator, tracker: Tracker) -> Iterator[HandState]:
-    """The states that the engine would have published from these records, one for every frame that completes one. A
-    frame over which the tracker fails is lost and counted (`Diagnostics`)."""
+def replay_states(records: Iterable[Record], door: LogValidator, tracker: Tracker,
+                  watch: Callable[[CameraFrame], None] = lambda frame: None) -> Iterator[HandState]:
+    """The states that the engine would have published from these records, one for every frame that completes one; of a
+    tracker that smooths all of them, in the order of time, some seconds late. A frame over which the tracker fails is
+    lost and counted (`Diagnostics`). `watch` is given every frame before."""
     changes, diagnostics, cameras = door.changes, diagnostics_of(tracker), [link.node.name for link in door.links]
     for record in records:
         frame = door.feed(record)
@@ -56,32 +37,15 @@ def replay_states(records: Iterable[Record], door: LogValidator, tracker: Tracke
         if door.changes != changes:
             changes = door.changes
             tracker.reset()
-        state = None
+        watch(frame)
+        states: list[HandState] = []
         with frame_part(diagnostics, tracker, frame, cameras):
-            state = solve_after(tracker, frame)
-        if state is not None:
-            yield state
-
-
-def smoothed_states(records: Iterable[Record], door: LogValidator, tracker: FrameSmoother) -> Iterator[HandState]:
-    """The states of these records by all of them, in the order of time; they come some seconds late."""
-    changes = door.changes
-    for record in records:
-        frame = door.feed(record)
-        if frame is None:
-            continue
-        if door.changes != changes:
-            changes = door.changes
-            tracker.reset()
-        if isinstance(frame, CameraObservations):
-            tracker.ingest(frame)
-            yield from tracker.states()
-        elif isinstance(frame, ObjectFrame) and isinstance(tracker, ObjectTracking):
-            tracker.ingest_objects(frame)
+            states = states_after(tracker, frame)
+        yield from states
     yield from tracker.finish()
 
 
-def summarise(reader: LogReader, rig: Rig, tracker: Tracker | SmoothedTracker) -> dict[str, Any]:
+def summarise(reader: LogReader, rig: Rig, tracker: Tracker) -> dict[str, Any]:
     """What a log holds and what the tracker makes of it; every key ends in its unit.
 
     Raises RecordingError when not one record of the log can be read.
@@ -89,8 +53,7 @@ def summarise(reader: LogReader, rig: Rig, tracker: Tracker | SmoothedTracker) -
     door = LogValidator(rig)
     times = _Span()
     records = times.watch(reader)
-    states = list(smoothed_states(records, door, tracker) if isinstance(tracker, SmoothedTracker)
-                  else replay_states(records, door, tracker))
+    states = list(replay_states(records, door, tracker))
     duration_s = 1e-9 * (states[-1].t_master_ns - states[0].t_master_ns) if len(states) > 1 else 0.0
     return {
         "log": str(reader.path), "duration_s": times.duration_s, "torn_bytes": reader.torn_bytes,
@@ -98,7 +61,7 @@ def summarise(reader: LogReader, rig: Rig, tracker: Tracker | SmoothedTracker) -
         "damaged_places": reader.losses.places, "skipped_bytes": reader.losses.skipped_bytes,
         "damaged_header_bytes": reader.losses.header_bytes,
         "missed_records": door.gaps, "unknown_node_records": door.unknown_nodes,
-        "smoothed": isinstance(tracker, SmoothedTracker),
+        "smoothed": tracker.smooths,
         "diagnostics": [{"level": one.level, "what": one.what, "frames": one.count}
                         for one in diagnostics_of(tracker).all()],
         "states": len(states), "state_rate_hz": (len(states) - 1) / duration_s if duration_s else 0.0,
@@ -154,8 +117,8 @@ class _Span:
 _RECORD_BYTES = 21  # around a record's data (docs/log.md)
 
 
-class SmoothedReplay:
-    """Implements `Tracker` for the frames of one log, in any number of passes. Its states lie in a temporary file."""
+class SmoothedReplay(Tracker):
+    """Plays the frames of one log, in any number of passes. Its states lie in a temporary file."""
 
     def __init__(self, path: Path, rig: Rig, progress: Progress = silent) -> None:
         """Smooth the log with the rig's tracker, the estimator. Raises RecordingError when nothing comes of it or
@@ -167,7 +130,7 @@ class SmoothedReplay:
         with contextlib.closing(LogReader(path)) as reader:
             try:
                 records = _watched(reader, progress)
-                for state in smoothed_states(records, LogValidator(rig), SmoothedTracker(rig)):
+                for state in replay_states(records, LogValidator(rig), make_tracker(rig, smooth=True)):
                     self._offsets.append(self._offsets[-1] + self._file.write(encode(state)))
                     received_ns.append(state.t_receive_ns)
             except OSError as exc:

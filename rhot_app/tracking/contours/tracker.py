@@ -32,15 +32,15 @@ from rhot_app.tracking.contours.finder import SAME_MAPS_NS, Finder, Maps, Newest
 from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.contours.occlusion import Capsules
 from rhot_app.tracking.contours.requests import Requests, requested_contour
-from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.tracker import CameraObservations, Tracker
 from rhot_node.wire.slices import SLICES_MAX
 
 Array = NDArray[np.float64]
 Estimate = tuple[Array, Array]
 
 
-class ContourEstimator:
-    """Implements `Tracker` and `ImageTracking`: a state after the edges of each frame."""
+class ContourEstimator(Tracker):
+    """A state after the edges of each frame."""
 
     def __init__(self, rig: Rig, hands: int = 1, lateral_m: float = 0.0) -> None:
         """`hands`: number of hands that share the nodes' requests. `lateral_m`: see `barehand.start.shown_pose`. Raises
@@ -54,7 +54,7 @@ class ContourEstimator:
         self._finder = Finder(self._hand)
         self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
         self._names, self._tracked_with = tuple(node.name for node in rig.nodes), rig.tracked_with
-        self.key_frames = KeyFrames(self._hand.model)
+        self.key_frames: KeyFrames = KeyFrames(self._hand.model)
         self._shown_contours: list[SeenContour] = []
         self._sequence = 0
         self.reset()
@@ -83,7 +83,7 @@ class ContourEstimator:
         self._tracking = self._was_confirmed = False
         self._latest: CameraObservations | EdgeFrame | None = None
 
-    # -- Tracker and ImageTracking -------------------------------------------------------------------------------------
+    # -- Tracker -------------------------------------------------------------------------------------------------------
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take the markers of one frame, which also has the time of the camera's frame."""
@@ -100,7 +100,7 @@ class ContourEstimator:
         return tuple(camera.newest for camera in self._cameras)
 
     def seen(self) -> list[SeenContour]:
-        """See `ShowsContours`. Without a hand, the pose that it is to take."""
+        """See `Tracker`. Without a hand, the pose that it is to take."""
         if not self.confirmed:
             return self._shown()
         state = self._hand.filter.newest.state

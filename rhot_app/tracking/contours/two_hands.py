@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest
 from rhot_app.barehand.relocalisation import RELOCALISATION_LOG_ODDS
 from rhot_app.barehand.silhouette import CORRELATED, score
@@ -49,7 +48,7 @@ _PALM_JOINTS = [0, *(joints.start for joints in JOINT_SLICES[1:])]  # wrist and 
 
 
 class TwoBareHands(TwoHands):
-    """Implements `Tracker` and `ImageTracking` for a rig with an `other_hand`: a state after the edges of each
+    """For a rig with an `other_hand`: a state after the edges of each
     frame."""
 
     def __init__(self, rig: Rig) -> None:
@@ -58,6 +57,7 @@ class TwoBareHands(TwoHands):
             own, hands=2, lateral_m=-LATERAL_M if own.hand.side == "right" else LATERAL_M))
         assert isinstance(self._hand, ContourEstimator) and isinstance(self._other, ContourEstimator)
         self._both = self._hand, self._other
+        self.key_frames = self._hand.key_frames
         for hand in self._both:
             hand.occluder = partial(self._occluder, hand)
         self._cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
@@ -191,7 +191,7 @@ class TwoBareHands(TwoHands):
         return found
 
     def warm_up(self) -> None:
-        """See `ImageTracking`."""
+        """See `Tracker`."""
         for hand in self._both:
             hand.warm_up()
         one, camera = self._both[0].hand, self._cameras[0]
@@ -228,13 +228,8 @@ class TwoBareHands(TwoHands):
         return self._merged_at(t_ns, replace(hand, t_receive_ns=received_ns), replace(other, t_receive_ns=received_ns))
 
     def seen(self) -> list[SeenContour]:
-        """See `ShowsContours`."""
+        """See `Tracker`."""
         return [replace(contour, hand=number) for number, hand in enumerate(self._both) for contour in hand.seen()]
-
-    @property
-    def key_frames(self) -> KeyFrames:
-        """Of the rig's first hand (`KeepsKeyFrames`)."""
-        return self._both[0].key_frames
 
 
 def _palm_distance_m(ours: Array, theirs: Array) -> float:

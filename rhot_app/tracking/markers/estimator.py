@@ -28,7 +28,7 @@ from rhot_app.tracking.markers.hand_size import HandSize
 from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
-from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.tracker import CameraObservations, Tracker
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ REJECTIONS = 2
 _PENDING = 16
 
 
-class Estimator:
+class Estimator(Tracker):
     """Implements `Tracker`: a state after every frame."""
 
     def __init__(self, rig: Rig) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.engine.observer import condition_of
-from rhot_app.engine.offline.replay_summary import replay_states, smoothed_states
+from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.engine.pipeline import warm_up
 from rhot_app.engine.status import TOPIC_STATE, decode, encode
 from rhot_app.errors import RecordingError
@@ -31,7 +31,7 @@ from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.films import RecordedFilm, recorded_films
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition, HandState
-from rhot_app.tracking.smoothing import NOT_SMOOTHED, SmoothedTracker
+from rhot_app.tracking.smoothing import NOT_SMOOTHED
 from rhot_app.tracking.trackers import make_tracker
 from rhot_app.ui.models.meters import JitterWindow
 
@@ -82,15 +82,13 @@ def track_log(log: Path, rig: Rig, out: Path, smooth: bool = False, *, progress:
         raise RecordingError(NOT_SMOOTHED)
     reader = LogReader(log)
     try:
-        tracker = make_tracker(rig)
+        tracker = make_tracker(rig, smooth=smooth)
         progress("Preparing the tracker …", 0.0)
         warm_up(tracker, rig)
         records = ReadableLog(reader, progress)
         collected = _Collected(rig)
         with out.open("wb", buffering=0) as file:
-            door = LogValidator(rig)
-            for state in (smoothed_states(iter(records), door, SmoothedTracker(rig)) if smooth
-                          else replay_states(iter(records), door, tracker)):
+            for state in replay_states(iter(records), LogValidator(rig), tracker):
                 _write(file, collected.take(state), out)
         if not collected.times_ns:
             raise RecordingError(f"{log}: {_why_nothing(records)}")
