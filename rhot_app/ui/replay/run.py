@@ -84,7 +84,7 @@ def track_log(log: Path, rig: Rig, out: Path, smooth: bool = False, *, progress:
     try:
         tracker = make_tracker(rig, smooth=smooth)
         progress("Preparing the tracker …", 0.0)
-        warm_up(tracker, rig)
+        warm_up(make_tracker(rig), rig)
         records = ReadableLog(reader, progress)
         collected = _Collected(rig)
         with out.open("wb", buffering=0) as file:
