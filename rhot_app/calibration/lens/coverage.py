@@ -170,9 +170,13 @@ class CaptureGuide:
         trouble = self._trouble(view, moved, new)
         if trouble:
             return Decision(False, trouble)
-        self._views.append(view)
-        self._places.append(where)
+        self.keep(view)
         return Decision(True, f"Taken: {len(self._views)}. {self._wish() or 'That is enough.'}")
+
+    def keep(self, view: BoardView) -> None:
+        """Take a view that was chosen already, as of a film."""
+        self._views.append(view)
+        self._places.append(place(view, self._board))
 
     def discard_last(self) -> None:
         """Forget the view that was taken last."""

@@ -65,11 +65,13 @@ class Moment:
 @dataclass(frozen=True, slots=True, eq=False)
 class FilmFrames:
     """The `moments` that were chosen of films, in the order of time; how many frames were `searched` of each film, in
-    how many of them the board was `found`, and of films without a board some pictures, to find out why."""
+    how many of them the board was `found`, the frame of each in which it is `stillest`, with its view, and of films
+    without a board some pictures, to find out why."""
 
     moments: tuple[Moment, ...]
     searched: int
     found: tuple[int, ...]
+    stillest: tuple[tuple[Gray, BoardView] | None, ...]
     unexplained: tuple[tuple[Gray, ...], ...]
 
 
@@ -94,16 +96,15 @@ def choose_frames(films: Sequence[Path], board: Board, offsets_s: Sequence[float
     first = clips[0]
     frames = np.arange(first.nearest(begin), first.nearest(end) + 1)
     times = first.begin_s + frames[::-(-len(frames) // SEARCHED)] / first.fps
-    rows, unexplained = [], []
-    for k, clip in enumerate(clips):
-        views, without = _search(clip, times, board, within(progress, k / len(clips), (k + 1) / len(clips)))
-        rows.append(views)
-        unexplained.append(without if not any(views) else ())
+    searches = [_search(clip, times, board, within(progress, k / len(clips), (k + 1) / len(clips)))
+                for k, clip in enumerate(clips)]
+    rows = [search.views for search in searches]
     moments = [Moment(float(t), views) for t, views in zip(times, zip(*rows, strict=True), strict=True)
                if sum(view is not None for view in views) >= min(2, len(clips))]
     chosen = sorted(_choose(moments, board), key=lambda moment: moment.t_s)
     return FilmFrames(tuple(chosen), len(times), tuple(sum(view is not None for view in row) for row in rows),
-                      tuple(unexplained))
+                      tuple(search.stillest for search in searches),
+                      tuple(() if any(search.views) else search.without for search in searches))
 
 
 def frame_at(path: Path) -> NDArray[np.uint8]:
@@ -185,18 +186,29 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
         capture.release()
 
 
-def _search(clip: _Clip, times: Array, board: Board,
-            progress: Progress) -> tuple[list[FilmView | None], tuple[Gray, ...]]:
-    """The board at each of `times` (T,) s, and pictures in which it is not."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Search:
+    """The board at each time, the frame in which it is stillest, and frames in which it is not."""
+
+    views: list[FilmView | None]
+    stillest: tuple[Gray, BoardView] | None
+    without: tuple[Gray, ...]
+
+
+def _search(clip: _Clip, times: Array, board: Board, progress: Progress) -> _Search:
+    """Look for the board at each of `times` (T,) s."""
     numbers = np.array([clip.nearest(t) for t in times])
     beside = np.unique(np.clip(np.concatenate([numbers - 1, numbers, numbers + 1]), 0, clip.count - 1))
     found: dict[int, FilmView | None] = {}
     without: list[Gray] = []
     before: tuple[int, Gray, BoardView | None] | None = None
+    best, stillest = np.inf, None
     for number, picture in clip.frames(beside):
         gray, view = to_gray(picture), None
         if before is not None and number == before[0] + 1 and before[2] is not None:
-            found[before[0]] = _worse(found[before[0]], _motion(before[1], gray, before[2]))
+            seen = found[before[0]] = _worse(found[before[0]], _motion(before[1], gray, before[2]))
+            if seen is not None and seen.badness < best:
+                best, stillest = seen.badness, (before[1], seen.view)
         if number in numbers:
             progress(f"looking for the board in {clip.path.name}", number / clip.count)
             view = detect(gray, board, thorough=False, source=f"{clip.path.name} at {number / clip.fps:.2f} s")
@@ -209,7 +221,7 @@ def _search(clip: _Clip, times: Array, board: Board,
             elif len(without) < UNEXPLAINED and number >= len(without) * clip.count / UNEXPLAINED:
                 without.append(gray)
         before = number, gray, view
-    return [found.get(int(number)) for number in numbers], tuple(without)
+    return _Search([found.get(int(number)) for number in numbers], stillest, tuple(without))
 
 
 def _motion(here: Gray, there: Gray, view: BoardView) -> float:

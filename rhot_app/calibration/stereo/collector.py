@@ -88,8 +88,12 @@ class StereoCollector:
         diagonal = max(float(np.hypot(*view.size)) for view in views if view is not None)
         if any(self._alike(shot, views, diagonal) for shot in self._shots):
             return Offer(False, f"This view is there already. {self.guidance().advice or 'There is enough.'}")
-        self._shots.append(BoardShot(f"{len(self._shots) + 1}", tuple(views)))
+        self.keep(BoardShot(f"{len(self._shots) + 1}", tuple(views)))
         return Offer(True, f"Taken: {len(self._shots)}.")
+
+    def keep(self, shot: BoardShot) -> None:
+        """Take a shot that was chosen already, as of films."""
+        self._shots.append(shot)
 
     def resize(self, board: Board) -> None:
         """The board's squares have another size: what was kept stays."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.shared_views import BoardShot, Dropped, SharedViews
-from rhot_app.calibration.lens.film import choose_frames, is_film
+from rhot_app.calibration.lens.film import FilmFrames, choose_frames, is_film
 from rhot_app.calibration.lens.views import (
     Read,
     drop_other_sizes,
@@ -71,16 +71,24 @@ def _read_films(files: Mapping[str, Sequence[Path]], board: Board, offsets_s: Ma
     for name, those in files.items():
         if len(those) != 1 or not is_film(those[0]):
             raise CalibrationError(f"{name}: give one film of each camera, or pictures of each.")
-    films = [those[0] for those in files.values()]
-    frames = choose_frames(films, board, [offsets_s.get(name, 0.0) for name in files], progress=progress)
-    columns = of_film(films, frames, board)
-    for name, found, reads in zip(files, frames.found, columns, strict=True):
+    frames, columns = film_frames({name: those[0] for name, those in files.items()}, board, offsets_s, progress)
+    return [f"{moment.t_s:.2f} s" for moment in frames.moments], columns, []
+
+
+def film_frames(films: Mapping[str, Path], board: Board, offsets_s: Mapping[str, float] | None = None,
+                progress: Progress = silent) -> tuple[FilmFrames, list[list[Read]]]:
+    """The frames that are chosen of one film of each camera, and what each film shows then. Raises CalibrationError."""
+    offsets_s = offsets_s or {}
+    paths = list(films.values())
+    frames = choose_frames(paths, board, [offsets_s.get(name, 0.0) for name in films], progress=progress)
+    columns = of_film(paths, frames, board)
+    for name, found, reads in zip(films, frames.found, columns, strict=True):
         if not found:
             raise CalibrationError(no_board(name, reads, board))
     if not frames.moments:
         raise CalibrationError(f"In {frames.searched} frames that were searched no two cameras see the board at once. "
-                               "Did the films begin together? Else give --offset-s NAME=S.")
-    return [f"{moment.t_s:.2f} s" for moment in frames.moments], columns, []
+                               "Did the films begin together? Else align them (--offset-s).")
+    return frames, columns
 
 
 def read_view(path: Path, board: Board) -> BoardView:

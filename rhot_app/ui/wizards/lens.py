@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QAbstractItemView, QCheckBox, QComboBox, QHeaderVi
 
 from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
+from rhot_app.ui.wizards.framework.films_page import FilmsPage
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page, shrinkable
 from rhot_app.ui.wizards.framework.plan import Kit, Memory, Plan
 from rhot_app.ui.wizards.models.board_form import fields_from
@@ -31,7 +32,7 @@ def make_plan(kit: Kit) -> Plan:
         kit.memory.remember(LAST, board.camera)
         return lens_proposal(kit.rig, kit.rig_path, board.camera, solve.report)
 
-    pages = (LensBoardPage(board, kit.memory), Page(show), LensResultPage(solve),
+    pages = (LensBoardPage(board, kit.memory), FilmsPage(show), LensResultPage(solve),
              AcceptPage(AcceptStep(propose), kit.scheme))
     return Plan("Intrinsics of a camera", pages, solver="rhot_app.calibration.lens.intrinsics")
 

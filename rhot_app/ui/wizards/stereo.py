@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout, QPushButton
 from rhot_app.simulator.scene.scene_description import RulerShow
 from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
+from rhot_app.ui.wizards.framework.films_page import FilmsPage
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.board_form import BoardStep, fields_from
@@ -36,7 +37,7 @@ def make_plan(kit: Kit) -> Plan:
         return stereo_proposal(kit.rig, kit.rig_path, solve.report, table.world) if solve.report is not None else None
 
     accept = AcceptPage(AcceptStep(propose), kit.scheme)
-    pages = (BoardPage(board, kit.memory), Page(show), KnownPage(known), Page(solve), Page(table), accept)
+    pages = (BoardPage(board, kit.memory), FilmsPage(show), KnownPage(known), Page(solve), Page(table), accept)
     return Plan("Stereo calibration", pages, solver="rhot_app.ui.wizards.steps.stereo_steps")
 
 

@@ -254,7 +254,7 @@ class WorkView(QWidget):
         self.remaining.setProperty("muted", True)
         self.cancel_button = QPushButton("Cancel")
         self.cancel_button.clicked.connect(work.cancel)
-        self.again_button = QPushButton("Solve again")
+        self.again_button = QPushButton("Begin again")
         self.again_button.clicked.connect(self.again_asked)
         for button in (self.cancel_button, self.again_button):
             button.setAutoDefault(False)

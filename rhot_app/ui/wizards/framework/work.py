@@ -16,7 +16,7 @@ from rhot_app.ui.common.job import CancelledError, Job, Progress
 from rhot_app.ui.models.words import Remaining
 from rhot_app.ui.wizards.models.step import Step, Task
 
-CANCELLED = "Stopped. Go on with Solve again, or go back."
+CANCELLED = "Stopped. Go on with Begin again, or go back."
 
 
 class Work(QObject):

@@ -11,6 +11,7 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import Board, same_pattern
 from rhot_app.calibration.board.corners import BoardView
+from rhot_app.calibration.board.shared_views import BoardShot
 from rhot_app.calibration.check.camera_calibration import with_lens
 from rhot_app.calibration.lens.coverage import CaptureGuide, Coverage
 from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
@@ -22,6 +23,7 @@ from rhot_app.ui.models.rows import lens_figures
 from rhot_app.ui.wizards.models.board_form import OTHER_BOARD, BoardFields, BoardObservation, BoardSearch, BoardStep
 from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Mark, Overlay, Tag
 from rhot_app.ui.wizards.models.step import Bar, Pictures, Step, StepView, Task
+from rhot_app.ui.wizards.steps.film_steps import FilmedStep, Films
 
 FEWEST = 5  # views that a solve can do anything with
 _VOUCHED_S = 0.03  # a person who presses Space says that the board has not moved since the last picture
@@ -48,7 +50,7 @@ class LensBoardStep(BoardStep):
         self.forget_views()
 
 
-class LensShowStep(Step):
+class LensShowStep(FilmedStep):
     """Views of the board, taken by themselves when it is still, sharp and somewhere new, or with Space."""
 
     title = "Show the board"
@@ -61,6 +63,7 @@ class LensShowStep(Step):
         self._search = BoardSearch()
         self._seen: tuple[BoardView | None, float] = (None, 0.0)
         self._sentence = ""
+        self.films = Films(())
         self._covered: tuple[int, Coverage, bool] | None = None  # by the number of views: it takes milliseconds
 
     def enter(self) -> None:
@@ -69,12 +72,27 @@ class LensShowStep(Step):
         assert board is not None, "the first step is not done without a board"
         self.cameras = (camera,)
         if self._of is None or self._guide is None or self._of[0] != camera or not same_pattern(self._of[1], board):
-            self._of, self._guide = (camera, board), CaptureGuide(board)
-            self._seen, self._sentence, self._covered = (None, 0.0), "", None
-            self._search.forget()
+            if self.films.cameras != (camera,):
+                self.films = Films((camera,))
+            self.begin()
         elif self._of[1] != board:
             self._of = camera, board
             self._guide.resize(board)
+
+    def begin(self) -> None:
+        """Forget what was taken."""
+        board, camera = self._board_step.board, self._board_step.camera
+        assert board is not None, "the first step is not done without a board"
+        self._of, self._guide = (camera, board), CaptureGuide(board)
+        self._seen, self._sentence, self._covered = (None, 0.0), "", None
+        self._search.forget()
+        self.films.forget_read()
+
+    def keep(self, shot: BoardShot) -> None:
+        """Take what a film shows at one moment."""
+        if self._guide is not None:
+            for view in (view for view in shot.views if view is not None):
+                self._guide.keep(view)
 
     @property
     def camera(self) -> str:
@@ -111,7 +129,7 @@ class LensShowStep(Step):
     def take(self, seen: tuple[str, BoardObservation, float]) -> None:
         """Offer what is seen; the guide decides and says what to do."""
         camera, look, t_s = seen
-        if self._guide is not None and (camera, look.board) == self._of:
+        if self._guide is not None and (camera, look.board) == self._of and not self.films.paths:
             self._search.take(look)
             view = look.views[camera]
             self._seen = view, t_s
@@ -121,7 +139,7 @@ class LensShowStep(Step):
     def capture(self) -> bool:
         """Space: take what is seen now, unless it adds nothing or is blurred."""
         view, t_s = self._seen
-        if self._guide is None or view is None or self._search.size_finding(self.board) is not None:
+        if self._guide is None or view is None or self.films.paths or self._search.size_finding(self.board) is not None:
             return False
         decision = self._guide.offer(view, t_s + _VOUCHED_S)
         self._sentence = decision.sentence
@@ -136,6 +154,10 @@ class LensShowStep(Step):
 
     def view(self) -> StepView:
         """What to do with the board, and what is covered."""
+        shown = self._live_view()
+        return self.films.view(shown) if self.films.paths else shown
+
+    def _live_view(self) -> StepView:
         if self._guide is None:
             return StepView("Show the whole board to the camera.")
         count = len(self.views)

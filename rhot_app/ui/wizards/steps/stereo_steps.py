@@ -10,7 +10,7 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import Board, same_pattern
 from rhot_app.calibration.board.corners import BoardView
-from rhot_app.calibration.board.shared_views import SharedViews
+from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.check.camera_calibration import lengths_text
 from rhot_app.calibration.lens.fit import LensStart, find_lens
 from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate, calibrated_rig, lens_of, rig_findings
@@ -26,6 +26,7 @@ from rhot_app.ui.models.rows import place_figures
 from rhot_app.ui.wizards.models.board_form import OTHER_BOARD, BoardObservation, BoardSearch, BoardStep
 from rhot_app.ui.wizards.models.drawing import Dots, Overlay
 from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Pictures, Step, StepView, Task
+from rhot_app.ui.wizards.steps.film_steps import FilmedStep, Films
 
 # -- The solve in its own process --------------------------------------------------------------------------------------
 
@@ -77,7 +78,7 @@ class BoardFinder(Step):
             self.seen = {name: seen.views.get(name) for name in self.cameras or ()}
 
 
-class ShowStep(BoardFinder):
+class ShowStep(BoardFinder, FilmedStep):
     """Shared captures: kept by themselves when the board is still and somewhere new, or with Space."""
 
     title = "Show the board"
@@ -88,18 +89,29 @@ class ShowStep(BoardFinder):
         self._collector: StereoCollector | None = None
         self._of: Board | None = None
         self._offer = Offer(False, "")
+        self.films = Films(cameras)
         self._guidance: Guidance | None = None  # of the first `_guided` shots: it takes milliseconds to find
         self._guided = 0
 
     def enter(self) -> None:
         """Another board makes what was kept useless; a corrected size of its squares does not."""
         if self._collector is None or self._of is None or not same_pattern(self._of, self.board):
-            self._of, self._collector = self.board, StereoCollector(self.cameras or (), self.board)
-            self._offer, self._guidance = Offer(False, ""), None
-            self.search.forget()
+            self.begin()
         elif self._of != self.board:
             self._of = self.board
             self._collector.resize(self.board)
+
+    def begin(self) -> None:
+        """Forget what was kept."""
+        self._of, self._collector = self.board, StereoCollector(self.cameras or (), self.board)
+        self._offer, self._guidance = Offer(False, ""), None
+        self.search.forget()
+        self.films.forget_read()
+
+    def keep(self, shot: BoardShot) -> None:
+        """Take what films show at one moment."""
+        if self._collector is not None:
+            self._collector.keep(shot)
 
     @property
     def views(self) -> SharedViews:
@@ -114,12 +126,13 @@ class ShowStep(BoardFinder):
 
     def take(self, seen: BoardObservation) -> None:
         """Offer what is seen; the collector decides."""
-        super().take(seen)
-        self._put(still=False)
+        if not self.films.paths:
+            super().take(seen)
+            self._put(still=False)
 
     def capture(self) -> bool:
         """Space: the person vouches that the board is still."""
-        return self._put(still=True)
+        return not self.films.paths and self._put(still=True)
 
     def _put(self, *, still: bool) -> bool:
         if self._collector is None or self.search.size_finding(self.board) is not None:
@@ -136,6 +149,10 @@ class ShowStep(BoardFinder):
 
     def view(self) -> StepView:
         """What to do with the board, and how far it is."""
+        shown = self._live_view()
+        return self.films.view(shown) if self.films.paths else shown
+
+    def _live_view(self) -> StepView:
         if self._collector is None:
             return StepView("Show the board to both cameras.")
         shots = self.views.shots
