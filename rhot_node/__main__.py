@@ -176,7 +176,7 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
         link.start()
         control.start(Responder(store, daemon.sessions, control.pictures, clock, daemon.report,
                                 lambda: {**daemon.count(), **link.count(), "strangers": control.refused}, keys,
-                                videos, foreground),
+                                videos, foreground, daemon.spare_landmarks),
                       Reception(trust, offers, lambda: {**daemon.introduce(), **ports}))
         daemon.prepare()
         gc.freeze()

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Reporting, Rewindable
 from rhot_node.clock import NodeClock
-from rhot_node.config import CameraSettings, NodeSettings, network_model
+from rhot_node.config import CameraSettings, NodeSettings
 from rhot_node.detect.image import Detector
 from rhot_node.errors import CameraError
 from rhot_node.foreground_store import ForegroundStore
@@ -151,6 +151,10 @@ class NodeDaemon:
         """Counters, for the control channel."""
         return dataclasses.asdict(self.counters) | self._tags.count() | self._landmarks.count() | self.slices.count()
 
+    def spare_landmarks(self) -> None:
+        """Search no landmarks for a while, whose camera serves nobody. Any thread may ask."""
+        self._landmarks.spare()
+
     def prepare(self) -> None:
         """Make the detector and open the camera: the node is then ready. Raises CameraError."""
         self._detector = self._make_detector(self._settings)
@@ -238,7 +242,7 @@ class NodeDaemon:
 
     def _by_networks_alone(self) -> bool:
         """Whether all markers are landmarks that the hand networks find: messages of markers would say nothing."""
-        return (network_model(self._settings.detector) is not None
+        return (self._landmarks.wanted
                 and all(marker.shape == "landmark" for marker in self._settings.markers.markers))
 
     def _look_at_light(self, frame: Frame) -> None:

@@ -27,6 +27,9 @@ log = logging.getLogger(__name__)
 RETRY_S: Final = 5.0
 """Between tries to open the networks: somebody may install them meanwhile."""
 
+SPARED_S: Final = 5.0
+"""A node that is not reminded for so long searches again."""
+
 _OPENING_S = 15.0  # on a slow computer, LiteRT takes seconds to load
 
 OpenNetworks = Callable[[str], "HandNetworks"]
@@ -50,7 +53,7 @@ class LandmarkSearch(FrameSearch[YuvImage]):
         self._model = network_model(settings.detector)
         self._open_with = open_networks if open_with is None else open_with
         self._networks: tuple[str | None, HandNetworks | None] = (None, None)  # and their model
-        self._retry_s = 0.0
+        self._retry_s = self._spared_s = 0.0
 
     def prepare(self) -> None:
         """Open the networks and start the thread, if the settings ask for landmarks."""
@@ -66,9 +69,18 @@ class LandmarkSearch(FrameSearch[YuvImage]):
         if model is not None:
             self.start("finds landmarks of hands", _OPENING_S)
 
+    def spare(self) -> None:
+        """Search nothing for SPARED_S: nobody uses what would be found. Any thread may ask."""
+        self._spared_s = time.monotonic() + SPARED_S
+
+    @property
+    def wanted(self) -> bool:
+        """Whether landmarks are searched for."""
+        return self._model is not None and time.monotonic() >= self._spared_s
+
     def offer(self, frame: Frame, stream: Stream, sender: SearchSender) -> None:
         """Have a frame searched if landmarks are asked for and nothing else is being searched; costs a copy of it."""
-        if self._model is not None and self.free():
+        if self.wanted and self.free():
             self.put(Waiting(frame, frame.image.copy(), stream, sender))
 
     def count(self) -> dict[str, int]:

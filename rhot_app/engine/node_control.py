@@ -131,6 +131,8 @@ class NodeControl:
                     peer.tag_advice = () if answer.get("ok") else (Advice(
                         "warning", f"The tags of objects are not looked for: {answer.get('error')} Does rhot-node have "
                         "the version of this program there?"),)
+                elif asked.command == "spare":
+                    continue  # a node of an older version goes on searching
                 elif asked.client is None:
                     state = answer.get("answer", {})
                     peer.message = printable(str(state.get("message", "")))
@@ -185,7 +187,10 @@ class NodeControl:
 
     def ask_for_states(self, status: EngineStatus) -> None:
         """Ask nodes for their own words: of a fault and of their machines' health once a second. What is over is
-        forgotten."""
+        forgotten. Cameras that are not tracked with are spared the search for landmarks, unless a log is recorded: it
+        may be tracked again when they are put together."""
+        apart = set() if self._rig is None or self._own is None or status.log_path else {
+            node.node_id for node, used in zip(self._rig.nodes, self._rig.tracked_with, strict=True) if not used}
         now_s = time.monotonic()
         for node in status.nodes:
             peer = self._peers.get(node.node_id)
@@ -198,6 +203,8 @@ class NodeControl:
             elif now_s - peer.asked_s > _STATE_PERIOD_S:
                 peer.asked_s = now_s
                 self._put(peer, None, "node", {"request": "state"})
+                if node.node_id in apart:
+                    self._put(peer, None, "spare", {"request": "spare_landmarks"})
 
     def record_video(self, name: str) -> None:
         """Have every node record the video `name`, or none when it is empty. Called often; nodes are reminded."""

@@ -108,7 +108,8 @@ class Observer:
                    else start_pose_advice(self._pipeline.last_state) if running else [])
         marker_ids = self.rig.markers.ids
         visibility = not (nowhere or bare)
-        found = [advice for one in facts for advice in node_advice(one, marker_ids, running, visibility=visibility)]
+        found = [advice for one, used in zip(facts, self.rig.tracked_with, strict=True)
+                 for advice in node_advice(one, marker_ids, running, visibility=visibility and used)]
         if running:
             self.rig_watch.take(self._pipeline.recent)
             stale = self.rig_watch.advice(now_ns)

@@ -83,6 +83,10 @@ class StopRequest(_Request, frozen=True, tag="stop"):
     session: Annotated[int, Meta(ge=0)] = 0
 
 
+class SpareLandmarksRequest(_Request, frozen=True, tag="spare_landmarks"):
+    """Search no landmarks of hands: nobody uses those of this camera now. Repeated every few seconds, or it ends."""
+
+
 class VideoStartRequest(_Request, frozen=True, tag="video_start"):
     """Record the video `name`, or go on with it: repeated every few seconds, or the video ends by itself."""
 
@@ -150,7 +154,7 @@ ForegroundRequest = (LearnBackgroundRequest | LearnSkinRequest | SaveForegroundR
                      | ForgetForegroundRequest | ForegroundMaskRequest)
 VideoRequest = VideoStartRequest | VideoStopRequest | VideoListRequest | VideoReadRequest | VideoDeleteRequest
 Request = (StateRequest | CountersRequest | SettingsRequest | SetSettingsRequest | StillRequest | StartRequest
-           | LinkRequest | StopRequest | ForegroundRequest | VideoRequest)
+           | LinkRequest | StopRequest | SpareLandmarksRequest | ForegroundRequest | VideoRequest)
 
 _decoder = msgspec.json.Decoder(Request)
 
@@ -185,9 +189,10 @@ class Responder:
 
     def __init__(self, store: SettingsStore, sessions: Sessions, pictures: PictureBox, clock: NodeClock,
                  state: Report, counters: Report, keys: LinkKeys | None, videos: VideoRecorder | None = None,
-                 foreground: ForegroundStore | None = None) -> None:
+                 foreground: ForegroundStore | None = None, spare: Callable[[], None] = lambda: None) -> None:
         """`keys` None: the node is open, and no datagram is tagged. `videos` None: it records none.
-        `foreground` None: it learns neither background nor skin."""
+        `foreground` None: it learns neither background nor skin. `spare`: stops the search for landmarks a while."""
+        self._spare = spare
         self._store = store
         self._sessions = sessions
         self._pictures = pictures
@@ -234,6 +239,9 @@ class Responder:
                 return self._link(request, master), b""
             case StopRequest():
                 return {"ok": True, "stopped": self._sessions.stop(request.session)}, b""
+            case SpareLandmarksRequest():
+                self._spare()
+                return {"ok": True}, b""
             case (LearnBackgroundRequest() | LearnSkinRequest() | SaveForegroundRequest() | RevertForegroundRequest()
                   | ForgetForegroundRequest() | ForegroundMaskRequest()):
                 return self._learn(request)

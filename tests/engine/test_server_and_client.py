@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -17,7 +18,7 @@ from rhot_app.engine.core import Engine
 from rhot_app.engine.directory import EngineDirectory, open_directory
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.serve import Server, StatePublisher
-from rhot_app.engine.status import EngineStatus, Preview
+from rhot_app.engine.status import EngineStatus, NodeStatus, Preview
 from rhot_app.errors import EngineError, RecordingError
 from rhot_app.project import Rig, load_rig
 from rhot_app.recording.bookmarks import Bookmark, read_bookmarks
@@ -26,6 +27,7 @@ from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.links import UdpNodes
 from rhot_app.state import HandState
 from rhot_node.files import JSON_BYTES_MAX
+from rhot_node.keys import new_key_pair
 from rhot_node.threads import OneShotThread
 from rhot_node.wire.messages import NodeState
 
@@ -409,3 +411,29 @@ def test_a_vanished_engine_is_noticed(rig: Rig, tmp_path: Path, monkeypatch: pyt
 def test_where_no_engine_is_a_client_says_so(tmp_path: Path) -> None:
     with EngineClient(tmp_path / "none") as client, pytest.raises(EngineError, match="There is no engine in"):
         client.command("status", timeout_s=30.0)
+
+
+def test_a_camera_that_is_not_tracked_with_is_spared_the_search_for_landmarks(peer: ControlPeer, rig: Rig) -> None:
+    """But not the other one, nor while a log is recorded, nor by a replay, which has no keys."""
+    left, right = rig.nodes
+    apart = msgspec.structs.replace(rig, nodes=(msgspec.structs.replace(left, pose_known=False), right))
+    streaming = NodeStatus(left.node_id, left.name, "streaming", False, 30.0, 9, 0, {}, None, None, None)
+    status = EngineStatus(1, 1, 1, True, "TRACKING", rig.name, "", 30.0, (streaming,), ())
+    recorded = replace(status, log_path="a.rhotlog")
+    for one, keys, said, spared in ((rig, True, status, False), (apart, True, recorded, False),
+                                    (apart, False, status, False), (apart, True, status, True)):
+        control = NodeControl(peer.context, new_key_pair() if keys else None)
+        heard = len(peer.heard)
+        try:
+            control.follow(one)
+            control.ask_for_states(said)
+
+            def answered(control: NodeControl = control, said: EngineStatus = said, heard: int = heard,
+                         wanted: str = "spare_landmarks" if spared else "state") -> bool:
+                control.ask_for_states(said)
+                control.answers()
+                return [request["request"] for request in peer.heard[heard:]].count(wanted) > 1
+            eventually(answered)
+            assert any(request["request"] == "spare_landmarks" for request in peer.heard[heard:]) == spared
+        finally:
+            control.close()

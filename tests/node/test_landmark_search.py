@@ -145,6 +145,17 @@ def test_networks_that_cannot_be_used_are_reported_until_they_can(monkeypatch: p
     assert search.search.troubles() == [] and len(search.sent()) == 1
 
 
+def test_a_search_that_is_spared_goes_on_when_nobody_says_so_any_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = Search()
+    search.search.spare()
+    search.offer(2)
+    assert not search.search.step() and not search.search.wanted
+    monkeypatch.setattr("rhot_node.landmark_search.SPARED_S", 0.0)
+    search.search.spare()
+    search.offer()
+    assert search.search.step() and len(search.sent()) == 1
+
+
 # -- the daemon --------------------------------------------------------------------------------------------------------
 
 def daemon_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings: NodeSettings, wanted: type) -> list[Any]:
@@ -166,6 +177,12 @@ def daemon_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings: N
     finally:
         daemon.close()
     return [message for message, _ in sender.sent]
+
+
+def test_a_camera_that_is_spared_still_says_that_it_sees(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rhot_node.landmark_search.LandmarkSearch.wanted", False)
+    sent = daemon_messages(tmp_path, monkeypatch, landmark_settings(), Observations)
+    assert all(isinstance(message, Observations) for message in sent)
 
 
 def test_a_set_of_landmarks_alone_sends_no_markers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
