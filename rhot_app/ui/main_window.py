@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QAction, QCloseEvent
 from PySide6.QtWidgets import (
     QApplication,
     QMainWindow,
     QStackedWidget,
+    QVBoxLayout,
+    QWidget,
 )
 
 from rhot_app.errors import RhotError
@@ -25,14 +27,15 @@ from rhot_app.ui.common.keys import bind_space
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import show_overflow
 from rhot_app.ui.common.theme import scheme_named
-from rhot_app.ui.dialogs.dialogs import NEXT_STEPS, Dialogs
+from rhot_app.ui.dialogs.dialogs import Dialogs
+from rhot_app.ui.dialogs.next_steps import NEXT_STEPS, NextSteps
 from rhot_app.ui.dialogs.recordings import SHOW_FOLDER, Recordings
 from rhot_app.ui.models.next_steps import NETWORKS, TRACKER
 from rhot_app.ui.models.notice import Notice, TransientNotices
 from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of
 from rhot_app.ui.replay.windows import ReplayWindows
 from rhot_app.ui.scene.page import ScenePage
-from rhot_app.ui.screen import Docks, Screen
+from rhot_app.ui.screen import BOTTOM_PX, Docks, Screen
 from rhot_app.ui.simulated_rig_menus import LensCaps, TwinShows
 from rhot_app.ui.status_words import RigFileWatch, label_of, look_of, notices_of
 from rhot_app.ui.tracked_objects import TrackedObjects
@@ -58,6 +61,7 @@ class MainWindow(QMainWindow):
         self.settings = settings
         self._buttons_shown: tuple[bool, bool] | None = None
         self._next_behind = 0.0
+        self._plots_hidden = False  # before the steps took their place
         self._offered = ""  # the rig whose steps were shown by themselves
         self.passing = TransientNotices()
         self.dialogs = Dialogs(self)
@@ -87,6 +91,7 @@ class MainWindow(QMainWindow):
         self.wizards.twin_menu = self.twin_shows.menu
         self.tracked_objects = TrackedObjects(controller, self.actions_.add_object, self.actions_.objects, self.tell,
                                               self.rig_watch.look_soon, self)
+        self.next_steps = NextSteps(scheme, lambda: controller.rig, self._in_force, settings)
         self.docks = Docks(self)
         self._add_docks()
         self.toolbar = MainToolBar(self.actions_, self.docks.actions, scheme, self)
@@ -108,7 +113,13 @@ class MainWindow(QMainWindow):
         self.docks.add("Markers", parts.markers, "left", scroll=True)
         self.docks.add("Cameras", parts.cameras, "right")
         self.docks.add("Hand", parts.hand_and_objects, "right")
-        self.docks.add("Plots", parts.plots, "bottom", title=False)
+        below = QWidget()
+        column = QVBoxLayout(below)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(parts.plots)
+        column.addWidget(self.next_steps)
+        self.next_steps.hide()
+        self.docks.add("Plots", below, "bottom", title=False)
 
     def _connect_actions(self) -> None:
         a, c = self.actions_, self.controller
@@ -161,6 +172,7 @@ class MainWindow(QMainWindow):
         c.failed.connect(self._show_failure)
         self.appearance.scheme_changed.connect(self._recolour_buttons)
         self.appearance.scheme_changed.connect(lambda: self.dialogs.set_scheme(self.appearance.scheme))
+        self.appearance.scheme_changed.connect(lambda: self.next_steps.set_scheme(self.appearance.scheme))
         self.appearance.scheme_changed.connect(lambda: self.replays.set_scheme(self.appearance.scheme))
         self.docks.docks[2].visibilityChanged.connect(c.set_preview)
 
@@ -171,9 +183,14 @@ class MainWindow(QMainWindow):
         self.actions_.fit.triggered.connect(self.wizards.open_fit)
         self.toolbar.calibrate_menu.aboutToShow.connect(self._show_ages)
         self.actions_.next_steps.triggered.connect(self.show_next_steps)
-        self.wizards.closed.connect(self._continue_steps)
+        self.next_steps.asked.connect(self._do_step)
+        self.next_steps.closed.connect(lambda: self._place_steps(False))
         self.wizards.rig_used.connect(self.rig_watch.look_soon)
         self.wizards.failed.connect(self._show_failure)
+
+    def _in_force(self) -> Collection[str]:
+        opened = self.controller.opened
+        return self.wizards.in_force("" if opened is None else opened.rig_path).keys()
 
     def _show_ages(self) -> None:
         """When each calibration was made, each time the menu opens."""
@@ -183,7 +200,7 @@ class MainWindow(QMainWindow):
     def _restore(self) -> None:
         """Layout and switches as they were left."""
         self.appearance.restore()
-        self.resize(*_SIZE)
+        self.resize(QSize(*_SIZE).boundedTo(self.screen().availableSize()))
         layout = self.settings.layout()
         if layout is None or not (self.restoreGeometry(layout[0]) and self.docks.restore(layout[1])):
             self.docks.arrange()
@@ -221,18 +238,30 @@ class MainWindow(QMainWindow):
                 self.tell(Notice("info", remark))
 
     def show_next_steps(self) -> None:
-        """What the rig still needs, as a list with ticks."""
-        if self.controller.opened is None:
+        """What the rig still needs, as a list with ticks, in the place of the plots."""
+        if self.controller.opened is not None:
+            self.next_steps.begin()
+            self._place_steps(True)
+
+    def _place_steps(self, on: bool) -> None:
+        """Steps or plots in their panel, which is hidden again when the steps go if it was."""
+        if on == (not self.next_steps.isHidden()):
             return
-        steps = self.dialogs.show_next_steps(self.controller, self.appearance.scheme, self.wizards, self.settings)
-        if steps is not None:
-            steps.asked.connect(self._do_step)
+        dock = self.docks.docks[4]
+        if on:
+            self.actions_.alone.setChecked(False)
+            self._plots_hidden = dock.isHidden()
+        going, coming = (self.screen_parts.plots, self.next_steps)[::1 if on else -1]
+        going.hide()  # first: the window would grow to hold both
+        coming.show()
+        dock.setHidden(not on and self._plots_hidden)
+        if not on:
+            self.resizeDocks([dock], [BOTTOM_PX], Qt.Orientation.Vertical)
 
     def _do_step(self, action: str) -> None:
-        """Open what a step asks for; the list steps aside for a wizard, and comes back."""
+        """Open what a step asks for."""
         wizard = wizard_named(action)
         if wizard is not None:
-            self.dialogs.hide_next_steps()
             self.wizards.open(wizard)
         elif action == TRACKER:
             self._change_observed()
@@ -243,20 +272,17 @@ class MainWindow(QMainWindow):
 
     def _change_observed(self) -> None:
         """Cameras of this computer are opened again with what they are to observe; for others the tracker is asked."""
-        opened, steps = self.controller.opened, self.dialogs.next_steps
+        opened = self.controller.opened
         path = Path(opened.rig_path) if opened is not None and opened.rig_path else None
-        if path is None or steps is None or camera_set_of(path) is None:
+        if path is None or camera_set_of(path) is None:
             self.dialogs.choose_tracker(self.controller, self.rig_watch.look_soon)
             return
         try:
-            change_observed(path, bare=steps.answers.wear != "paint")
+            change_observed(path, bare=self.next_steps.answers.wear != "paint")
         except (RhotError, OSError) as exc:
             self.tell(Notice("error", str(exc)))
             return
         self.open_rig(path)
-
-    def _continue_steps(self) -> None:
-        self.dialogs.continue_next_steps()
 
     def show_rig_file(self, page: str) -> None:
         """What the rig file says, to read."""
@@ -332,6 +358,8 @@ class MainWindow(QMainWindow):
 
     def _show_rig(self) -> None:
         rig, opened = self.controller.rig, self.controller.opened
+        if rig is None:
+            self._place_steps(False)
         self.screen_parts.show_rig(rig)
         self.dialogs.follow_rig(self.controller)
         self.pages.setCurrentIndex(0 if rig is None else 1)

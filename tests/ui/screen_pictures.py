@@ -6,9 +6,21 @@ import os
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtCore import QSize
-from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QRect, QSize, Qt
+from PySide6.QtGui import QFontMetrics, QImage
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QCheckBox,
+    QLabel,
+    QRadioButton,
+    QScrollArea,
+    QTableWidget,
+    QToolButton,
+    QWidget,
+)
+
+from rhot_app.ui.common.theme import CELL_PADDING_PX
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "screenshots"
 UPDATE = os.environ.get("RHOT_UPDATE_SCREENSHOTS") == "1"
@@ -37,3 +49,61 @@ def check(name: str, image: QImage, least_colours: int) -> None:
         FOLDER.mkdir(parents=True, exist_ok=True)
         assert image.save(str(path))
     assert path.exists(), f"{path} is missing; run this test with RHOT_UPDATE_SCREENSHOTS=1"
+
+
+def cut_texts(window: QWidget) -> list[str]:
+    """What cannot be read: texts of labels, buttons and tables in sight that their place does not hold, and parts that
+    reach over the window's edge. What scrolls may be longer than its place."""
+    for _ in range(3):  # a scrolling page is laid out once more when its bar has come or gone
+        QApplication.processEvents()
+    cut = []
+    for part in window.findChildren(QWidget):
+        if not part.isVisible() or part.visibleRegion().isEmpty():
+            continue
+        scrolls = _scrolls(part, window)
+        if isinstance(part, (QLabel, QAbstractButton)):
+            place = QRect(part.mapTo(window, part.rect().topLeft()), part.size())
+            if not scrolls and not window.rect().contains(place):
+                cut.append(f"{part.text()!r} reaches over the edge")
+        if isinstance(part, QLabel) and part.text() and not scrolls:
+            needed = QSize(part.width(), part.heightForWidth(part.width())) if part.wordWrap() else part.sizeHint()
+            if needed.height() > part.height() or needed.width() > part.width():
+                cut.append(part.text())
+        elif isinstance(part, QAbstractButton) and part.text() and not isinstance(part, QToolButton):
+            least = part.minimumSizeHint() if isinstance(part, (QCheckBox, QRadioButton)) else part.sizeHint()
+            if least.width() > part.width():
+                cut.append(part.text())
+        elif isinstance(part, QTableWidget):
+            cut += _cut_cells(part)
+    return cut
+
+
+def _scrolls(part: QWidget, window: QWidget) -> bool:
+    above = part.parentWidget()
+    while above is not None and above is not window:
+        if isinstance(above, QScrollArea):
+            return True
+        above = above.parentWidget()
+    return False
+
+
+def _cut_cells(table: QTableWidget) -> list[str]:
+    """Texts of heads and cells that are wider, or where they wrap higher, than their place."""
+    cut = []
+    padding = 2 * (CELL_PADDING_PX + 3)
+    header = table.horizontalHeader()
+    for column in range(table.columnCount()):
+        head = table.horizontalHeaderItem(column)
+        if head is not None and header.fontMetrics().horizontalAdvance(head.text()) > header.sectionSize(column):
+            cut.append(head.text())
+        if not table.wordWrap() and table.sizeHintForColumn(column) > table.columnWidth(column):
+            cut.append(f"column {column}")
+    for row in range(table.rowCount() if table.wordWrap() else 0):
+        for column in range(table.columnCount()):
+            item = table.item(row, column)
+            if item is not None and item.text():
+                room = QRect(0, 0, table.columnWidth(column) - padding, 10_000)
+                needed = QFontMetrics(item.font()).boundingRect(room, Qt.TextFlag.TextWordWrap, item.text())
+                if needed.height() > table.rowHeight(row) or needed.width() > room.width():
+                    cut.append(item.text())
+    return cut

@@ -12,7 +12,7 @@ from patience import PATIENCE_MS
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QInputDialog
-from screen_pictures import check
+from screen_pictures import check, colours_in
 
 from rhot_app.project import load_rig
 from rhot_app.sources.cameras import camera_set
@@ -115,7 +115,13 @@ def test_a_webcam_is_seen_named_and_opened_in_another_mode(qtbot, themed):
     assert "1280 × 720" in chosen.lines()[0] and chosen.previews[0].ended
     chosen.click(dialog.turned_box)
     assert chosen.previews[-1].source.turned and chosen.previews[-2].ended
+    def colours_of_box() -> int:
+        box = dialog.list.visualItemRect(dialog.list.item(0))
+        box.setWidth(box.height() // 2)
+        return colours_in(dialog.list.viewport().grab(box).toImage())
+    unticked = colours_of_box()
     chosen.tick(0)
+    assert colours_of_box() > unticked, "a tick is drawn in the box"
     dialog.name_field.setFocus()
     qtbot.keyClicks(dialog.name_field, "desk/left")
     assert dialog.name_field.text() == "deskleft", "a name is part of file names"

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from fake_engine import synthetic_rig
 from PySide6.QtWidgets import QFileDialog
-from screen_pictures import check
+from screen_pictures import cut_texts
 
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, Rig, load_rig
@@ -111,12 +111,16 @@ def cameras(bench, monkeypatch):
     return bench
 
 
-def test_the_page_is_there_by_itself_comes_back_and_can_be_closed_for_ever(cameras, tmp_path, monkeypatch):
-    bench, dialogs = cameras, cameras.window.dialogs
+def test_the_steps_are_there_by_themselves_leave_the_scene_in_sight_and_can_be_closed_for_ever(cameras, tmp_path,
+                                                                                                monkeypatch):
+    bench, page = cameras, cameras.window.next_steps
     bench.window.open_rig(tmp_path / "cameras.json")
-    bench.until(lambda: dialogs.next_steps is not None and dialogs.next_steps.isVisible())
-    page = dialogs.next_steps
-    check("next-steps", page.grab().toImage(), 12)
+    bench.until(page.isVisible)
+    parts = bench.window.screen_parts
+    bench.until(parts.scene.isVisible)
+    assert not parts.plots.isVisible() and parts.cameras.isVisible(), "hand and cameras stay in sight"
+    bench.window.resize(1280, 800)
+    bench.keep("next-steps", 12, lambda: page.grab().toImage())
     assert [step.action for step in page.steps] == ["tracker", "board", "lens", "stereo", "time", "colours",
                                                        "bones"]
     bench.click(page.counts[1])
@@ -125,9 +129,8 @@ def test_the_page_is_there_by_itself_comes_back_and_can_be_closed_for_ever(camer
     lens = next(row for row, step in enumerate(page.steps) if step.action == "lens")
     bench.click(page.buttons[lens])
     bench.until(lambda: bench.window.wizards.wizard is not None and bench.window.wizards.wizard.isVisible())
-    assert not page.isVisible()
     bench.window.wizards.wizard.reject()
-    bench.until(page.isVisible)
+    bench.until(lambda: bench.window.wizards.wizard is None)
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args: (str(tmp_path / "board.pdf"), ""))
     board = next(row for row, step in enumerate(page.steps) if step.action == "board")
     bench.click(page.buttons[board])
@@ -135,17 +138,51 @@ def test_the_page_is_there_by_itself_comes_back_and_can_be_closed_for_ever(camer
     assert (tmp_path / "board.pdf").read_bytes().startswith(b"%PDF")
     bench.click(page.never)
     bench.click(page.close_button)
+    bench.until(lambda: parts.plots.isVisible() and not page.isVisible())
     bench.close_rig()
     bench.window.open_rig(tmp_path / "cameras.json")
     bench.until(lambda: bench.controller.opened is not None)
-    assert dialogs.next_steps is None
+    assert not page.isVisible()
     bench.window.actions_.next_steps.trigger()
-    bench.until(lambda: dialogs.next_steps is not None and dialogs.next_steps.isVisible())
-    assert dialogs.next_steps.width() <= 1024 and dialogs.next_steps.height() <= 700
-    dialogs.next_steps.reject()
+    bench.until(page.isVisible)
+    bench.close_rig()
+    assert not page.isVisible() and not parts.plots.isVisible(), "the first page has no panels"
+
+
+def test_the_steps_come_into_the_panel_of_the_plots_where_that_was_hidden(cameras, tmp_path):
+    bench, page, plots = cameras, cameras.window.next_steps, cameras.window.screen_parts.plots
+    bench.window.open_rig(tmp_path / "cameras.json")
+    bench.until(page.isVisible)
+    bench.click(page.close_button)
+    bench.until(plots.isVisible)
+    hide_plots = bench.window.docks.actions[4]
+    hide_plots.trigger()
+    bench.until(lambda: not plots.isVisible())
+    bench.window.actions_.next_steps.trigger()
+    bench.until(page.isVisible)
+    bench.click(page.close_button)
+    bench.until(lambda: not page.isVisible())
+    assert not plots.isVisible()
+
+
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("size", [(1280, 800), (1024, 700)])
+def test_every_step_fits_its_place_and_leaves_room_for_the_scene(cameras, tmp_path, size, count):
+    bench, page = cameras, cameras.window.next_steps
+    rig = bench.backend.engine.rig
+    bench.backend.engine.rig = msgspec.structs.replace(rig, nodes=rig.nodes[:count])
+    bench.window.resize(*size)
+    bench.window.open_rig(tmp_path / "cameras.json")
+    bench.until(page.isVisible)
+    scene = bench.window.screen_parts.scene
+    for answer in (*page.wears.values(), *page.counts.values()):
+        bench.click(answer)
+        bench.run(0.02)
+        assert cut_texts(page) == []
+        assert bench.window.size().toTuple() == size and scene.height() > 0.3 * size[1]
 
 
 def test_a_rig_of_other_nodes_is_left_in_peace(bench, tmp_path):
     bench.window.open_rig(tmp_path / "desk.json")
     bench.until(lambda: bench.controller.opened is not None)
-    assert bench.window.dialogs.next_steps is None
+    assert not bench.window.next_steps.isVisible()

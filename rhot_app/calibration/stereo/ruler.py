@@ -100,7 +100,7 @@ def baseline_finding(measured_m: float, nominal_m: float, square_m: float, names
     """The baseline against one measured by hand between the lenses."""
     ratio = nominal_m / measured_m
     figure = (f"{names[0]} and {names[1]} are {measured_m * 1e3:.1f} mm apart, by hand {nominal_m * 1e3:.1f} mm "
-              f"({100 * (1 / ratio - 1):+.1f} %)")
+              f"({100 * (1 / ratio - 1):+z.1f} %)")
     if abs(1.0 / ratio - 1.0) <= TAPE:
         return Finding("baseline", Grade.GOOD, f"{figure}, which agrees.")
     return Finding(

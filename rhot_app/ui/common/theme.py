@@ -7,9 +7,11 @@ from PySide6.QtGui import QColor, QFont, QPalette, QPixmapCache
 from PySide6.QtWidgets import QApplication
 
 from rhot_app.ui.models.palette import SCHEMES, Scheme
+from rhot_node.files import resource_path
 
 GRID_PX = 8
 TEXT_PT = 11.0
+CELL_PADDING_PX = 6
 PIXMAPS_KB = 2048
 """Of parts that the style has drawn. It keeps them by the widget's palette, so those of closed windows serve nobody."""
 
@@ -95,6 +97,7 @@ def style_sheet(s: Scheme) -> str:
     QPushButton[flat="true"]:hover, QPushButton[flat="true"]:focus {{ border-color: {s.accent}; }}
     QPushButton[flat="true"]:checked {{ background: {s.raised}; border-color: {s.border}; color: {s.accent}; }}
     #advice QPushButton {{ padding: 1px 12px; }}
+    #steps QPushButton {{ padding: 3px 12px; }}
     #advice QToolButton {{ padding: 1px 20px 1px 8px; border: 1px solid {s.border}; border-radius: 6px; }}
     QLabel[muted="true"] {{ color: {s.muted}; }}
     QLabel[title="true"] {{ font-weight: 600; }}
@@ -111,7 +114,7 @@ def style_sheet(s: Scheme) -> str:
     QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
     QTableView {{ background: {s.panel}; border: none; gridline-color: {s.border}; }}
     QHeaderView::section {{ background: {s.panel}; color: {s.muted}; border: none; padding: 4px 10px; }}
-    QTableView::item {{ padding: 0 6px; }}
+    QTableView::item {{ padding: 0 {CELL_PADDING_PX}px; }}
     QStatusBar {{ background: {s.panel}; border-top: 1px solid {s.border}; }}
     QLineEdit, QComboBox {{ background: {s.panel}; border: 1px solid {s.border}; border-radius: 4px;
         padding: 4px 8px; min-height: 20px; }}
@@ -130,8 +133,9 @@ def style_sheet(s: Scheme) -> str:
         radius: 0.5, fx: 0.5, fy: 0.5, stop: 0 {s.accent}, stop: 0.6 {s.accent}, stop: 0.7 {s.panel}); }}
     QCheckBox::indicator, QListView::indicator {{ width: 12px; height: 12px; border: 2px solid {s.muted};
         border-radius: 3px; background: {s.panel}; }}
+    QCheckBox::indicator:checked, QListView::indicator:checked {{ border-color: {s.text};
+        image: url("{resource_path('icons', 'tick.svg').as_posix()}"); }}
     QCheckBox::indicator:disabled {{ border-color: {s.border}; }}
-    QCheckBox::indicator:checked, QListView::indicator:checked {{ border-color: {s.text}; background: {s.text}; }}
     QProgressBar {{ border: 1px solid {s.border}; border-radius: 4px; background: {s.panel}; height: 8px; }}
     QProgressBar::chunk {{ background: {s.accent}; border-radius: 3px; }}
     """

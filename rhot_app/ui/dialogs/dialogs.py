@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,11 +29,9 @@ from rhot_app.sources.cameras.camera_set import Prepared
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.disposal import dispose, release_style
 from rhot_app.ui.common.guide import GuideViewer
-from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.cameras_dialog import CamerasDialog
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
 from rhot_app.ui.dialogs.networks_dialog import NetworksDialog
-from rhot_app.ui.dialogs.next_steps import NextSteps
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
 from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
 from rhot_app.ui.dialogs.recordings import recordings_folder
@@ -43,10 +41,6 @@ from rhot_app.ui.mouse.window import MouseWindow
 
 if TYPE_CHECKING:  # they bring numerical code, which waits until it is wanted
     from rhot_app.ui.dialogs.layers_dialog import LayersDialog
-    from rhot_app.ui.wizards.launcher import Launcher
-
-NEXT_STEPS = "next steps"
-"""The setting: whether the steps are shown by themselves."""
 
 
 class Dialogs:
@@ -61,7 +55,6 @@ class Dialogs:
         self.mouse: MouseWindow | None = None
         self.layers: LayersDialog | None = None
         self.export: ExportDialog | None = None
-        self.next_steps: NextSteps | None = None
 
     def _hold(self, name: str, dialog: QDialog) -> None:
         """Hold a dialog until it is closed, then let go of it."""
@@ -125,33 +118,6 @@ class Dialogs:
             self._hold("networks", NetworksDialog(self._parent))
         _bring_forward(self.networks)
 
-    def show_next_steps(self, controller: Controller, scheme: Scheme, wizards: Launcher,
-                        settings: Settings) -> NextSteps | None:
-        """What the rig still needs, beside the window; the dialog if it is a new one."""
-        def reasons() -> Collection[str]:
-            opened = controller.opened
-            return wizards.in_force("" if opened is None else opened.rig_path).keys()
-
-        new = self.next_steps is None
-        if new:
-            dialog = NextSteps(scheme, lambda: controller.rig, reasons, settings, self._parent)
-            dialog.never.setChecked(not settings.flag(NEXT_STEPS))
-            dialog.never.toggled.connect(lambda never: settings.set_flag(NEXT_STEPS, not never))
-            self._hold("next_steps", dialog)
-        _bring_forward(self.next_steps)
-        return self.next_steps if new else None
-
-    def hide_next_steps(self) -> None:
-        """Put the steps aside while one is done."""
-        if self.next_steps is not None:
-            self.next_steps.hide()
-
-    def continue_next_steps(self) -> None:
-        """Show the steps again that were put aside."""
-        if self.next_steps is not None:
-            self.next_steps.look()
-            _bring_forward(self.next_steps)
-
     def show_outputs(self, controller: Controller, scheme: Callable[[], Scheme], actions: Sequence[QAction],
                      rig_used: Callable[[], None]) -> None:
         """The live streams to other programs, beside the window; the keys of `actions` work there too."""
@@ -174,8 +140,6 @@ class Dialogs:
             else:
                 path = controller.opened.rig_path
                 self.tracker.follow(controller.opened.rig, Path(path) if path else None)
-        if self.next_steps is not None and controller.opened is None:
-            self.next_steps.reject()
         if self.outputs is not None:
             if controller.opened is None:
                 self.outputs.close()
@@ -219,8 +183,7 @@ class Dialogs:
 
     def close(self) -> None:
         """Close what stands beside the window."""
-        for window in (self.guide, self.tracker, self.networks, self.outputs, self.mouse, self.layers, self.export,
-                       self.next_steps):
+        for window in (self.guide, self.tracker, self.networks, self.outputs, self.mouse, self.layers, self.export):
             if window is not None:
                 window.close()
 

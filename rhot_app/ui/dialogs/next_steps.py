@@ -1,4 +1,4 @@
-"""The page "What do you have?": three answers, one camera or two, and the steps that follow, with ticks."""
+"""What is still to be done: what somebody has, one camera or two, and the steps that follow, with ticks."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import (
     QButtonGroup,
     QCheckBox,
-    QDialog,
     QFileDialog,
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QRadioButton,
     QVBoxLayout,
@@ -24,15 +22,17 @@ from rhot_app.errors import RhotError
 from rhot_app.project import Rig
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import ShapeMark
-from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.next_steps import BOARD, Answers, Step, Wear, answers_of, next_steps
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.framework.plan import Memory
 from rhot_node.landmarks.install import installed_folder
 
 LOOK_MS = 700
-_WIDTH_PX = 620
+NEXT_STEPS = "next steps"
+"""The setting: whether the steps are shown by themselves."""
+
+_COLUMNS = 3
 _MOST_STEPS = 8
 _PRINTED = "board printed"
 _WEARS: tuple[tuple[Wear, str], ...] = (
@@ -40,43 +40,55 @@ _WEARS: tuple[tuple[Wear, str], ...] = (
     ("landmarks", "Landmarks or nodes of my own"))
 
 
-class NextSteps(QDialog):
-    """`asked` gives the action of a step whose button was pressed; what it opens is the window's business."""
+class NextSteps(QWidget):
+    """A panel below the scene, so that hand and cameras stay in sight. `asked` gives the action of a step whose button
+    was pressed; what it opens is the window's business. `closed` when the person has seen enough of it."""
 
     asked = Signal(str)
+    closed = Signal()
 
     def __init__(self, scheme: Scheme, rig: Callable[[], Rig | None], reasons: Callable[[], Collection[str]],
-                 memory: Memory, parent: QWidget | None = None, *,
+                 settings: Settings, parent: QWidget | None = None, *,
                  networks: Callable[[], bool] = lambda: installed_folder() is not None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("What do you have?")
+        self.setObjectName("steps")
         self.setProperty("guide", "start")
-        self._scheme, self._rig, self._reasons, self._memory, self._networks = scheme, rig, reasons, memory, networks
+        self.setProperty("panel", True)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self._scheme, self._rig, self._reasons, self._settings, self._networks = (scheme, rig, reasons, settings,
+                                                                                  networks)
         self._shown: list[Step] = []
         self._job: Job | None = None
-        now = rig()
-        answers = Answers("bare", 2) if now is None else answers_of(now)
         self.wears = {wear: QRadioButton(text) for wear, text in _WEARS}
         self.counts = {1: QRadioButton("one camera"), 2: QRadioButton("two cameras")}
         self._groups = [self._group(list(self.wears.values())), self._group(list(self.counts.values()))]
-        self.wears[answers.wear].setChecked(True)
-        self.counts[answers.cameras].setChecked(True)
         self.marks = [ShapeMark(16) for _ in range(_MOST_STEPS)]
-        self.titles = [QLabel() for _ in range(_MOST_STEPS)]
-        self.meanings = [QLabel() for _ in range(_MOST_STEPS)]
         self.buttons = [QPushButton() for _ in range(_MOST_STEPS)]
         self.verdict = Sentence(2)
-        self.never = QCheckBox("Do not show this by itself any more")
-        self.never.setToolTip("Calibrate, What to do next opens it.")
+        self.never = QCheckBox("Not by itself any more")
+        self.never.setToolTip("Do not show these steps by themselves. Calibrate, What to do next shows them.")
+        self.never.setChecked(not settings.flag(NEXT_STEPS))
+        self.never.toggled.connect(lambda never: settings.set_flag(NEXT_STEPS, not never))
         self.close_button = QPushButton("Close")
-        self.close_button.setAutoDefault(False)
-        self.close_button.clicked.connect(self.reject)
+        self.close_button.clicked.connect(self.closed)
         self._lay_out()
-        self.setMinimumWidth(_WIDTH_PX)
         self._timer = QTimer(self, interval=LOOK_MS)
         self._timer.timeout.connect(lambda: self.look() if self.isVisible() else None)
         self._timer.start()
-        self.look()
+
+    def begin(self) -> None:
+        """Show the steps of the rig that is open, by what it says of itself."""
+        rig = self._rig()
+        if rig is not None:
+            answers = answers_of(rig)
+            self.wears[answers.wear].setChecked(True)
+            self.counts[answers.cameras].setChecked(True)
+            self.look()
+
+    def set_scheme(self, scheme: Scheme) -> None:
+        """Change colours."""
+        self._scheme = scheme
+        self._show()
 
     def _group(self, buttons: list[QRadioButton]) -> QButtonGroup:
         group = QButtonGroup(self)
@@ -86,38 +98,27 @@ class NextSteps(QDialog):
         return group
 
     def _lay_out(self) -> None:
-        layout, grid, bottom = QVBoxLayout(self), QGridLayout(), QHBoxLayout()
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(8)
+        """The steps in columns; below them what stays where it is when their number changes."""
+        layout, grid, answers, bottom = QVBoxLayout(self), QGridLayout(), QHBoxLayout(), QHBoxLayout()
+        layout.setContentsMargins(16, 8, 16, 4)
+        layout.setSpacing(4)
+        grid.setSpacing(4)
+        for number, (mark, button) in enumerate(zip(self.marks, self.buttons, strict=True)):
+            button.clicked.connect(lambda checked=False, number=number: self._press(number))
+            row, column = divmod(number, _COLUMNS)
+            grid.addWidget(mark, row, 2 * column)
+            grid.addWidget(button, row, 2 * column + 1)
+            grid.setColumnStretch(2 * column + 1, 1)
+        layout.addStretch(1)
+        layout.addLayout(grid)
         for group in self._groups:
-            answers = QHBoxLayout()
             for answer in group.buttons():
                 answers.addWidget(answer)
-            answers.addStretch(1)
-            layout.addLayout(answers)
-        grid.setHorizontalSpacing(16)
-        grid.setVerticalSpacing(8)
-        grid.setColumnStretch(1, 1)
-        for row, (mark, title, meaning, button) in enumerate(zip(self.marks, self.titles, self.meanings, self.buttons,
-                                                                 strict=True)):
-            title.setFont(app_font(bold=True))
-            meaning.setProperty("muted", True)
-            meaning.setWordWrap(True)
-            button.setAutoDefault(False)
-            button.clicked.connect(lambda checked=False, row=row: self._press(row))
-            words = QVBoxLayout()
-            words.setSpacing(0)
-            words.addWidget(title)
-            words.addWidget(meaning)
-            grid.addWidget(mark, row, 0, Qt.AlignmentFlag.AlignTop)
-            grid.addLayout(words, row, 1)
-            grid.addWidget(button, row, 2, Qt.AlignmentFlag.AlignVCenter)
-        layout.addSpacing(8)
-        layout.addLayout(grid)
-        layout.addStretch(1)
-        layout.addWidget(self.verdict)
+            answers.addSpacing(16)
+        answers.addStretch(1)
+        layout.addLayout(answers)
+        bottom.addWidget(self.verdict, 1)
         bottom.addWidget(self.never)
-        bottom.addStretch(1)
         bottom.addWidget(self.close_button)
         layout.addLayout(bottom)
 
@@ -135,9 +136,9 @@ class NextSteps(QDialog):
     def look(self) -> None:
         """Look at the rig and show how far it is."""
         rig = self._rig()
-        if rig is None or not any(button.isChecked() for button in self.counts.values()):
+        if rig is None:
             return
-        printed = bool(self._memory.remembered(_PRINTED))
+        printed = bool(self._settings.remembered(_PRINTED))
         found = next_steps(self.answers, rig, networks=self._networks(), printed=printed, reasons=self._reasons())
         if found != self._shown:
             self._shown = found
@@ -147,22 +148,23 @@ class NextSteps(QDialog):
         first = next((number for number, step in enumerate(self._shown) if not step.done), None)
         for row in range(_MOST_STEPS):
             step = self._shown[row] if row < len(self._shown) else None
-            for widget in (self.marks[row], self.titles[row], self.meanings[row], self.buttons[row]):
-                widget.setVisible(step is not None)
+            self.marks[row].setVisible(step is not None)
+            self.buttons[row].setVisible(step is not None)
             if step is None:
                 continue
             self.marks[row].set_shape("tick" if step.done else "ring",
                                       self._scheme.good if step.done else self._scheme.neutral)
             self.marks[row].setAccessibleName("done" if step.done else "not done yet")
-            self.titles[row].setText(step.title)
-            self.meanings[row].setText(step.meaning)
-            self.buttons[row].setText("Again …" if step.done else "Do it …")
+            self.buttons[row].setText(f"{step.title} …")
             self.buttons[row].setAccessibleName(step.title)
+            self.buttons[row].setToolTip(step.meaning)
             self.buttons[row].setProperty("primary", row == first)
             style = self.buttons[row].style()
             style.unpolish(self.buttons[row])
             style.polish(self.buttons[row])
-        self.verdict.setText("All is done: press Start, and hold the hand before the cameras." if first is None else "")
+        if self._shown:
+            self.verdict.setText("All is done: hold the hand before the cameras." if first is None else
+                                 f"{self._shown[first].title}: {self._shown[first].meaning}")
 
     def _press(self, row: int) -> None:
         action = self._shown[row].action
@@ -178,7 +180,7 @@ class NextSteps(QDialog):
 
     def _printed(self, path: Path) -> None:
         self._job = None
-        self._memory.remember(_PRINTED, str(path))
+        self._settings.remember(_PRINTED, str(path))
         self.look()
         self.verdict.setText(f"Written: {path}. Print it at 100 % and measure the ruler on it.")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMessageBox, QWidget
 
@@ -42,7 +42,7 @@ class HandFitWindow(QDialog):
         self.setWindowTitle(TITLE)
         self.setProperty("guide", "fitting")
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
-        self.resize(*_SIZE)
+        self.resize(parent.window().size() if parent is not None else QSize(*_SIZE))
         self._guide: GuideViewer | None = None
         self.frame = FitFrame(fit, scheme, kept, self, live=live is not None)
         self._changes = Changes(fit, kept, memory, self)

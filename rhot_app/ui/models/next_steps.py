@@ -1,4 +1,4 @@
-"""What a rig still needs, in order, by what its owner has: the steps of the page "What do you have?". No Qt."""
+"""What a rig still needs, in order, by what its owner has: the steps that `NextSteps` shows. No Qt."""
 
 from __future__ import annotations
 

@@ -227,7 +227,7 @@ def lens_figures(node: RigNode) -> Figures:
     return {f"{node.name}: picture": f"{lens.width} × {lens.height} px",
             f"{node.name}: focal length": f"{lens.fx:.1f}, {lens.fy:.1f} px",
             f"{node.name}: centre": f"{lens.cx:.1f}, {lens.cy:.1f} px",
-            f"{node.name}: distortion": ", ".join(f"{k:.3f}" for k in lens.distortion)}
+            f"{node.name}: distortion": ", ".join(f"{k:z.3f}" for k in lens.distortion)}
 
 
 def place_figures(node: RigNode) -> Figures:
@@ -236,8 +236,8 @@ def place_figures(node: RigNode) -> Figures:
         return {f"{node.name}: place": "not known", f"{node.name}: looks along": "not known"}
     x, y, z = (1e3 * metres for metres in node.pose.translation_m)
     axis = rotation_from_quaternion(np.array(node.pose.rotation_wxyz))[:, 2]
-    return {f"{node.name}: place": f"{x:.1f}, {y:.1f}, {z:.1f} mm",
-            f"{node.name}: looks along": ", ".join(f"{part:.3f}" for part in axis)}
+    return {f"{node.name}: place": f"{x:z.1f}, {y:z.1f}, {z:z.1f} mm",
+            f"{node.name}: looks along": ", ".join(f"{part:z.3f}" for part in axis)}
 
 
 def _cameras(rig: Rig) -> Iterator[tuple[str, str]]:

@@ -66,19 +66,21 @@ class ApartPage(Page):
         self.table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.table.setAccessibleName("Which colour is taken for which")
-        caption = QLabel("How much of each column's colour is taken for the marker of the row, in %, over all lamps "
-                         "that may come; of a marker's own colour by the lamp where that is least")
+        self.table.setWordWrap(False)
+        self.table.setStyleSheet("QHeaderView::section { padding: 4px 0 } QTableView::item { padding: 0 }")
+        caption = QLabel("The table: how much of each column's colour is taken for the marker of the row, in %, over "
+                         "all lamps that may come; of a marker's own colour by the lamp where that is least.")
         caption.setWordWrap(True)
         self.centre = QWidget()
         column = QVBoxLayout(self.centre)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.charts, 1)
-        column.addWidget(caption)
         column.addWidget(self.table)
-        note = QLabel("The blue line shows which hues the room has, and how much of each. Where it rises inside a "
-                      "marker's band, the room has things of that marker's colour.")
+        note = QLabel("The chart: the blue line shows which hues the room has, and how much of each. Where it rises "
+                      "inside a marker's band, the room has things of that marker's colour.")
         note.setWordWrap(True)
         note.setProperty("muted", True)
+        self.column.addWidget(caption)
         self.column.addWidget(note)
         self.column.addStretch(1)
 

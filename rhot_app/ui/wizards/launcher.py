@@ -48,12 +48,10 @@ class RigNow:
 
 
 class Launcher(QObject):
-    """`rig_used` after a wizard or a restore has changed the rig; `failed` with a sentence when none could open;
-    `closed` after a wizard was closed."""
+    """`rig_used` after a wizard or a restore has changed the rig; `failed` with a sentence when none could open."""
 
     rig_used = Signal()
     failed = Signal(str)
-    closed = Signal()
 
     def __init__(self, connect: Callable[[], Asker], listen: Callable[[], Listener], scheme: Callable[[], Scheme],
                  memory: Memory, window: QWidget, make_solver: Callable[[], Solver] = Solver) -> None:
@@ -152,7 +150,6 @@ class Launcher(QObject):
         if self.wizard is not None:
             dispose(self.wizard)
             self.wizard = None
-        self.closed.emit()
 
     def _show_versions(self, now: RigNow) -> None:
         self._job = None

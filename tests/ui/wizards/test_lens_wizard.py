@@ -10,11 +10,11 @@ from fake_engine import synthetic_rig
 from wizard_rig import FakeRigAsker
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
-from rhot_app.project import Intrinsics, load_rig
+from rhot_app.project import Intrinsics, Rig, RigNode, load_rig
 from rhot_app.ui.wizards.lens import LAST, make_plan
 from rhot_app.ui.wizards.models.board_form import BoardFields
 from rhot_app.ui.wizards.models.drawing import Cells, Line
-from rhot_app.ui.wizards.steps.lens_steps import LensBoardStep, LensShowStep, straightened
+from rhot_app.ui.wizards.steps.lens_steps import LensBoardStep, LensShowStep, straightened, what_follows
 
 TRUE_F = 530.0
 PLACES = [((0.0, 0.0, 0.0), (0.0, 0.0, 0.417)), ((0.0, 0.0, 0.0), (-0.142, -0.083, 0.417)),
@@ -123,6 +123,20 @@ def test_another_camera_begins_anew(steps, scene):
     assert step.camera == "right" and step.views == () and step.seen is None
     step.take(step.see(scene.pictures()))
     assert step.capture() and len(step.views) == 1
+
+
+def test_what_follows_a_lens_is_what_the_rig_lacks():
+    def rig(nominal, placed):
+        found = Intrinsics(640, 480, 500.0, 500.0, 321.0, 240.0)
+        nodes = tuple(RigNode(k, name, Intrinsics.assumed(640, 480) if name in nominal else found,
+                              pose_known=k == 1 or placed) for k, name in enumerate(("left", "right"), 1))
+        return Rig("two", nodes)
+    new, placed = rig(("left", "right"), False), rig(("left",), True)
+    assert "of right" in what_follows(new, rig(("right",), False))
+    assert "not known yet" in what_follows(new, rig((), False))
+    assert "old intrinsics" in what_follows(placed, rig((), True))
+    alone = msgspec.structs.replace(new, nodes=new.nodes[:1])
+    assert what_follows(alone, alone) == ""
 
 
 def test_straightening_takes_the_lens_distortion_away():

@@ -17,9 +17,9 @@ from wizard_rig import RigBackend
 
 from rhot_app import rig_history
 from rhot_app.engine.status import Advice
-from rhot_app.project import load_rig
+from rhot_app.project import CameraPose, load_rig
 from rhot_app.ui import actions, main_window
-from rhot_app.ui.models.rows import rig_rows
+from rhot_app.ui.models.rows import place_figures, rig_rows
 from rhot_app.ui.wizards import launcher
 from rhot_app.ui.wizards.framework import plan
 from rhot_app.ui.wizards.framework.plan import Wizard
@@ -124,3 +124,8 @@ def test_two_rigs_are_compared_in_figures_for_people():
     assert rig_rows(rig, rig) == ()
     assert [(row.what, row.before, row.after) for row in rig_rows(rig, other)] == [
         ("left: focal length", "530.0, 530.0 px", "540.0, 530.0 px")]
+
+
+def test_a_figure_has_no_negative_zero():
+    node = msgspec.structs.replace(synthetic_rig().nodes[0], pose=CameraPose(translation_m=(-1e-6, 0.0, 0.1)))
+    assert place_figures(node)["left: place"] == "0.0, 0.0, 100.0 mm"

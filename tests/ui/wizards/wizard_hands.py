@@ -22,8 +22,8 @@ class Hands(Person):
 
     wait = staticmethod(wait)
 
-    def __init__(self, window):
-        window.resize(SIZE)
+    def __init__(self, window, size=SIZE):
+        window.resize(size)
         super().__init__(window)
 
     def told(self):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt, Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -14,6 +14,8 @@ from PySide6.QtWidgets import (
     QPushButton,
     QScrollArea,
     QSizePolicy,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
     QTableWidget,
     QTableWidgetItem,
     QVBoxLayout,
@@ -23,7 +25,7 @@ from PySide6.QtWidgets import (
 from rhot_app.calibration.verdict import Finding, Verdict
 from rhot_app.ui.common.disposal import plot_widget
 from rhot_app.ui.common.shapes import ShapeMark
-from rhot_app.ui.common.theme import app_font
+from rhot_app.ui.common.theme import CELL_PADDING_PX, app_font
 from rhot_app.ui.models.palette import Scheme, visible_on
 from rhot_app.ui.models.proposal import Row
 from rhot_app.ui.models.words import GRADES
@@ -113,6 +115,16 @@ def shrinkable(part: QWidget, least_px: int = 96) -> None:
     part.setMinimumHeight(least_px)
 
 
+class _WrappedCell(QStyledItemDelegate):
+    """Qt measures a wrapped text without the style sheet's padding, and cuts off the line too many."""
+
+    def sizeHint(self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex) -> QSize:  # noqa: N802
+        """As high as the text is in the width that is left."""
+        left = QStyleOptionViewItem(option)
+        left.rect = option.rect.adjusted(0, 0, -2 * CELL_PADDING_PX, 0)
+        return super().sizeHint(left, index)
+
+
 class RowTable(QTableWidget):
     """Rows of before and after; what changes is bold."""
 
@@ -127,8 +139,8 @@ class RowTable(QTableWidget):
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setShowGrid(False)
         self.setWordWrap(True)
+        self.setItemDelegate(_WrappedCell(self))
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        self.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         self.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 
     def show_rows(self, rows: tuple[Row, ...]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMessageBox, QWidget
 
@@ -25,8 +25,8 @@ _SIZE = (1280, 800)
 
 
 class WizardWindow(QDialog):
-    """Shows one `Plan`. `rig_used` gives the rig that is in force after "Use this calibration" and after a restore;
-    `used` the proposal, and whether it is in force now.
+    """Shows one `Plan`, as large as the window that it stands over. `rig_used` gives the rig that is in force after
+    "Use this calibration" and after a restore; `used` the proposal, and whether it is in force now.
 
     `tick` is one turn of the timer, so that tests can turn by hand.
     """
@@ -41,7 +41,7 @@ class WizardWindow(QDialog):
         self.setWindowTitle(plan.title)
         self.setProperty("guide", plan.guide)
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
-        self.resize(*_SIZE)
+        self.resize(parent.window().size() if parent is not None else QSize(*_SIZE))
         self.feed = LiveFeed({node.name: node.node_id for node in kit.rig.nodes if not node.text_datagrams},
                              kit.connect)
         self.looker = PictureWorker(self.feed)

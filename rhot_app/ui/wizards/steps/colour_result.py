@@ -276,8 +276,8 @@ def hue_chart(report: ColourReport) -> Chart:
             if ends[1] > ends[0]:
                 name = one.name if low + turn < middle + turn <= 180.0 and middle + turn > -180.0 else ""
                 curves.append(Curve(name, ends, np.ones(2), "band", np.full(2, top), hex_of(one.rgb)))
-    return Chart("Colours of the room beside those of the markers", "hue (angle of chroma), °",
-                 "colour pixels per picture", tuple(curves), log_y=True)
+    return Chart("Colours of the room and of the markers", "hue (angle of chroma), °",
+                 "pixels per picture", tuple(curves), log_y=True)
 
 
 def matrix_cells(report: ColourReport) -> tuple[tuple[str, ...], list[tuple[str, list[float]]]]:

@@ -278,10 +278,19 @@ def lens_proposal(rig: Rig, path: Path | None, camera: str, report: IntrinsicsRe
     """The rig with the new lens, and its figures beside the old ones."""
     after = with_lens(rig, camera, report.intrinsics)
     reason = f"{REASON} {camera}"
-    afterwards = ("Calibrate the other cameras' intrinsics, then stereo: the poses of the cameras were found with "
-                  "the old intrinsics.") if len(rig.nodes) > 1 else ""
     return Proposal(reason, report.verdict, _rows(rig, after, camera, report), (RigChange(rig, after, path, reason),),
-                    afterwards)
+                    what_follows(rig, after))
+
+
+def what_follows(before: Rig, after: Rig) -> str:
+    """What a new lens leaves to be done, a sentence; "" for nothing."""
+    missing = [node.name for node in after.nodes if node.intrinsics.nominal]
+    if len(after.nodes) == 1:
+        return ""
+    if missing:
+        return f"Next the intrinsics of {' and '.join(missing)}, then stereo."
+    return ("Next stereo: the poses of the cameras were found with the old intrinsics." if all(before.tracked_with) else
+            "Next stereo: how the cameras stand to each other is not known yet.")
 
 
 def _rows(before: Rig, after: Rig, camera: str, report: IntrinsicsReport) -> tuple[Row, ...]:
