@@ -100,7 +100,7 @@ class NextSteps(QWidget):
     def _lay_out(self) -> None:
         """The steps in columns; below them what stays where it is when their number changes."""
         layout, grid, answers, bottom = QVBoxLayout(self), QGridLayout(), QHBoxLayout(), QHBoxLayout()
-        layout.setContentsMargins(16, 8, 16, 4)
+        layout.setContentsMargins(16, 4, 16, 4)
         layout.setSpacing(4)
         grid.setSpacing(4)
         for number, (mark, button) in enumerate(zip(self.marks, self.buttons, strict=True)):
