@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from rhot_app.errors import RecordingError, add_force_argument, input_file, posi
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
+    from rhot_app.sources.film_offset import FilmOffset
     from rhot_app.sources.frame_sets import CameraVideo
 
 
@@ -32,8 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              "with the pose that it takes (default: followed from where it takes the rig's)")
     parser.add_argument("--fps", type=positive_number, default=None, metavar="N",
                         help="frames per second of ordinary videos, instead of what the files say, and of pictures")
-    parser.add_argument("--offset-s", action="append", default=[], metavar="NAME=S",
-                        help="seconds to add to a camera's times, where the videos did not begin together")
+    began = parser.add_mutually_exclusive_group()
+    began.add_argument("--offset", choices=("sound", "flash"), default=None,
+                       help="find out when each film began, by the sound of all or by a light that goes on once")
+    began.add_argument("--offset-s", action="append", default=[], metavar="NAME=S",
+                       help="seconds to add to a camera's times, where the videos did not begin together")
     parser.add_argument("--unknown-size", action="store_true",
                         help="estimate the hand's size, too, unless all its bones are measured")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the states as .csv, .parquet or .npz")
@@ -63,7 +67,8 @@ def run(args: argparse.Namespace) -> int:
 
     rig = msgspec.structs.replace(rig, nodes=tuple(node for node in rig.nodes if node.name in given),
                                   depth=type(rig.depth)())
-    videos = opened_videos(args, rig, given)
+    offsets = film_offsets(args, rig, given)
+    videos = opened_videos(args, rig, given, offsets)
     announce_compilation()
     foreground, empty_s = None, 0.0
     if args.background:
@@ -82,8 +87,9 @@ def run(args: argparse.Namespace) -> int:
                            hand_file=args.adapt, progress=line.report)
     line.finish()
     document = summary.document() | {"out": args.out and str(args.out), "overlay": args.overlay and str(args.overlay),
-                                     "hand_file": str(args.adapt) if args.adapt and summary.adapted else None}
-    print(json.dumps(document) if args.json else "\n".join(sentences(document)))
+                                     "hand_file": str(args.adapt) if args.adapt and summary.adapted else None,
+                                     **offset_fields(offsets)}
+    print(json.dumps(document) if args.json else "\n".join([*offset_sentences(args, offsets), *sentences(document)]))
     return 0
 
 
@@ -131,15 +137,48 @@ def named(given: Sequence[str], option: str, rig: Rig) -> dict[str, str]:
     return found
 
 
-def opened_videos(args: argparse.Namespace, rig: Rig, given: dict[str, str]) -> list[CameraVideo]:
-    """The videos of cameras on one clock, by --fps and --offset-s, in the rig's order. Raises RecordingError."""
+def film_offsets(args: argparse.Namespace, rig: Rig, given: dict[str, str]) -> dict[str, FilmOffset]:
+    """By --offset, when each film began after that of the rig's first camera; nothing without. Raises
+    RecordingError."""
+    if args.offset is None:
+        return {}
+    from rhot_app.progress import ProgressLine
+    from rhot_app.sources.film_offset import offsets_of
+
+    line = ProgressLine("offsets")
+    found = offsets_of({node.name: input_file(given[node.name]) for node in rig.nodes if node.name in given},
+                       args.offset, line.report)
+    line.finish()
+    return found
+
+
+def offset_fields(offsets: Mapping[str, FilmOffset]) -> dict[str, Any]:
+    """The summary's fields of `film_offsets`."""
+    if not offsets:
+        return {}
+    return {"offsets_s": {name: one.seconds for name, one in offsets.items()},
+            "offsets_std_s": {name: one.std_s for name, one in offsets.items()}}
+
+
+def offset_sentences(args: argparse.Namespace, offsets: Mapping[str, FilmOffset]) -> list[str]:
+    """The same for a person."""
+    from rhot_app.sources.film_offset import offset_sentence
+
+    return [offset_sentence(offsets, args.offset)] if offsets else []
+
+
+def opened_videos(args: argparse.Namespace, rig: Rig, given: dict[str, str],
+                  offsets: Mapping[str, FilmOffset]) -> list[CameraVideo]:
+    """The videos of cameras on one clock, by --fps, --offset-s and `film_offsets`, in the rig's order. Raises
+    RecordingError."""
     from rhot_app.sources.frame_sets import FPS, checked_seconds, on_one_clock, open_videos
 
     if args.fps is not None and not FPS[0] <= args.fps <= FPS[1]:
         raise RecordingError(f"--fps {args.fps:g}: give the frames per second, from {FPS[0]:g} to {FPS[1]:g}.")
     return on_one_clock(open_videos(rig, given, args.fps), {
         name: checked_seconds(text, f"--offset-s {name}")
-        for name, text in named(args.offset_s, "--offset-s", rig).items()})
+        for name, text in named(args.offset_s, "--offset-s", rig).items()}
+        | {name: one.seconds for name, one in offsets.items()})
 
 
 def sentences(document: dict[str, Any]) -> list[str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rhot_app.errors import RecordingError, input_file
 from rhot_app.export import bare_hand_command
-from rhot_app.export.bare_hand_command import named, opened_videos
+from rhot_app.export.bare_hand_command import film_offsets, named, offset_fields, offset_sentences, opened_videos
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -100,7 +100,9 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
 
     open_hand_networks()  # without them nothing is begun
     rig = landmark_rig_of(rig, tuple(given))
-    videos = opened_videos(args, rig, given)
+    offsets = film_offsets(args, rig, given)
+    said += offset_sentences(args, offsets)
+    videos = opened_videos(args, rig, given, offsets)
     announce_compilation()
     line = ProgressLine("tracking")
     summary = track_landmarks(rig, videos, either_side=args.rig is None, measure=args.bones == "measured",
@@ -113,6 +115,6 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
     document = summary.document() | {"out": args.out and str(args.out), "overlay": args.overlay and str(args.overlay),
                                      "log": args.log and str(args.log),
                                      "hand_file": str(args.adapt) if summary.adapted else None,
-                                     "notes": said}
+                                     "notes": said, **offset_fields(offsets)}
     print(json.dumps(document) if args.json else "\n".join([*said, *landmark_sentences(document)]))
     return 0

@@ -8,6 +8,9 @@ Either must stand out from chance, and from every other place, or it is refused.
 from __future__ import annotations
 
 import contextlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from statistics import NormalDist
@@ -38,6 +41,7 @@ CHANCE: Final = 1e-6
 RIVAL: Final = 0.8
 """Of the peak's height: a second peak as high as that makes the answer one of two, as in a song's beat."""
 
+_SAMPLE: Final = 12.0**-0.5  # SD of a number that is rounded to one
 _SOUND_HZ: Final = 8000
 _SMOOTH: Final = 11  # ms, the loudness is smoothed over: a clap rises as fast
 _FLOOR: Final = 1e-3  # of the mean power: what is softer than that is silence
@@ -46,10 +50,21 @@ _PEAK_S: Final = 0.1  # a clap and its echo: nearer peaks are the same one
 _DEMUXERS: Final = "mov,matroska,avi,mpegts,mpeg"  # no playlists, which name other files
 
 
-def offset_by_sound(first: Path, second: Path) -> float:
-    """Seconds to add to the second film's times, so that both heard the same at the same time.
+@dataclass(frozen=True, slots=True)
+class FilmOffset:
+    """`seconds` to add to a film's times, and their standard deviation."""
 
-    Raises RecordingError: no sound, too little of it at the same time, or no lag at which both agree.
+    seconds: float
+    std_s: float
+
+
+def offset_by_sound(first: Path, second: Path) -> FilmOffset:
+    """What to add to the second film's times, so that both heard the same at the same time.
+
+    The agreement of two series at a lag has unit variance, and is as wide as the sound's own correlation. So a peak of
+    height M and curvature c has its place known to 1 / sqrt(M c). What sound travels farther to one microphone, 3 ms a
+    metre, is not in it. Raises RecordingError: no sound, too little of it at the same time, or no lag at which both
+    agree.
     """
     (start, heard), (other_start, other) = (_envelope(path) for path in (first, second))
     least = round(_OVERLAP_S * ENVELOPE_HZ)
@@ -68,7 +83,9 @@ def offset_by_sound(first: Path, second: Path) -> float:
     if rivals.max(initial=0.0) > RIVAL * match[best]:
         raise RecordingError(f"The sound of {both} agrees at more than one time: it repeats itself. Clap once next "
                              "time, or give the offset by hand.")
-    return start - other_start + (lags[best] + _vertex(match, best)) / ENVELOPE_HZ
+    vertex, bend = _vertex(match, best)
+    return FilmOffset(start - other_start + (lags[best] + vertex) / ENVELOPE_HZ,
+                      math.hypot(1.0 / math.sqrt(match[best] * bend), _SAMPLE) / ENVELOPE_HZ)
 
 
 def correlate(first: Array, second: Array, least: int) -> tuple[Array, Array]:
@@ -91,13 +108,15 @@ def correlate(first: Array, second: Array, least: int) -> tuple[Array, Array]:
     return lags.astype(np.float64), match * np.sqrt(shared / inflation)
 
 
-def _vertex(values: Array, peak: int) -> float:
-    """Where between samples the parabola through a peak and its neighbours is highest."""
-    if not 0 < peak < len(values) - 1:
-        return 0.0
-    before, here, after = values[peak - 1:peak + 2]
-    bend = before - 2.0 * here + after
-    return 0.0 if bend >= 0.0 else float(0.5 * (before - after) / bend)
+def _vertex(values: Array, peak: int) -> tuple[float, float]:
+    """Where between samples the parabola through a peak and its neighbours is highest, and how curved it is, per sample
+    squared."""
+    place = min(max(peak, 1), len(values) - 2)
+    before, here, after = values[place - 1:place + 2]
+    bend = float(2.0 * here - before - after)
+    if place != peak or bend <= 0.0:
+        return 0.0, 1e-6  # at the end of all lags: known to a second
+    return 0.5 * float(after - before) / bend, bend
 
 
 def _envelope(path: Path) -> tuple[float, Array]:
@@ -165,8 +184,9 @@ def filmed(path: Path) -> datetime | None:
 
 # -- light -------------------------------------------------------------------------------------------------------------
 
-def flash_s(path: Path, progress: Progress = silent) -> float:
-    """When a light goes on in a film, s after its first frame. Raises RecordingError."""
+def flash_s(path: Path, progress: Progress = silent) -> FilmOffset:
+    """When a light goes on in a film, s after its first frame. The standard deviation is that of a time between two
+    frames: how long a frame is exposed is not known. Raises RecordingError."""
     levels, fps = _brightness(path, progress)
     rise = np.diff(levels)
     if len(rise) < 10:
@@ -185,7 +205,7 @@ def flash_s(path: Path, progress: Progress = silent) -> float:
     parts = np.where(near & (rise > 0.5 * needed), rise, 0.0)
     parts[:best] *= np.cumprod((parts[:best] > 0.0)[::-1])[::-1]  # of one rise only
     parts[best + 1:] *= np.cumprod(parts[best + 1:] > 0.0)
-    return float(np.sum(parts * (np.arange(len(rise)) + 0.5)) / np.sum(parts)) / fps
+    return FilmOffset(float(np.sum(parts * (np.arange(len(rise)) + 0.5)) / np.sum(parts)) / fps, _SAMPLE / fps)
 
 
 def _brightness(path: Path, progress: Progress) -> tuple[Array, float]:
@@ -212,10 +232,23 @@ def _brightness(path: Path, progress: Progress) -> tuple[Array, float]:
     return np.array(levels), fps
 
 
-def offsets_of(films: dict[str, Path], by: str, progress: Progress = silent) -> dict[str, float]:
-    """Seconds to add to each film's times, 0 for the first one; `by` "sound" or "flash". Raises RecordingError."""
+def offsets_of(films: Mapping[str, Path], by: str, progress: Progress = silent) -> dict[str, FilmOffset]:
+    """What to add to each film's times, 0 for the first one; `by` "sound" or "flash". Raises RecordingError."""
+    if len(films) < 2:
+        raise RecordingError("one film has no offset; give two or more of one scene.")
     (name, first), *others = films.items()
+    found = {name: FilmOffset(0.0, 0.0)}
     if by == "sound":
-        return {name: 0.0} | {other: offset_by_sound(first, path) for other, path in others}
+        return found | {other: offset_by_sound(first, path) for other, path in others}
     began = flash_s(first, progress)
-    return {name: 0.0} | {other: began - flash_s(path, progress) for other, path in others}
+    for other, path in others:
+        seen = flash_s(path, progress)
+        found[other] = FilmOffset(began.seconds - seen.seconds, math.hypot(began.std_s, seen.std_s))
+    return found
+
+
+def offset_sentence(found: Mapping[str, FilmOffset], by: str) -> str:
+    """By how much later than the first film the others began."""
+    first, *others = found
+    return (f"By {by}, after {first} began " + ", ".join(
+        f"{name} {found[name].seconds:+.4f} ± {found[name].std_s:.4f} s" for name in others) + ".")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 
 from rhot_app.errors import RecordingError, input_file
@@ -25,13 +26,17 @@ def run(args: argparse.Namespace) -> int:
     """Compare every film with the first one and print what to add to its times. Raises RecordingError."""
     films = named_films(args.films)
     from rhot_app.progress import ProgressLine
-    from rhot_app.sources.film_offset import offsets_of
+    from rhot_app.sources.film_offset import offset_sentence, offsets_of
 
     line = ProgressLine("offsets")
     offsets = offsets_of(films, args.by, line.report)
     line.finish()
-    words = " ".join(f"--offset-s {name}={seconds:.4f}" for name, seconds in list(offsets.items())[1:])
-    print(json.dumps({"by": args.by, "offsets_s": offsets}) if args.json else words)
+    if args.json:
+        print(json.dumps({"by": args.by, "offsets_s": {name: one.seconds for name, one in offsets.items()},
+                          "offsets_std_s": {name: one.std_s for name, one in offsets.items()}}))
+        return 0
+    print(" ".join(f"--offset-s {name}={one.seconds:.4f}" for name, one in list(offsets.items())[1:]))
+    print(f"rhot: {offset_sentence(offsets, args.by)}", file=sys.stderr)
     return 0
 
 
@@ -44,6 +49,4 @@ def named_films(texts: list[str]) -> dict[str, Path]:
         if name in films:
             raise RecordingError(f"{text}: there are two films of {name}; name them, as in left={path}.")
         films[name] = input_file(path)
-    if len(films) < 2:
-        raise RecordingError("one film has no offset; give two or more of one scene.")
     return films

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from drawn_films import RATE, StandIn, seen_by, use_networks, video
 from recorded_landmarks import FOLDER, FPS, JUDGED, WHOLE, needs_recording, recording
+from test_film_offset import film_of, heard, speech
 
 from rhot_app.__main__ import main
 from rhot_app.export import bare_hand_command, landmark_track
@@ -108,6 +109,46 @@ def test_the_log_that_is_kept_is_replayed_beside_the_films(drawn, monkeypatch):
         assert films[1].number_at(t_ns) == number
         np.testing.assert_allclose(states[t_ns].joint_positions, places[number], atol=1e-6)
     assert main([*words, "--log", str(folder / "hand.rhotlog")]) == 2, "nothing is written over unasked"
+
+
+@pytest.mark.parametrize("by", ["sound", "flash"])
+def test_films_that_began_apart_are_aligned_by_what_they_heard_or_saw(tmp_path, monkeypatch, capsys, by):
+    hand, later = moving_hand(RIG, "grasp", SECONDS, RATE, 1, 0.05), 7
+    seen, sound = seen_by(RIG, hand.joints()), speech(SECONDS + 1.0, 1)
+    save_rig(tmp_path / "rig.json", RIG)
+    words = ["track", "--rig", str(tmp_path / "rig.json"), "--out", str(tmp_path / "hand.csv"), "--json"]
+    for node, begin in zip(RIG.nodes, (0, later), strict=True):
+        lens, count, path = node.intrinsics, len(hand.times_s) - begin, tmp_path / f"{node.name}-{by}.mp4"
+        if by == "sound":
+            film_of(path, heard(sound, begin / RATE, SECONDS - begin / RATE, begin), count / RATE,
+                    size=(lens.width, lens.height), rate=round(RATE))
+        else:
+            video(path := path.with_suffix(".avi"), lens, count, lit_from=20 - begin)
+        words.insert(1, f"{node.name}={path}")
+
+    def use() -> None:
+        use_networks(monkeypatch, [StandIn(seen[0][None], 0.95), StandIn(seen[1][None, later:], 0.95)])
+
+    use()
+    name = RIG.nodes[1].name
+    assert main([*words, "--offset", by]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["offsets_s"][name] == pytest.approx(later / RATE, abs=0.5 / RATE)
+    assert 0.0 < said["offsets_std_s"][name] < 0.5 / RATE and f"{name} +0.35" in said["notes"][0]
+    assert by in said["notes"][0] and said["tracked"] > 0.7
+    use()
+    with pytest.raises(SystemExit):
+        main([*words, "--offset", by, "--offset-s", f"{name}=0.35"])
+    assert "not allowed with" in capsys.readouterr().err
+
+
+def test_films_that_neither_heard_nor_saw_the_same_are_not_aligned(drawn, capsys):
+    _, words, folder = drawn
+    for by, reason in (("sound", "no sound"), ("flash", "no light")):
+        assert main([*words, "--offset", by, "--out", str(folder / "hand.csv")]) == 2
+        assert reason in capsys.readouterr().err and not (folder / "hand.csv").exists()
+    assert main(["track", words[1], *words[3:], "--offset", "flash"]) == 2
+    assert "one film has no offset" in capsys.readouterr().err
 
 
 def test_a_hand_of_the_other_side_is_none_and_is_said_to_be(drawn, capsys):

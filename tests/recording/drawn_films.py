@@ -15,11 +15,12 @@ from rhot_node.landmarks.networks import DetectedHand, Region
 RATE = 20.0
 
 
-def video(path: Path, lens, count: int) -> Path:
-    """Black pictures of the lens's size."""
+def video(path: Path, lens, count: int, lit_from: int | None = None) -> Path:
+    """Black pictures of the lens's size; from a number on, a light is on."""
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), RATE, (lens.width, lens.height))
-    for _ in range(count):
-        writer.write(np.zeros((lens.height, lens.width, 3), np.uint8))
+    for number in range(count):
+        level = 0 if lit_from is None or number < lit_from else 120
+        writer.write(np.full((lens.height, lens.width, 3), level, np.uint8))
     writer.release()
     return path
 

@@ -35,16 +35,17 @@ def heard(sound: Array, begin_s: float, seconds: float, seed: int, noise: float 
     return part + np.random.default_rng(seed).normal(0.0, noise, len(part))
 
 
-def film_of(path: Path, sound: Array | None, seconds: float = 6.0, **metadata: str) -> Path:
-    """A film of small grey pictures with AAC sound."""
+def film_of(path: Path, sound: Array | None, seconds: float = 6.0, *, size: tuple[int, int] = (64, 48),
+            rate: int = 30, **metadata: str) -> Path:
+    """A film of grey pictures with AAC sound."""
     av = pytest.importorskip("av", reason="the extra `films` is not installed")
     with av.open(str(path), "w") as film:
         film.metadata.update(metadata)
-        pictures = film.add_stream("mpeg4", rate=Fraction(30))
-        pictures.width, pictures.height, pictures.pix_fmt = 64, 48, "yuv420p"
+        pictures = film.add_stream("mpeg4", rate=Fraction(rate))
+        pictures.width, pictures.height, pictures.pix_fmt = *size, "yuv420p"
         voice = None if sound is None else film.add_stream("aac", rate=SOUND_HZ, layout="mono")
-        for k in range(round(seconds * FPS)):
-            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 90, np.uint8), format="rgb24")
+        for k in range(round(seconds * rate)):
+            frame = av.VideoFrame.from_ndarray(np.full((*size[::-1], 3), 90, np.uint8), format="rgb24")
             frame.pts = k
             film.mux(pictures.encode(frame))
         film.mux(pictures.encode(None))
@@ -92,6 +93,22 @@ def test_sound_says_when_a_film_began(tmp_path: Path, capsys: pytest.CaptureFixt
     assert main(["offset", f"left={b}", f"right={a}"]) == 0
     words = capsys.readouterr().out.split()
     assert words[0] == "--offset-s" and float(words[1].removeprefix("right=")) == pytest.approx(-LATER_S, abs=0.5 / FPS)
+
+
+def test_the_true_offset_lies_in_the_stated_interval(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With as much noise as speech the peak is lower and the interval wider."""
+    sound, widths = speech(9.0, 1), []
+    a = film_of(tmp_path / "a.mp4", heard(sound, 0.0, 6.0, 2))
+    for noise in (0.01, 0.1):
+        b = film_of(tmp_path / "b.mp4", heard(sound, LATER_S, 6.0, 3, noise))
+        assert main(["offset", str(a), str(b), "--json"]) == 0
+        said = json.loads(capsys.readouterr().out)
+        assert abs(said["offsets_s"]["b"] - LATER_S) < 3.0 * said["offsets_std_s"]["b"] < 0.5 / FPS
+        widths.append(said["offsets_std_s"]["b"])
+    assert widths[1] > widths[0] > 0.0 and said["offsets_std_s"]["a"] == 0.0
+    lamps = [lit(tmp_path / f"{name}.avi", (2.5,), begin) for name, begin in (("a", 0.0), ("b", LATER_S))]
+    assert main(["offset", *map(str, lamps), "--by", "flash", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["offsets_std_s"]["b"] == pytest.approx(np.sqrt(2 / 12) / FPS)
 
 
 def test_sound_that_says_nothing_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

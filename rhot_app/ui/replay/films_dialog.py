@@ -28,7 +28,7 @@ from PySide6.QtWidgets import (
 from rhot_app.errors import RhotError
 from rhot_app.export.film_log import ChosenFilm, describe_film, log_films
 from rhot_app.project import Rig, load_rig
-from rhot_app.sources.film_offset import offsets_of
+from rhot_app.sources.film_offset import FilmOffset, offsets_of
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
 from rhot_app.ui.common.sentence import Sentence
@@ -299,16 +299,16 @@ class FilmsDialog(QDialog):
         self.sentence.setText(f"{text} …")
         self.bar.setValue(round(1000 * fraction))
 
-    def _show_offsets(self, offsets_s: dict[str, float]) -> None:
+    def _show_offsets(self, offsets: dict[str, FilmOffset]) -> None:
         self._job = None
         self.bar.setValue(1000)
         for row in range(self.table.rowCount()):
             later = self.table.cellWidget(row, 3)
             assert isinstance(later, QDoubleSpinBox)
-            later.setValue(offsets_s[str(self._path(row))])
+            later.setValue(offsets[str(self._path(row))].seconds)
         self._show_state()
-        self.sentence.setText("Aligned: " + ", ".join(f"{Path(path).name} {seconds:+.3f} s"
-                                                      for path, seconds in offsets_s.items()) + ".")
+        self.sentence.setText("Aligned: " + ", ".join(f"{Path(path).name} {one.seconds:+.3f} ± {one.std_s:.3f} s"
+                                                      for path, one in offsets.items()) + ".")
 
     def _finish(self, log: Path, said: list[str]) -> None:
         self._job = None

@@ -16,7 +16,7 @@ from rhot_app.calibration.lens.views import size_of
 from rhot_app.calibration.stereo.reading import film_frames
 from rhot_app.calibration.verdict import Finding
 from rhot_app.progress import Progress, within
-from rhot_app.sources.film_offset import offsets_of
+from rhot_app.sources.film_offset import FilmOffset, offset_sentence, offsets_of
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards.models.drawing import board_marks
 from rhot_app.ui.wizards.models.step import AnnotatedPicture, Step, StepView, Task
@@ -28,19 +28,20 @@ Began = Literal["together", "sound", "flash"]
 @dataclass(frozen=True, slots=True, eq=False)
 class FilmShots:
     """What films show: the `shots` that were chosen, a view of each camera or None, what they say of the board's size,
-    the frame in which each camera's board is `stillest`, and the seconds added to the times of each film."""
+    the frame in which each camera's board is `stillest`, and the `offsets` of films that were aligned."""
 
     shots: tuple[BoardShot, ...]
     size: Finding | None
     stillest: Mapping[str, AnnotatedPicture]
-    offsets_s: Mapping[str, float]
+    offsets: Mapping[str, FilmOffset]
 
 
 def read_films(films: Mapping[str, Path], board: Board, began: Began, *, progress: Progress) -> FilmShots:
     """Choose frames of one film of each camera. Raises CalibrationError and RecordingError."""
     aligned = 0.0 if began == "together" else 0.3
-    offsets = offsets_of(dict(films), began, within(progress, 0.0, aligned)) if aligned else dict.fromkeys(films, 0.0)
-    frames, columns = film_frames(films, board, offsets, within(progress, aligned, 1.0))
+    offsets = offsets_of(films, began, within(progress, 0.0, aligned)) if aligned else {}
+    frames, columns = film_frames(films, board, {name: one.seconds for name, one in offsets.items()},
+                                  within(progress, aligned, 1.0))
     shots = tuple(BoardShot(f"{moment.t_s:.2f} s", tuple(None if seen is None else seen.view for seen in moment.views))
                   for moment in frames.moments)
     stillest = {}
@@ -105,8 +106,9 @@ class Films:
         if self.read.size is not None:
             return StepView("Go back: the board is another one than the form says.",
                             hint=f"{self.read.size.figure} {self.read.size.cause}", annotated=self.read.stillest)
-        later = [f"{name} {seconds:+.3f} s" for name, seconds in self.read.offsets_s.items() if seconds]
-        said = f"{len(self.read.shots)} frames were chosen.{' Began: ' + ', '.join(later) + '.' if later else ''}"
+        said = f"{len(self.read.shots)} frames were chosen."
+        if self.read.offsets:
+            said += f" {offset_sentence(self.read.offsets, self.began)}"
         if shown.done:
             sentence = "Enough: press Next."
         elif shown.may_go_on:
