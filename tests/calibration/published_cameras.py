@@ -80,6 +80,35 @@ projection_matrix:
 """
 """ros-perception/image_common, camera_info_manager/tests/test_calibration.yaml, BSD-3-Clause."""
 
+def _ros(name: str, **matrices: tuple[int, int, str]) -> str:
+    parts = [f"{key}:\n  rows: {rows}\n  cols: {cols}\n  data: [{data}]\n" for key, (rows, cols, data)
+             in matrices.items()]
+    return (f"image_width: 640\nimage_height: 480\ncamera_name: {name}\ndistortion_model: plumb_bob\n"
+            + "".join(parts))
+
+
+ROS_PAIR = (
+    _ros("left", camera_matrix=(3, 3, "430.15433020105519, 0.0, 311.71339830549732, 0.0, 430.60920415473657, "
+                                "221.06824942698509, 0.0, 0.0, 1.0"),
+         distortion_coefficients=(1, 5, "-0.363528858080088, 0.16117037733986861, -8.1109585007538829e-05, "
+                                  "-0.00044776712298447841, 0.0"),
+         rectification_matrix=(3, 3, "0.99806560714807102, 0.0068562422224214027, 0.061790256276695904, "
+                               "-0.0067522959054715113, 0.99997541519165112, -0.0018909025066874664, "
+                               "-0.061801701660692349, 0.0014700186639396652, 0.99808736527268516"),
+         projection_matrix=(3, 4, "295.53402059708782, 0.0, 285.55760765075684, 0.0, 0.0, 295.53402059708782, "
+                            "223.29617881774902, 0.0, 0.0, 0.0, 1.0, 0.0")),
+    _ros("right", camera_matrix=(3, 3, "428.38163131344191, 0.0, 327.95553847249192, 0.0, 428.85728580588329, "
+                                 "217.54828640915309, 0.0, 0.0, 1.0"),
+         distortion_coefficients=(1, 4, "-0.3560641041112021, 0.15647260261553159, -0.00016442960757099968, "
+                                  "-0.00093175810713916221"),
+         rectification_matrix=(3, 3, "0.9982082576219119, 0.0067433328293516528, 0.059454199832973849, "
+                               "-0.0068433268864187356, 0.99997549128605434, 0.0014784127772287513, "
+                               "-0.059442773257581252, -0.0018826283666309878, 0.99822993965212292"),
+         projection_matrix=(3, 4, "295.53402059708782, 0.0, 285.55760765075684, -26.507895206214123, 0.0, "
+                            "295.53402059708782, 223.29617881774902, 0.0, 0.0, 0.0, 1.0, 0.0")))
+"""ros-perception/vision_opencv, image_geometry/test/directed.py, BSD-3-Clause: D, K, R and P "taken from a real camera
+calibration", here as files of camera_info."""
+
 KALIBR_CHAIN = """cam0:
   camera_model: pinhole
   intrinsics: [461.629, 460.152, 362.680, 246.049]

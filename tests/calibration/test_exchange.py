@@ -27,6 +27,7 @@ from published_cameras import (
     OPENCV_CAMERA,
     OPENCV_PAIR,
     ROS_CAMERA,
+    ROS_PAIR,
 )
 
 from rhot_app.calibration.commands.output import FORMAT_NAMES
@@ -142,6 +143,26 @@ def test_a_ros_pair_stands_as_opencvs_rectification_says(written: Written) -> No
         read_files(written(".yaml", texts[1]), Stated())
 
 
+def test_a_published_ros_pair_is_what_opencv_rectifies_like_that(written: Written) -> None:
+    """From the poses that are read cv2.stereoRectify makes the published R of both cameras, and P's shift. Transposed,
+    or with the other sign of the shift, it makes others."""
+    _, (left, right) = read_files(written(".yaml", *ROS_PAIR), Stated())
+    stated = [yaml.safe_load(text) for text in ROS_PAIR]
+    k, d, r, p = ([np.reshape(one[key]["data"], shape) for one in stated] for key, shape in (
+        ("camera_matrix", (3, 3)), ("distortion_coefficients", (-1,)), ("rectification_matrix", (3, 3)),
+        ("projection_matrix", (3, 4))))
+    assert left.camera_from_world is not None and right.camera_from_world is not None
+    right_from_left = right.camera_from_world @ inverse(left.camera_from_world)
+    r1, r2, p1, p2, *_ = cv2.stereoRectify(k[0], d[0], k[1], d[1], (640, 480), right_from_left[:3, :3],
+                                           right_from_left[:3, 3])
+    assert np.allclose(r1, r[0], atol=1e-8) and np.allclose(r2, r[1], atol=1e-8)
+    assert p2[0, 3] / p2[0, 0] == pytest.approx(p[1][0, 3] / p[1][0, 0]) == pytest.approx(-0.0896949)
+    for camera, matrix, lens, turn, shift in zip((left, right), k, d, r, (0.0, p[1][0, 3] / p[1][0, 0]), strict=True):
+        assert_projects(camera, matrix.tolist(), lens.tolist(), cv2.Rodrigues(turn.T)[0].ravel(),
+                        turn.T @ np.array([shift, 0.0, 0.0]))
+    assert p1[0, 3] == 0.0
+
+
 def test_kalibrs_chain_agrees_with_where_the_imu_is(written: Written) -> None:
     """Each camera of the published example also states the pose of one IMU, in the other direction it would be
     220 mm off."""
@@ -151,8 +172,12 @@ def test_kalibrs_chain_agrees_with_where_the_imu_is(written: Written) -> None:
     imu = [np.array(stated[key]["T_cam_imu"]) for key in ("cam0", "cam1")]
     assert first.camera_from_world is not None and second.camera_from_world is not None
     assert np.allclose(second.camera_from_world @ inverse(first.camera_from_world) @ imu[0], imu[1], atol=1e-6)
-    fx, fy, cx, cy = stated["cam0"]["intrinsics"]
-    assert_projects(first, [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], stated["cam0"]["distortion_coeffs"])
+    stated["cam1"]["intrinsics"] = stated["cam1"]["intrinsics"][1:]  # of the pinhole that replaces the omni lens
+    for camera, key in ((first, "cam0"), (second, "cam1")):
+        fx, fy, cx, cy = stated[key]["intrinsics"]
+        pose = np.array(stated[key].get("T_cn_cnm1", np.eye(4)))
+        assert_projects(camera, [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], stated[key]["distortion_coeffs"],
+                        cv2.Rodrigues(pose[:3, :3])[0].ravel(), pose[:3, 3])
 
 
 def test_an_anipose_file_projects_as_opencv_does_with_its_numbers(written: Written) -> None:

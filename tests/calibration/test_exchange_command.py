@@ -9,7 +9,15 @@ import cv2
 import msgspec
 import numpy as np
 import pytest
-from published_cameras import ANIPOSE, CALISCOPE, KALIBR_CHAIN, OPENCV_CAMERA, ROS_CAMERA
+from published_cameras import (
+    ANIPOSE,
+    CALISCOPE,
+    KALIBR_CHAIN,
+    KALIBR_PINHOLES,
+    OPENCV_CAMERA,
+    OPENCV_PAIR,
+    ROS_CAMERA,
+)
 
 from rhot_app.__main__ import main
 from rhot_app.calibration.exchange.formats import FORMATS
@@ -19,6 +27,10 @@ from rhot_app.geometry.transforms import exp_so3, quaternion_from_rotation
 from rhot_app.project import CameraCalibration, CameraPose, Rig, load_rig, save_rig
 from rhot_app.rig_history import versions
 from rhot_node.files import resource_path
+
+SIDE_BY_SIDE = OPENCV_PAIR.replace("2.9589439552724328e-01, -1.0354662043042675e+00", "-0.17, -0.11"
+                                   ) + "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+"""The first lens as published folds back within the picture."""
 
 
 @pytest.fixture
@@ -114,12 +126,42 @@ def test_other_cameras_of_the_rig_move_along_with_the_first(rig: Path, tmp_path:
     assert np.allclose(models[0].world_from_camera, before[1].camera_from_world @ before[0].world_from_camera)
 
 
-def test_the_files_world_can_be_kept(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("unit", "baseline_mm", "hint"), [("mm", 75.0, ""), ("cm", 750.0, ""), ("m", 75e3, "mm")])
+def test_what_a_unit_implies_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str], unit: str, baseline_mm: float,
+                                     hint: str) -> None:
+    """Nothing tells millimetres from centimetres but a person who knows how far the cameras are apart."""
+    source = tmp_path / "pair.yml"
+    source.write_text(SIDE_BY_SIDE + "T: [-74.94, -3, 0]\n")
+    words = ["calibrate", "import", str(source), "--size", "640x480", "--unit", unit]
+    code = main(words)
+    told = capsys.readouterr()
+    assert (code, "--unit mm" in told.err) == ((0, False) if not hint else (2, True))
+    if hint:
+        return
+    assert f"cam1 to cam2: {baseline_mm:.1f} mm" in told.out
+    assert f"cam2 stands {baseline_mm / 25:.0f} mm lower than cam1" in told.out
+    assert main([*words, "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["baselines_mm"][0]["baseline_mm"] == pytest.approx(baseline_mm, rel=1e-4)
+    assert said["cameras"][1]["height_mm"] == pytest.approx(-baseline_mm / 25, rel=1e-3)
+
+
+def test_a_baseline_of_a_few_millimetres_names_the_unit_that_would_fit(tmp_path: Path,
+                                                                     capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "pair.yml"
+    source.write_text(SIDE_BY_SIDE + "T: [-0.075, 0, 0]\n")
+    main(["calibrate", "import", str(source), "--size", "640x480", "--unit", "cm", "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert any("With --unit m they are 75 mm apart" in warning for warning in said["warnings"])
+
+
+def test_the_files_world_can_be_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source, out = tmp_path / "camera_array.toml", tmp_path / "rig.json"
     source.write_text(CALISCOPE)
     assert main(["calibrate", "import", str(source), "--keep-world", "--out", str(out)]) == 0
     made: Rig = load_rig(out)
-    assert made.up == "z"
+    said = capsys.readouterr().out
+    assert made.up == "z" and f"cam_0: {1e3 * made.nodes[0].pose.translation_m[2]:.0f} mm above" in said
     camera = CameraModel.from_rig(made.nodes[0].intrinsics, made.nodes[0].pose)
     assert np.allclose(camera.camera_from_world[:3, 3], (0.05666886720753522, 0.0029046886409570417,
                                                          0.8981482977014373), atol=1e-12)
@@ -139,8 +181,12 @@ def test_what_cannot_be_imported_leaves_everything_as_it_was(rig: Path, tmp_path
         (tmp_path / name).write_text(text)
     where = ["--out", str(rig)]
     anipose = ["import", str(tmp_path / "a.toml")]
-    assert "--unit" in refused([*anipose, "--unit", "m", "--out", str(tmp_path / "n.json")], tmp_path, capsys)
-    assert "apart" in refused([*anipose, "--unit", "cm", "--out", str(tmp_path / "n.json")], tmp_path, capsys)
+    for unit in ("m", "cm"):
+        assert "With --unit mm" in refused([*anipose, "--unit", unit, "--out", str(tmp_path / "n.json")], tmp_path,
+                                           capsys)
+    (tmp_path / "k2.yaml").write_text(KALIBR_PINHOLES.replace("-0.11003785", "-110.03785"))
+    assert "numbers are mm, they are 110" in refused(
+        ["import", str(tmp_path / "k2.yaml"), "--out", str(tmp_path / "n.json")], tmp_path, capsys)
     assert "--camera" in refused([*anipose, "--unit", "mm", *where], tmp_path, capsys)
     assert "--camera" in refused([*anipose, "--unit", "mm", "--camera", "left=cam000", *where], tmp_path, capsys)
     assert "omni" in refused(["import", str(tmp_path / "k.yaml"), *where], tmp_path, capsys)

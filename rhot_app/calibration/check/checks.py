@@ -30,7 +30,8 @@ _USUAL_OFFSET = 0.15  # of the picture's side, principal point from the middle
 _USUAL_ASPECT = 0.05  # fx against fy: pixels are square
 _GRID = 19
 _TOGETHER_M = 0.005
-_NARROW_M, _APART_M = 0.025, 3.0
+NARROW_M, APART_M = 0.025, 3.0
+"""Baselines with which cameras hardly see depth, and with which they are taken for a wrong unit."""
 _GOOD_OVERLAP, _LEAST_OVERLAP = 0.5, 0.15
 _STEEP_RAD = np.radians(70.0)
 
@@ -109,11 +110,11 @@ def pair_findings(rig: Rig, pairs: list[PairGeometry]) -> list[Finding]:
         if pair.baseline_m < _TOGETHER_M:
             found.append(Finding("coincident", Grade.POOR, f"{both} stand at the same place "
                                  f"({pair.baseline_m * 1e3:.0f} mm apart).", "Depth needs two places.", _STEREO))
-        elif pair.baseline_m < _NARROW_M:
+        elif pair.baseline_m < NARROW_M:
             found.append(Finding("narrow", Grade.FAIR, f"{both} are only {pair.baseline_m * 1e3:.0f} mm apart.",
                                  "So near to each other they hardly see depth; or the board's squares were given too "
                                  "small.", "Measure from lens to lens. If that is right, put them 75 mm apart."))
-        elif pair.baseline_m > _APART_M:
+        elif pair.baseline_m > APART_M:
             found.append(Finding("apart", Grade.POOR, f"{both} are {pair.baseline_m:.0f} m apart.",
                                  "A rig's translations are in metres: is the unit right (--unit, --square-mm)?",
                                  _STEREO))

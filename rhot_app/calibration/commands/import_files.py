@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import (
     FORMAT_NAMES,
+    UNITS_M,
     add_json_argument,
     add_length_arguments,
     require_folder,
@@ -20,6 +21,8 @@ from rhot_app.errors import CalibrationError, input_file
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
+    from rhot_app.calibration.check.checks import PairGeometry
+    from rhot_app.calibration.exchange.formats import Format
     from rhot_app.calibration.exchange.records import ForeignCamera
     from rhot_app.project import Rig
 
@@ -58,6 +61,7 @@ def _size(text: str) -> tuple[int, int]:
 
 def run(args: argparse.Namespace) -> int:
     """Read, check and report; files are written when the cameras can be those of a rig."""
+    from rhot_app.calibration.check.checks import all_pairs
     from rhot_app.calibration.exchange.formats import FORMATS, read_files
     from rhot_app.calibration.exchange.records import Stated
     from rhot_app.calibration.exchange.rig_cameras import camera_findings, new_rig, with_cameras
@@ -71,19 +75,26 @@ def run(args: argparse.Namespace) -> int:
     base_file = args.rig_from or (args.out if args.out is not None and args.out.exists() else None)
     base = None if base_file is None else load_rig(base_file)
     chosen = _chosen(args.camera, cameras, base)
-    rig = with_cameras(base or new_rig(args.files[0].stem[:64], chosen), chosen, keep_world=args.keep_world)
+    hint = _unit_hint(chosen, 1.0 if FORMATS[name].states_unit else unit_of(args), FORMATS[name])
+    rig = with_cameras(base or new_rig(args.files[0].stem[:64], chosen), chosen, keep_world=args.keep_world,
+                       unit_hint=hint)
     posed = all(camera.camera_from_world is not None for camera in chosen.values())
     verdict = judge(f"{len(chosen)} {'camera' if len(chosen) == 1 else 'cameras'} of {FORMATS[name].title}, "
-                    f"{'lenses and poses' if posed else 'lenses alone'}.", camera_findings(rig, chosen))
+                    f"{'lenses and poses' if posed else 'lenses alone'}.", camera_findings(rig, chosen, hint))
     written = []
     if args.intrinsics is not None and verdict.acceptable:
         written.append(_write_intrinsics(args.intrinsics, chosen))
     if args.out is not None and verdict.acceptable:
         accept(args.out, rig, f"import from {name}")
         written.append(str(args.out))
-    return show({"format": name, "cameras": [_fields(node, chosen[node.name], posed) for node in rig.nodes
-                                             if node.name in chosen]},
-                _lines(rig, chosen, posed), verdict, as_json=args.json, written=", ".join(written))
+    pairs = [pair for pair in all_pairs(rig) if {pair.first, pair.second} <= chosen.keys()] if posed else []
+    heights = _heights_m(rig, chosen) if posed else {}
+    return show({"format": name, "cameras": [_fields(node, chosen[node.name], posed, heights) for node in rig.nodes
+                                             if node.name in chosen],
+                 "baselines_mm": [{"first": pair.first, "second": pair.second, "baseline_mm": 1e3 * pair.baseline_m}
+                                  for pair in pairs]},
+                [*_lens_lines(rig, chosen), *_place_lines(pairs, heights, args.keep_world)], verdict,
+                as_json=args.json, written=", ".join(written))
 
 
 def _chosen(texts: Sequence[str], cameras: list[ForeignCamera], rig: Rig | None) -> dict[str, ForeignCamera]:
@@ -120,22 +131,56 @@ def _write_intrinsics(path: Path, cameras: dict[str, ForeignCamera]) -> str:
     return str(path)
 
 
-def _fields(node: Any, camera: ForeignCamera, posed: bool) -> dict[str, Any]:
+def _unit_hint(cameras: dict[str, ForeignCamera], unit_m: float | None, form: Format) -> str:
+    """Which unit would make plausible distances between the cameras; empty where they are, or none would."""
+    from rhot_app.calibration.check.checks import APART_M, NARROW_M
+    from rhot_app.calibration.exchange.rig_cameras import baselines_m
+
+    found = baselines_m(cameras)
+    if unit_m is None or not found or NARROW_M <= min(found) <= max(found) <= APART_M:
+        return ""
+    for name, metres in UNITS_M.items():
+        low, high = (metres / unit_m * bound(found) for bound in (min, max))
+        if NARROW_M <= low <= high <= APART_M:
+            far = f"{1e3 * low:.4g} mm" if low == high else f"{1e3 * low:.4g} to {1e3 * high:.4g} mm"
+            if form.states_unit:
+                return (f"{form.title} writes metres; if these numbers are {name}, they are {far} apart: convert the "
+                        "file.")
+            return f"With --unit {name} they are {far} apart."
+    return ""
+
+
+def _heights_m(rig: Rig, cameras: dict[str, ForeignCamera]) -> dict[str, float]:
+    """How high each camera stands above the rig frame's origin, by what the rig calls up."""
+    axis, sign = "xyz".index(rig.up[-1]), -1.0 if rig.up.startswith("-") else 1.0
+    return {node.name: sign * node.pose.translation_m[axis] for node in rig.nodes if node.name in cameras}
+
+
+def _fields(node: Any, camera: ForeignCamera, posed: bool, heights_m: dict[str, float]) -> dict[str, Any]:
     lens = node.intrinsics
     return {"name": node.name, "theirs": camera.name, "fx": lens.fx, "fy": lens.fy, "cx": lens.cx, "cy": lens.cy,
             "distortion": list(lens.distortion), "size": [lens.width, lens.height],
             "translation_mm": [1e3 * value for value in node.pose.translation_m] if posed else None,
-            "rotation_wxyz": list(node.pose.rotation_wxyz) if posed else None}
+            "rotation_wxyz": list(node.pose.rotation_wxyz) if posed else None,
+            "height_mm": 1e3 * heights_m[node.name] if posed else None}
 
 
-def _lines(rig: Rig, cameras: dict[str, ForeignCamera], posed: bool) -> list[str]:
-    from rhot_app.calibration.check.checks import all_pairs
-
+def _lens_lines(rig: Rig, cameras: dict[str, ForeignCamera]) -> list[str]:
     lines = []
     for node in (node for node in rig.nodes if node.name in cameras):
         lens = node.intrinsics
         lines.append(f"{node.name}, in the file {cameras[node.name].name}: f {lens.fx:.2f}, {lens.fy:.2f} px, centre "
                      f"({lens.cx:.2f}, {lens.cy:.2f}) px, {lens.width}x{lens.height} px")
-    if posed:
-        lines += [f"{pair.first} to {pair.second}: {1e3 * pair.baseline_m:.1f} mm" for pair in all_pairs(rig)]
+    return lines
+
+
+def _place_lines(pairs: list[PairGeometry], heights_m: dict[str, float], keep_world: bool) -> list[str]:
+    """What the poses imply, for a person to hold against the room: nothing else tells a wrong unit."""
+    lines = [f"{pair.first} to {pair.second}: {1e3 * pair.baseline_m:.1f} mm" for pair in pairs]
+    if keep_world:
+        return lines + [f"{name}: {1e3 * height:.0f} mm above z = 0" for name, height in heights_m.items()]
+    (first, origin), *others = list(heights_m.items()) or [("", 0.0)]
+    for name, height in others:
+        side = "higher" if height >= origin else "lower"
+        lines.append(f"{name} stands {1e3 * abs(height - origin):.0f} mm {side} than {first}, as {first} is held")
     return lines

@@ -85,13 +85,14 @@ def show(fields: dict[str, Any], lines: list[str], verdict: Verdict, *, as_json:
 FORMAT_NAMES = ("opencv", "ros", "kalibr", "anipose", "caliscope")
 """Of `exchange.formats.FORMATS`, which loads OpenCV."""
 
-_UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+"""Of `add_length_arguments`."""
 
 
 def add_length_arguments(parser: argparse.ArgumentParser) -> None:
     """The unit of lengths in a format that does not say it."""
     unit = parser.add_mutually_exclusive_group()
-    unit.add_argument("--unit", choices=tuple(_UNITS_M), help="of lengths, where the format does not say it (OpenCV, "
+    unit.add_argument("--unit", choices=tuple(UNITS_M), help="of lengths, where the format does not say it (OpenCV, "
                       "anipose)")
     unit.add_argument("--square-mm", type=positive_number, metavar="S",
                       help="lengths are in sides of a board's square, of S mm")
@@ -101,7 +102,7 @@ def unit_of(args: argparse.Namespace) -> float | None:
     """Metres per unit of length as `add_length_arguments` says, None where nothing was given."""
     if args.square_mm is not None:
         return 1e-3 * float(args.square_mm)
-    return None if args.unit is None else _UNITS_M[args.unit]
+    return None if args.unit is None else UNITS_M[args.unit]
 
 
 # -- arguments that describe a board -----------------------------------------------------------------------------------
