@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.estimation.track import SESSION_NS
+from rhot_app.estimation.track import LOST_NS, SESSION_NS
 from rhot_app.tracking import tracks
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
@@ -40,7 +40,6 @@ SILENT_NS = 200_000_000
 """A camera unheard for longer (or for three of its frame periods) no longer holds up the others."""
 
 _SAME_FRAME_NS = 1_000_000  # the same frame again, its time moved a little by a new clock estimate
-_LATE_NS = 500_000_000  # later than this a frame is of no use to any track
 _STEP_NS = 100_000_000  # frames cannot come from the future by more than delays vary
 _STALE_FRAMES_BEFORE_RESET = 5
 
@@ -57,7 +56,7 @@ def place_frame(frames: Times, book: Times, t_row0_ns: int, receive_ns: int) -> 
         book[STALE] = 0
         if t_row0_ns - frames[count - 1] > receive_ns - book[RECEIVED] + _STEP_NS:
             outcome = ANEW  # its clock was set forwards
-    elif count > 0 and frames[count - 1] - t_row0_ns > _LATE_NS:
+    elif count > 0 and frames[count - 1] - t_row0_ns > LOST_NS:  # of no use to any track
         book[STALE] += 1
         if book[STALE] < _STALE_FRAMES_BEFORE_RESET:
             return IGNORED

@@ -226,7 +226,7 @@ class RecordingEstimator(Estimator):
                 self._final.append(self._instants.pop(key))
 
 
-class TwoRecordingEstimators(TwoHands):
+class TwoRecordingEstimators(TwoHands[RecordingEstimator]):
     """Two hands, each of whose estimators smooths what it has found."""
 
     def __init__(self, rig: Rig) -> None:
@@ -236,8 +236,7 @@ class TwoRecordingEstimators(TwoHands):
 
     def smoothed(self) -> Iterator[HandState]:
         """The states of both hands that have become final, in the order of time."""
-        hands = self._recording
-        for tracker, waiting in zip(hands, self._waiting, strict=True):
+        for tracker, waiting in zip(self._both, self._waiting, strict=True):
             waiting.update((instant.number, instant) for instant in tracker.failed() + tracker.taken())
         one, other = self._waiting
         for number in [number for number in one if number in other]:
@@ -246,7 +245,7 @@ class TwoRecordingEstimators(TwoHands):
             state = None
             with self.diagnostics.part("a smoothed state", lambda: None):
                 state = self._merge(*(replace(tracker.describe(instant, t_ns), t_master_ns=t_ns)
-                                      for tracker, instant in zip(hands, pair, strict=True)))
+                                      for tracker, instant in zip(self._both, pair, strict=True)))
             if state is not None:
                 yield state
             for waiting in self._waiting:  # what is so far behind has no counterpart
@@ -255,13 +254,8 @@ class TwoRecordingEstimators(TwoHands):
 
     def conclude(self) -> None:
         """The recording is over: all instants are final."""
-        for tracker in self._recording:
+        for tracker in self._both:
             tracker.conclude()
-
-    @property
-    def _recording(self) -> tuple[RecordingEstimator, RecordingEstimator]:
-        assert isinstance(self._hand, RecordingEstimator) and isinstance(self._other, RecordingEstimator)
-        return self._hand, self._other
 
 
 class SmoothedTracker(Tracker):

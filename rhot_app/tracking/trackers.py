@@ -33,7 +33,7 @@ def make_tracker(rig: Rig, *, smooth: bool = False) -> Tracker:
         if rig.tracker.contours:
             tracker = ContourEstimator(hand) if rig.other_hand is None else TwoBareHands(hand)
         else:
-            tracker = Estimator(hand) if rig.other_hand is None else TwoHands(hand)
+            tracker = Estimator(hand) if rig.other_hand is None else TwoHands(hand, Estimator)
     return WithObjects(rig, tracker, own) if rig.objects else tracker
 
 

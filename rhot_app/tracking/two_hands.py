@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from rhot_app.estimation.track import comes_late
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, no_hand
 from rhot_app.tracking.extrapolation import Extrapolator
-from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.rig_arrays import rigs_of_hands
 from rhot_app.tracking.tracker import CameraObservations, Tracker
 
@@ -29,18 +28,21 @@ _WORK = ("triangulate", "filter", "solve")
 """Stages that are gone through for one hand after the other."""
 
 
-class TwoHands(Tracker):
-    """Implements `Tracker` for a rig with an `other_hand`: states of its `hand`, whose `other` is of the other one.
+OneHand = TypeVar("OneHand", bound=Tracker)
+
+
+class TwoHands(Tracker, Generic[OneHand]):
+    """For a rig with an `other_hand`: states of its `hand`, whose `other` is of the other one.
 
     The arrays of a state's markers are those of the whole rig; its `other` has its own markers only.
     """
 
-    def __init__(self, rig: Rig, one_hand: Callable[[Rig], Tracker] = Estimator) -> None:
+    def __init__(self, rig: Rig, one_hand: Callable[[Rig], OneHand]) -> None:
         """`one_hand` makes the tracker of each hand. Raises RigError as it does."""
         (first, own), (second, others) = rigs_of_hands(rig)
         self._ids, self._own = rig.markers.ids, (own, others)
         self._order = np.argsort(np.concatenate(self._own))
-        self._hand, self._other = one_hand(first), one_hand(second)
+        self._both = one_hand(first), one_hand(second)
         self.diagnostics = Diagnostics()
         self._names = tuple(node.name for node in rig.nodes)
         self._extrapolators = Extrapolator(first), Extrapolator(second)
@@ -50,15 +52,15 @@ class TwoHands(Tracker):
     def reset(self) -> None:
         """Forget everything but the count of states."""
         self._newest = [None] * len(self._newest)
-        self._hand.reset()
-        self._other.reset()
+        for hand in self._both:
+            hand.reset()
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in; each hand gets the observations of its own markers."""
         last = self._newest[observations.camera]
         if last is None or not comes_late(observations.t_row0_master_ns, last.t_row0_master_ns):
             self._newest[observations.camera] = observations
-        for tracker, own in zip((self._hand, self._other), self._own, strict=True):
+        for tracker, own in zip(self._both, self._own, strict=True):
             further = None if observations.further is None else observations.further.of(own)
             columns = {name: getattr(observations, name)[own] for name in _PER_OBSERVATION}
             tracker.ingest(replace(observations, further=further, **columns))
@@ -82,7 +84,7 @@ class TwoHands(Tracker):
     def _each(self) -> list[tuple[HandState | None, bool]]:
         """The next state of each hand, and whether its tracker failed."""
         found = []
-        for tracker, name in zip((self._hand, self._other), ("the hand", "the other hand"), strict=True):
+        for tracker, name in zip(self._both, ("the hand", "the other hand"), strict=True):
             state = None
             with self.diagnostics.part(name, tracker.reset) as part:
                 state = tracker.solve()

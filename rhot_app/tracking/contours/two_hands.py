@@ -47,7 +47,7 @@ class _JointRequest(NamedTuple):
 _PALM_JOINTS = [0, *(joints.start for joints in JOINT_SLICES[1:])]  # wrist and knuckles
 
 
-class TwoBareHands(TwoHands):
+class TwoBareHands(TwoHands[ContourEstimator]):
     """For a rig with an `other_hand`: a state after the edges of each
     frame."""
 
@@ -55,9 +55,7 @@ class TwoBareHands(TwoHands):
         """Raises RigError as `ContourEstimator`."""
         super().__init__(rig, lambda own: ContourEstimator(  # a right palm that faces a camera is to its left
             own, hands=2, lateral_m=-LATERAL_M if own.hand.side == "right" else LATERAL_M))
-        assert isinstance(self._hand, ContourEstimator) and isinstance(self._other, ContourEstimator)
-        self._both = self._hand, self._other
-        self.key_frames = self._hand.key_frames
+        self.key_frames = self._both[0].key_frames
         for hand in self._both:
             hand.occluder = partial(self._occluder, hand)
         self._cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]

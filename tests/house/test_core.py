@@ -1,0 +1,47 @@
+"""One way of each thing in the core: counts that a second one would raise."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+CORE = [path for room in ("estimation", "geometry", "filters", "hand", "tracking", "barehand", "articulated", "objects",
+                          "handfit", "recording", "sources", "engine", "export")
+        for path in sorted((ROOT / "rhot_app" / room).rglob("*.py"))]
+
+
+def _bases(node: ast.ClassDef) -> set[str]:
+    return {one.id for base in node.bases for one in ast.walk(base) if isinstance(one, ast.Name)}
+
+
+def _trackers() -> set[str]:
+    """Names of `Tracker` and of all classes that derive from it."""
+    classes = [node for path in CORE for node in ast.walk(ast.parse(path.read_text()))
+               if isinstance(node, ast.ClassDef)]
+    found = {"Tracker"}
+    while more := {node.name for node in classes if _bases(node) & found} - found:
+        found |= more
+    return found
+
+
+def test_nobody_asks_a_tracker_what_it_is() -> None:
+    trackers = _trackers()
+    assert len(trackers) > 6
+    asked = [f"{path.relative_to(ROOT)}:{node.lineno}"
+             for path in CORE for node in ast.walk(ast.parse(path.read_text()))
+             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "isinstance"
+             and trackers & {one.id for one in ast.walk(node.args[1]) if isinstance(one, ast.Name)}]
+    assert not asked, "give `tracking.tracker.Tracker` what they need, with a default"
+
+
+@pytest.mark.parametrize("ns", [500_000_000, 1_000_000_000])
+def test_when_a_track_is_lost_and_a_session_over_is_said_once(ns: int) -> None:
+    """`estimation.track`; other constants of the same length are of clocks and nodes."""
+    said = [f"{path.relative_to(ROOT)}:{node.lineno}" for path in CORE
+            if path.parent.parts[len(ROOT.parts) + 1] in ("estimation", "tracking", "barehand", "objects")
+            for node in ast.parse(path.read_text()).body if isinstance(node, ast.Assign | ast.AnnAssign)
+            for one in ast.walk(node) if isinstance(one, ast.Constant) and type(one.value) is int and one.value == ns]
+    assert len(said) == 1 and said[0].startswith("rhot_app/estimation/track.py"), said
