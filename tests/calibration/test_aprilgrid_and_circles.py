@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from board_rendering import LENS, Photo, april_grid, corners_px, pose, take
 from numpy.typing import NDArray
+from stereo_twin import LENSES, RIGHT_FROM_LEFT, stereo_twin
 
 from rhot_app.__main__ import main
 from rhot_app.calibration.board.aprilgrid import measured_spacing
@@ -128,3 +129,23 @@ def test_the_command_takes_the_board(board: Board, words: list[str], tmp_path: P
     assert main(["calibrate", "intrinsics", "--images", str(tmp_path / "left*.png"), "--kind", "chessboard",
                  "--tag-spacing", "0.3"]) == 2
     assert "AprilGrid" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("board", "words"), [
+    (AprilGrid(6, 4, 0.030, 0.3), ["--kind", "aprilgrid", "--board", "6x4", "--square-mm", "30"]),
+    (CIRCLES, ["--kind", "circles", "--square-mm", "20"])], ids=["aprilgrid", "circles"])
+def test_two_cameras_are_put_together(board: Board, words: list[str], tmp_path: Path,
+                                      capsys: pytest.CaptureFixture[str]) -> None:
+    """Seven pictures of each camera; the baseline, and the board's own length, come back."""
+    poses = stereo_twin(seed=5, shots=7, board=board).world_from_board
+    for camera, (name, camera_from_world) in enumerate((("left", np.eye(4)), ("right", RIGHT_FROM_LEFT))):
+        taken = Photo(lens=tuple(LENSES[camera]), blur_px=0.8, noise=2.0, oversampling=2)
+        for k, world_from_board in enumerate(poses):
+            picture = take(board, camera_from_world @ world_from_board, taken, k)
+            cv2.imwrite(str(tmp_path / f"{name}{k:02d}.png"), picture)
+    assert main(["calibrate", "stereo", "--left", str(tmp_path / "left*.png"), "--right", str(tmp_path / "right*.png"),
+                 *words, "--baseline-mm", "99.8", "--out", str(tmp_path / "rig.json"), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    off = np.abs(np.array(answer["translation_mm"]) - 1e3 * RIGHT_FROM_LEFT[:3, 3])
+    assert answer["views_used"] >= 6 and np.all(off < 3.5 * np.array(answer["translation_std_mm"]))
+    assert answer["square_mm_triangulated"] == pytest.approx(1e3 * board.square_m, abs=0.05)

@@ -279,8 +279,8 @@ def lines_of(report: StereoReport, frame: WorldFrame | None) -> list[str]:
                      f"R ({_listed(pair.rotation_rad, 4)}) rad, epipolar {pair.epipolar_px:.2f} px")
     lines.append(what_is_reported(figures.error_inflation))
     squares = figures.squares
-    lines.append(f"squares as the cameras see them: {squares.mean_m * 1e3:.3f} ± {squares.std_m * 1e3:.3f} mm, board "
-                 f"flat to {squares.flatness_m * 1e3:.2f} mm")
+    lines.append(f"{figures.board.parts} as the cameras see them: {squares.mean_m * 1e3:.3f} ± "
+                 f"{squares.std_m * 1e3:.3f} mm, board flat to {squares.flatness_m * 1e3:.2f} mm")
     if figures.board_errors is not None:
         lines.append(f"the board's corners are {figures.board_errors.in_plane_m * 1e3:.2f} mm off in its plane and "
                      f"{figures.board_errors.across_m * 1e3:.2f} mm across; allowed for")

@@ -100,16 +100,18 @@ def _findings(figures: StereoFigures, solution: StereoSolution, lenses: Sequence
     found += dropped_findings(dropped, len(figures.shots))
     square = figures.board.square_m
     if figures.ruler is not None:
-        found.append(ruler_finding(figures.ruler, square))
+        found.append(ruler_finding(figures.ruler, square, figures.board.parts))
     if known.baseline_m is not None:
         pair = figures.pairs[0]
-        found.append(baseline_finding(pair.baseline_m, known.baseline_m, square, (pair.first, pair.second)))
+        found.append(baseline_finding(pair.baseline_m, known.baseline_m, square, (pair.first, pair.second),
+                                      figures.board.parts))
     return found if figures.lengths != "skipped" else [*found, lengths_finding()]
 
 
 def _summary(figures: StereoFigures) -> str:
     baselines = ", ".join(f"{pair.first} to {pair.second} {pair.baseline_m * 1e3:.1f} mm" for pair in figures.pairs)
-    return (f"rms {figures.rms_px:.2f} px over {len(figures.shots)} shots; {baselines}; squares "
+    return (f"rms {figures.rms_px:.2f} px over {len(figures.shots)} shots; {baselines}; "
+            f"{figures.board.parts} "
             f"{figures.squares.mean_m * 1e3:.2f} mm.")
 
 

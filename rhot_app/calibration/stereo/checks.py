@@ -108,10 +108,10 @@ def _scale(figures: StereoFigures) -> Finding | None:
         return None
     return Finding(
         "scale", Grade.POOR if typical < _NEAREST_M else Grade.FAIR,
-        f"With squares of {figures.board.square_m * 1e3:g} mm the board was held {typical * 100:.0f} cm from the "
-        "cameras.",
-        "The squares have another size: they are given in millimetres.",
-        "Measure a square with a ruler, and say with --baseline-mm how far the lenses are apart.")
+        f"With {figures.board.parts} of {figures.board.square_m * 1e3:g} mm the board was held {typical * 100:.0f} cm "
+        "from the cameras.",
+        f"The {figures.board.parts} have another size: they are given in millimetres.",
+        "Measure one with a ruler, and say with --baseline-mm how far the lenses are apart.")
 
 
 def _squares(figures: StereoFigures) -> Finding | None:
@@ -123,8 +123,8 @@ def _squares(figures: StereoFigures) -> Finding | None:
         return None
     return Finding(
         "squares", Grade.POOR if off > _SQUARE_POOR else Grade.FAIR,
-        f"Seen by the cameras the squares are {squares.mean_m * 1e3:.2f} ± {squares.std_m * 1e3:.2f} mm (said: "
-        f"{side * 1e3:g}) and the board is flat to {squares.flatness_m * 1e3:.2f} mm.",
+        f"Seen by the cameras the {figures.board.parts} are {squares.mean_m * 1e3:.2f} ± "
+        f"{squares.std_m * 1e3:.2f} mm (said: {side * 1e3:g}) and the board is flat to {squares.flatness_m * 1e3:.2f} mm.",
         "The board is bent, or the cameras' geometry is not well determined.",
         "Use a stiff, flat board and take more pictures, also near and tilted.")
 

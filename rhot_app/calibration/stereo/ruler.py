@@ -74,29 +74,31 @@ def read_ruler(reading: RulerReading, state: BundleState) -> RulerResult:
     return RulerResult(reading.length_m, length, float(np.sqrt(variance)))
 
 
-def ruler_finding(result: RulerResult, square_m: float) -> Finding:
-    """What the ruler says about the size of the squares."""
+def ruler_finding(result: RulerResult, square_m: float, parts: str = "squares") -> Finding:
+    """What the ruler says about the size of the board's `parts`, each of `square_m`."""
     off = abs(result.ratio - 1.0)
     measured = (f"The ruler of {result.said_m * 1e3:.1f} mm measures {result.measured_m * 1e3:.1f} "
                 f"± {result.std_m * 1e3:.1f} mm")
     if off > max(_TOLERATED, result.doubt):
         return Finding(
             "square_size", Grade.POOR, f"{measured}, {100 * (1 / result.ratio - 1):+.1f} %.",
-            f"The squares are not {square_m * 1e3:g} mm: about {square_m * result.ratio * 1e3:.2f} mm fits the ruler. "
+            f"The {parts} are not {square_m * 1e3:g} mm: about {square_m * result.ratio * 1e3:.2f} mm fits the ruler. "
             "A printer that scales to the page does this.",
-            "Measure ten squares of the board with a ruler, divide by ten and give that as the square size.")
+            f"Measure ten {parts} of the board with a ruler, divide by ten and give that as their size.")
     if off > max(_FAIR, result.doubt):
         return Finding("square_size", Grade.FAIR, f"{measured}, {100 * (1 / result.ratio - 1):+.1f} %.",
-                       "The squares may not be exactly as big as said.",
+                       f"The {parts} may not be exactly as big as said.",
                        "Measure the board again over its whole width.")
     if not result.tells:
-        return Finding("ruler_vague", Grade.FAIR, f"{measured}, which is too vague to confirm the size of the squares.",
+        return Finding("ruler_vague", Grade.FAIR, f"{measured}, which is too vague to confirm the size of the "
+                       f"{parts}.",
                        "The ruler is short or far away, or points at the cameras.",
                        "Take a longer ruler, nearer and across the pictures.")
-    return Finding("ruler", Grade.GOOD, f"{measured}: the size of the squares is right.")
+    return Finding("ruler", Grade.GOOD, f"{measured}: the size of the {parts} is right.")
 
 
-def baseline_finding(measured_m: float, nominal_m: float, square_m: float, names: tuple[str, str]) -> Finding:
+def baseline_finding(measured_m: float, nominal_m: float, square_m: float, names: tuple[str, str],
+                     parts: str = "squares") -> Finding:
     """The baseline against one measured by hand between the lenses."""
     ratio = nominal_m / measured_m
     figure = (f"{names[0]} and {names[1]} are {measured_m * 1e3:.1f} mm apart, by hand {nominal_m * 1e3:.1f} mm "
@@ -105,9 +107,9 @@ def baseline_finding(measured_m: float, nominal_m: float, square_m: float, names
         return Finding("baseline", Grade.GOOD, f"{figure}, which agrees.")
     return Finding(
         "baseline", Grade.POOR, f"{figure}; more than {100 * TAPE:.0f} % apart.",
-        f"The squares are not {square_m * 1e3:g} mm (the baseline speaks for {square_m * ratio * 1e3:.1f} mm), or the "
+        f"The {parts} are not {square_m * 1e3:g} mm (the baseline speaks for {square_m * ratio * 1e3:.1f} mm), or the "
         "baseline was not measured from lens to lens.",
-        "Measure both again: ten squares with a ruler, and from the middle of one lens to the middle of the other.")
+        f"Measure both again: ten {parts} with a ruler, and from the middle of one lens to the middle of the other.")
 
 
 def _length(ends: Array, state: BundleState) -> float:
