@@ -124,7 +124,8 @@ def _squares(figures: StereoFigures) -> Finding | None:
     return Finding(
         "squares", Grade.POOR if off > _SQUARE_POOR else Grade.FAIR,
         f"Seen by the cameras the {figures.board.parts} are {squares.mean_m * 1e3:.2f} ± "
-        f"{squares.std_m * 1e3:.2f} mm (said: {side * 1e3:g}) and the board is flat to {squares.flatness_m * 1e3:.2f} mm.",
+        f"{squares.std_m * 1e3:.2f} mm (said: {side * 1e3:g}) and the board is flat to "
+        f"{squares.flatness_m * 1e3:.2f} mm.",
         "The board is bent, or the cameras' geometry is not well determined.",
         "Use a stiff, flat board and take more pictures, also near and tilted.")
 
