@@ -14,7 +14,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from multiprocessing import get_context, parent_process
 from typing import get_args
 
@@ -213,15 +213,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+STILL_S = 2.0
+"""s: how often it is said that a step, which may take a minute, is still being compiled."""
+
+
 def _compile(steps: Sequence[str], workers: int) -> None:
-    """Run the steps in processes of their own; prints a line after each."""
+    """Run the steps in processes of their own; prints a line after each, and now and then while none ends."""
+    begun_s, done = time.monotonic(), 0
     print(f"0 of {len(steps)} steps compiled", flush=True)
     with ProcessPoolExecutor(workers, get_context("spawn"), start_worker) as pool:
         running = {pool.submit(warm, name): name for name in steps}
-        for done, step in enumerate(as_completed(running), 1):
-            line = step.result()
-            mark_complete(running[step])
-            print(f"{done} of {len(steps)} steps compiled; {line}", flush=True)
+        waiting = set(running)
+        while waiting:
+            ended, waiting = wait(waiting, STILL_S, FIRST_COMPLETED)
+            for step in ended:
+                line = step.result()
+                mark_complete(running[step])
+                done += 1
+                print(f"{done} of {len(steps)} steps compiled; {line}", flush=True)
+            if not ended:
+                print(f"{done} of {len(steps)} steps compiled, {time.monotonic() - begun_s:.0f} s so far", flush=True)
 
 
 if __name__ == "__main__":

@@ -19,10 +19,12 @@ import shutil
 import stat
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
+from typing import TextIO, cast
 
 VARIABLE = "NUMBA_CACHE_DIR"
 _KEPT = 3  # folders: of this version of the sources, and of two other checkouts
@@ -128,29 +130,55 @@ def is_complete(part: str = ALL) -> bool:
     return VARIABLE in os.environ and (Path(os.environ[VARIABLE]) / f"complete-{part}").exists()
 
 
-def announce_compilation(takes: str = "some minutes") -> None:
-    """Have this process print one line to standard error when it starts to compile.
+def announce_compilation(takes: str = "one to three minutes") -> None:
+    """Have this process print one line to standard error when it starts to compile, and how long it has compiled while
+    it goes on: on a terminal every second, else every `STILL_S`.
 
     `takes`: how long it takes where nothing is compiled. Imports numba, which is slow: validate arguments first.
     """
     from numba.core import event
 
     class Notice(event.Listener):
-        printed = False
+        began_s: float | None = None
+        under_way = 0
 
         def on_start(self, event: object) -> None:
-            if not self.printed:
-                self.printed = True
-                print("rhot: the numerical code is being compiled, once for these sources; that takes "
-                      f"{'some seconds' if is_complete() else takes}.", file=sys.stderr, flush=True)
+            self.under_way += 1
+            if self.began_s is None:
+                self.began_s = time.monotonic()
+                _tell(f"the numerical code is being compiled, once for these sources; that takes "
+                      f"{'some seconds' if is_complete() else takes}.", for_good=True)
+                threading.Thread(target=self._watch, name="says how long it compiles", daemon=True).start()
 
         def on_end(self, event: object) -> None:
-            """Part of the interface."""
+            self.under_way -= 1
+
+        def _watch(self) -> None:
+            assert self.began_s is not None
+            while True:
+                time.sleep(1.0 if _terminal().isatty() else STILL_S)
+                if self.under_way:
+                    _tell(f"compiling, {time.monotonic() - self.began_s:.0f} s so far", for_good=False)
 
     global _announced
     if not _announced:
         _announced = True
         event.register("numba:compile", Notice())
+
+
+STILL_S = 20.0
+"""s: between two lines that say that it still compiles, where a line cannot be rewritten."""
+
+
+def _terminal() -> TextIO:
+    return cast(TextIO, getattr(sys.stderr, "terminal", sys.stderr))  # a line is rewritten by escapes
+
+
+def _tell(text: str, *, for_good: bool) -> None:
+    """A line on standard error; on a terminal in the place of what is rewritten there."""
+    terminal = _terminal()
+    start, end = ("\r", "\x1b[K") if terminal.isatty() else ("", "")
+    print(f"{start}rhot: {text}{end}", file=terminal, end="\n" if for_good or not start else "", flush=True)
 
 
 _announced = False

@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Sequence
 
 from rhot_app.errors import EngineError
@@ -18,7 +19,7 @@ from rhot_node.threads import OneShotThread
 Report = Callable[[str, float], None]
 
 COMMAND = (sys.executable, "-m", "rhot_app.warm")
-TITLE = "Compiling the numerical code, once; this takes a minute"
+TITLE = "Compiling the numerical code, once; usually a minute or two"
 
 
 def part_of(rig: Rig) -> str:
@@ -36,11 +37,16 @@ def compile_part(part: str, report: Report, started: Callable[[int], object] = l
     """
     if not is_missing(part):
         return
+    begun_s = time.monotonic()
+
+    def tell(done: int, steps: int) -> None:
+        report(f"{TITLE}: {time.monotonic() - begun_s:.0f} s so far", done / max(1, steps))
+
     report(TITLE, 0.0)
     with _start([*command, part]) as process:
         try:
             started(process.pid)
-            reason = _follow(process, lambda done, steps: report(TITLE, done / max(1, steps)))
+            reason = _follow(process, tell)
         except BaseException:
             process.terminate()
             raise
@@ -101,4 +107,4 @@ class BackgroundCompilation:
 
     def _report(self, done: int, steps: int) -> None:
         self.sentence = ("The code of other trackers and of calibrations is being compiled in the background, once: "
-                         f"{done} of {steps} steps.")
+                         f"{done} of {steps} steps. It yields to the tracking, and takes minutes.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -27,6 +28,9 @@ def check_pictures(video: Path, target: Path, again: bool) -> None:
     """Refuse a film or a folder that cannot be written, before anything is tracked. Raises ExportError."""
     if target.suffix.lower() in _CODECS:
         check_place(video, target, again, "--overlay")
+    elif re.fullmatch(r"\.[A-Za-z]\w{1,4}", target.suffix):
+        raise ExportError(f"--overlay {target}: a film ends in {' or '.join(_CODECS)}, not in {target.suffix}. A name "
+                          "without an ending is a folder of pictures.")
     elif target.exists():
         raise ExportError(f"{target} exists already; name a new folder for the pictures, or a film (.avi, .mp4).")
     elif not target.absolute().parent.is_dir():

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+import os
+import sys
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import cv2
@@ -19,6 +21,7 @@ Network = Callable[[Tensor], list[Tensor]]
 LITERT: Final = "litert"
 OPENCV: Final = "opencv"
 RUNTIMES: Final = (LITERT, OPENCV)
+_STDERR: Final = 2
 
 
 def best_runtime() -> str:
@@ -46,8 +49,9 @@ def open_network(data: bytes, runtime: str, threads: int) -> Network:
 def _litert(data: bytes, threads: int) -> Network:
     from ai_edge_litert.interpreter import Interpreter
 
-    interpreter: Any = Interpreter(model_content=data, num_threads=threads)
-    interpreter.allocate_tensors()
+    with _unheard():
+        interpreter: Any = Interpreter(model_content=data, num_threads=threads)
+        interpreter.allocate_tensors()
     image = interpreter.get_input_details()[0]["index"]
     names = {one["name"]: one["index"] for one in interpreter.get_output_details()}
     outputs = [names[name] for name in sorted(names)]
@@ -58,6 +62,26 @@ def _litert(data: bytes, threads: int) -> Network:
         return [np.asarray(interpreter.get_tensor(output), np.float32) for output in outputs]
 
     return run
+
+
+@contextlib.contextmanager
+def _unheard() -> Iterator[None]:
+    """Keeps what LiteRT writes to standard error, which no setting of it turns off, away from a terminal; its errors
+    are raised all the same."""
+    try:
+        kept = os.dup(_STDERR)
+    except OSError:  # there is none
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        sys.stderr.flush()
+        os.dup2(nowhere, _STDERR)
+        yield
+    finally:
+        os.dup2(kept, _STDERR)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def _opencv(data: bytes) -> Network:

@@ -41,6 +41,13 @@ def test_progress_is_reported_and_what_is_compiled_is_not_compiled_again() -> No
     compile_part(WINDOW, lambda text, fraction: pytest.fail("it is compiled"), command=program("raise SystemExit(1)"))
 
 
+def test_it_is_said_how_long_a_step_has_been_compiled_that_takes_long() -> None:
+    texts: list[str] = []
+    compile_part(WINDOW, lambda text, fraction: texts.append(text),
+                 command=program("print('0 of 2 steps compiled'); print('0 of 2 steps compiled, 12 s so far')"))
+    assert len(texts) == 3 and "so far" in texts[-1]
+
+
 def test_nothing_is_compiled_where_nothing_can_be_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(VARIABLE)
     compile_part(WINDOW, lambda text, fraction: pytest.fail("for whom?"), command=program("raise SystemExit(1)"))

@@ -173,7 +173,7 @@ def test_videos_without_a_hand_say_so(recorded: Recorded, tmp_path: Path, capsys
     (("--start", "-1"), "no such file"), (("--start", "nowhere.json"), "no such file"),
     (("--out", "hand.bvh"), ".csv, .parquet or .npz"),
     (("--background-seconds", "0.01"), "two pictures without a hand"),
-    (("--overlay", "nowhere/pictures"), "does not exist"),
+    (("--overlay", "nowhere/pictures"), "does not exist"), (("--overlay", "hand.xyz"), "a film ends in .avi or .mp4"),
     (("--background-seconds", "2"), "only 0.80 s together"), (("--background-seconds", "0"), "a number above 0"),
     (("--background-seconds=-1",), "a number above 0"),
     (("--out", "hand.xyz"), ".csv, .parquet or .npz; rhot export"),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import math
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -227,6 +229,12 @@ def runtime(request: pytest.FixtureRequest) -> str:
     if request.param == LITERT and best_runtime() != LITERT:
         pytest.skip("LiteRT is not installed")
     return str(request.param)
+
+
+def test_opening_the_networks_writes_nothing_to_a_terminal(runtime: str) -> None:
+    program = f"from rhot_node.landmarks.networks import open_hand_networks; open_hand_networks(runtime={runtime!r})"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("", "")
 
 
 @pytest.fixture

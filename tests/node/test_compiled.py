@@ -149,6 +149,15 @@ def test_a_process_says_at_once_and_only_then_that_it_compiles(tmp_path: Path) -
     assert "some seconds" in said()
 
 
+def test_a_process_says_how_long_it_has_compiled_while_it_goes_on(tmp_path: Path) -> None:
+    program = ("import time\nfrom numba.core import event\nfrom rhot_node import compiled\n"
+               "compiled.STILL_S = 0.01\ncompiled.announce_compilation()\n"
+               "event.start_event('numba:compile')\ntime.sleep(0.2)\nevent.end_event('numba:compile')\n")
+    done = subprocess.run([sys.executable, "-c", program], env=os.environ | {VARIABLE: str(tmp_path)},
+                          capture_output=True, text=True, check=True)
+    assert "being compiled" in done.stderr and "s so far" in done.stderr.splitlines()[1]
+
+
 def test_a_program_that_loads_numba_first_uses_the_same_folder() -> None:
     folders = []
     for first in ("rhot_node", "numba"):
