@@ -27,6 +27,7 @@ from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.errors import CalibrationError, RecordingError, input_file, note_loss
 from rhot_app.export.bare_hand import check_outputs, closing_sentences, lost_intervals, open_table
 from rhot_app.export.pictures import side_by_side, whole_pictures
+from rhot_app.export.recording import one_of_each_instant
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.landmarks import DISAGREEMENT_M
@@ -199,7 +200,7 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: boo
             write_hand_log(kept, rig, films, {FILMS: _names(videos, films, first_s), **_taken(videos, films, first_s)})
         progress("tracking", 0.92)
         seen = _seen(rig, log)
-        states = list(_one_of_each_instant(states_of_log(rig, log, smooth), round(1e9 * half_s)))
+        states = list(one_of_each_instant(states_of_log(rig, log, smooth), round(1e9 * half_s)))
         figures = summarise(rig, states)
     times_s = np.array([first_s + 1e-9 * (state.t_master_ns - FIRST_NS) for state in states])
     with contextlib.ExitStack() as stack:
@@ -341,21 +342,6 @@ def landmark_sentences(document: dict[str, Any]) -> list[str]:
         out.append("That is large. Do not rely on the hand: check the rig's calibration, the cameras' order and the "
                    "hand's side and size.")
     return [*out, *closing_sentences(document)]
-
-
-def _one_of_each_instant(states: Iterator[HandState], half_ns: int) -> Iterator[HandState]:
-    """Of the states of one frame set the last, which knows all its pictures."""
-    waiting: HandState | None = None
-    first_ns = 0
-    for state in states:
-        if waiting is not None and state.t_master_ns - first_ns > half_ns:
-            yield waiting
-            waiting = None
-        if waiting is None:
-            first_ns = state.t_master_ns
-        waiting = state
-    if waiting is not None:
-        yield waiting
 
 
 def _with_hands(camera: CameraModel, picture: Image, found: Sequence[LandmarkedHand],

@@ -17,7 +17,9 @@ from rhot_app.export.states import HandStates, in_blocks
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, TrackerKind, load_rig, with_tracker
 from rhot_app.recording.raw_log import LogReader, Record, wall_clock_offset_ns
+from rhot_app.sources.films import film_period_ns
 from rhot_app.sources.replay import LogValidator
+from rhot_app.state import HandState
 from rhot_app.tracking.smoothing import NOT_SMOOTHED
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations
 from rhot_app.tracking.trackers import make_tracker
@@ -80,7 +82,9 @@ class TrackedLog:
 
     def blocks(self) -> Iterator[HandStates]:
         """The states, some hundred at a time. Raises RecordingError when there is none."""
-        for block in in_blocks(replay_states(self._records(), self._door, self.tracker, self._frames.note)):
+        states = replay_states(self._records(), self._door, self.tracker, self._frames.note)
+        period_ns = film_period_ns(self._reader.about, self.path)
+        for block in in_blocks(states if period_ns is None else one_of_each_instant(states, period_ns // 2)):
             self.count += len(block)
             self.tracked += int(np.count_nonzero(block.tracked))
             yield block
@@ -165,3 +169,18 @@ def read_log(path: Path, rig: Rig | Path | None = None) -> tuple[Rig, str]:
     with contextlib.closing(LogReader(path)) as reader:
         own = reader.rig if rig is None else load_rig(rig) if isinstance(rig, Path) else rig
         return own, str(reader.about.get("created", ""))
+
+
+def one_of_each_instant(states: Iterator[HandState], half_ns: int) -> Iterator[HandState]:
+    """Of the states of one frame set the last, which knows all its pictures."""
+    waiting: HandState | None = None
+    first_ns = 0
+    for state in states:
+        if waiting is not None and state.t_master_ns - first_ns > half_ns:
+            yield waiting
+            waiting = None
+        if waiting is None:
+            first_ns = state.t_master_ns
+        waiting = state
+    if waiting is not None:
+        yield waiting

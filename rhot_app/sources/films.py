@@ -9,7 +9,7 @@ import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import cv2
 import msgspec
@@ -81,6 +81,14 @@ def recorded_films(log: Path, rig: Rig) -> tuple[RecordedFilm, ...]:
             times_ns = video.times_ns - video.times_ns[0] + film.first_t_master_ns
             found.append(RecordedFilm(camera, replace(video, times_ns=times_ns)))
     return tuple(found)
+
+
+def film_period_ns(about: Mapping[str, Any], log: Path) -> int | None:
+    """Time from picture to picture of the quickest film that a log was made of, by its header `about`: pictures within
+    half of it are of one instant. None where it was made of none, or of nodes' recordings, which have times of their
+    own. Raises RecordingError."""
+    rates = [film.fps for film in _named(about.get(FILMS), log).values()]
+    return round(1e9 / max(rate for rate in rates if rate is not None)) if rates and None not in rates else None
 
 
 def _named(value: object, log: Path) -> Mapping[str, NamedFilm]:

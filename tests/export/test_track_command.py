@@ -108,6 +108,8 @@ def test_the_log_that_is_kept_is_replayed_beside_the_films(drawn, monkeypatch):
         t_ns = int(films[0].video.times_ns[number])
         assert films[1].number_at(t_ns) == number
         np.testing.assert_allclose(states[t_ns].joint_positions, places[number], atol=1e-6)
+    assert main(["export", str(folder / "hand.rhotlog"), "--format", "csv", "--out", str(folder / "log.csv")]) == 0
+    np.testing.assert_allclose(table_of(folder / "log.csv")[1], places, atol=1e-4, err_msg="one row per frame set")
     assert main([*words, "--log", str(folder / "hand.rhotlog")]) == 2, "nothing is written over unasked"
 
 

@@ -66,7 +66,7 @@ def test_an_uncalibrated_rig_says_so_and_its_button_opens_the_lens_wizard(tracke
     bench.until(lambda: len(advice.texts) == 2 and list(advice.buttons) == ["Calibrate …"])
     operational, lasting = advice.texts
     assert "hand is tracked" in operational and HEADLINE in lasting and not bench.calm
-    assert set(bench.window.screen_parts.markers.spreads) == {"?"}
+    assert set(bench.window.screen_parts.markers.spreads) == {"≥ 1.8"}
     bench.click(advice.buttons["Calibrate …"])
     bench.until(lambda: bench.window.wizards.wizard is not None)
     assert bench.window.wizards.wizard.plan.title == wizard_named("lens").title
@@ -102,7 +102,7 @@ def test_the_notice_is_gone_and_figures_are_back_once_the_rig_is_calibrated(trac
     bench.until(lambda: bench.said(HEADLINE))
     tracked(calibrated_rig())
     bench.until(lambda: bench.calm)
-    bench.until(lambda: any(text not in ("", "?") for text in bench.window.screen_parts.markers.spreads))
+    bench.until(lambda: any(text and "≥" not in text for text in bench.window.screen_parts.markers.spreads))
 
 
 def test_lengths_that_were_never_checked_are_said_with_the_stereo_wizard(tracked):

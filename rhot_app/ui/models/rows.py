@@ -25,9 +25,6 @@ from rhot_app.ui.models.words import KNOWLEDGE, NODES, Look, marker_look, settin
 
 # -- standard deviation along the worst axis ---------------------------------------------------------------------------
 
-UNKNOWN = "?"
-"""Stands for a standard deviation that nobody knows, because nobody knows how good the calibration is."""
-
 Array = NDArray[np.float64]
 
 
@@ -53,6 +50,13 @@ def sd_number(sd_m: float) -> str:
         return ""
     sd_mm = 1e3 * sd_m
     return f"{sd_mm:.2f}" if sd_mm < 0.995 else f"{sd_mm:.1f}" if sd_mm < 9.95 else f"{sd_mm:.0f}"
+
+
+def spread_number(total_m: float, own_m: float) -> str:
+    """The standard deviation `total_m` in mm; where the calibration's part is unknown, that it is at least `own_m`,
+    e.g. "≥ 0.31". "" where not even that is known."""
+    own = sd_number(own_m)
+    return sd_number(total_m) or (f"≥ {own}" if own else "")
 
 
 def sd_text(sd_m: float) -> str:
@@ -136,19 +140,21 @@ class MarkerRow:
     look: Look
     knowledge: Look
     position: str
-    spread: str  # mm, one sigma along the worst axis; "?" for an unknown calibration, "" when not estimated
+    spread: str  # mm, one sigma along the worst axis; "≥ 0.31" for an unknown calibration, "" when not estimated
     detail: str
 
 
 def marker_rows(state: HandState, by_calibration: CalibrationAccuracy = KNOWN_EXACTLY) -> list[MarkerRow]:
     """Rows of all markers, in the rig's order."""
     rows = []
-    estimated = np.isfinite(state.marker_positions).all(axis=1) & np.isfinite(worst_sd(state.marker_covariances))
+    least = worst_sd(state.marker_covariances)
+    estimated = np.isfinite(state.marker_positions).all(axis=1) & np.isfinite(least)
     spreads = total_sd(state.marker_covariances, state.marker_positions, by_calibration)
     for index, name in enumerate(state.marker_ids):
         known = KNOWLEDGE[Knowledge(int(state.marker_knowledge[index]))]
+        spread = spread_number(float(spreads[index]), float(least[index]))
         rows.append(MarkerRow(name, marker_look(state, index), known, position_text(state.marker_positions[index]),
-                              (sd_number(float(spreads[index])) or UNKNOWN) if estimated[index] else "",
+                              spread if estimated[index] else "",
                               marker_detail(state, index, by_calibration)))
     return rows
 
@@ -164,12 +170,12 @@ def marker_detail(state: HandState, marker: int, by_calibration: CalibrationAccu
     """Tooltip of one marker: position, its standard deviation per axis, epipolar error."""
     lines = [f"x, y, z: {position_text(state.marker_positions[marker])}"]
     variances = np.diagonal(state.marker_covariances[marker])
-    if not by_calibration.known:
-        lines.append(by_calibration.reason)
-    elif np.isfinite(variances).all() and (variances >= 0).all():
-        more = float(by_calibration.at(state.marker_positions[marker]))
+    if np.isfinite(variances).all() and (variances >= 0).all():
+        more = float(by_calibration.at(state.marker_positions[marker])) if by_calibration.known else 0.0
         lines.append("± " + ", ".join(f"{math.hypot(math.sqrt(v), more) * 1e3:.2f}" for v in variances)
                      + " mm (one sigma)" + (f", {1e3 * more:.2f} mm of it by the calibration" if more > 0.0 else ""))
+    if not by_calibration.known:
+        lines.append(f"At least: {by_calibration.reason[:1].lower()}{by_calibration.reason[1:]}")
     if np.isfinite(state.epipolar_error_px[marker]):
         lines.append(f"epipolar error {state.epipolar_error_px[marker]:.2f} px")
     return "\n".join(lines)
