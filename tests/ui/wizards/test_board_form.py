@@ -143,7 +143,9 @@ def test_the_page_hides_what_a_chessboard_has_not_and_undoes(qtbot, page, memory
 
 @pytest.mark.parametrize(("kind", "board", "measured", "has_gap"), [
     ("aprilgrid", AprilGrid(7, 5, 0.024, 0.3), "Tag", True), ("circles", CircleGrid(4, 11, 0.024), "Spacing", False)])
-def test_other_boards_are_chosen_measured_and_remembered(qtbot, page, memory, kind, board, measured, has_gap):
+def test_other_boards_are_chosen_measured_and_remembered(qtbot, page, memory, monkeypatch, kind, board, measured,
+                                                         has_gap):
+    monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: True)
     page.kind.setCurrentIndex(page.kind.findData(kind))
     qtbot.keyClicks(page.square, "24")
     assert page.step.board == board and remembered_fields(memory[MEMORY]).kind == kind
