@@ -21,6 +21,7 @@ from rhot_app.errors import SourceError
 from rhot_app.sources.cameras.camera_set import CameraSource, nodes_folder, prepare
 from rhot_app.sources.cameras.camera_source import check_sources
 from rhot_app.ui.backend.session import CAMERAS_ROLE, Session
+from rhot_app.ui.models.rows import node_row
 
 
 @pytest.fixture(autouse=True)
@@ -73,10 +74,13 @@ def test_two_films_are_seen_and_a_dead_node_is_started_again(session: Session, t
         nodes = children(cameras)
         assert len(nodes) == 2
         os.kill(nodes[1], signal.SIGKILL)
+        wait_until(client, lambda: node_row(node_status(client, "right")).look.word != "streaming", START_S,
+                   "the card of the dead camera says that it does not stream")
         eventually(lambda: start.exists() and int(start.read_text()) > first_ns)
         counts = [node_status(client, name).received for name in ("left", "right")]  # type: ignore[union-attr]
         wait_until(client, lambda: streams("left", counts[0]) and streams("right", counts[1]), START_S,
                    "both films again")
+        assert all(node_row(node).look.word == "streaming" and not node.message for node in client.status.nodes)
     again = Session(session.directory)
     assert again.attach(quiet).begin is False, "an attached window leaves the tracking as it is"
 
@@ -85,8 +89,10 @@ def test_two_films_are_seen_and_a_dead_node_is_started_again(session: Session, t
 def test_a_network_camera_that_goes_and_comes_again_is_tracked_with_again(session: Session) -> None:
     with EngineClient(session.directory) as client:
         def is_in(state: str, *words: str) -> bool:
+            """Whether the camera's card in the window says so."""
             status = node_status(client, "camera 1")
-            return status is not None and status.state == state and all(word in status.message for word in words)
+            card = None if status is None else node_row(status)
+            return card is not None and card.look.word == state and all(word in card.message for word in words)
 
         with sending() as (address, _):
             session.open_rig(prepare(check_sources([f"{address}/video"])).rig_path, quiet)
