@@ -18,6 +18,9 @@ from rhot_app.ui.panels.empty_state import EmptyState
 _IDLE = Look("not tracking", "square", "neutral", "The nodes do not stream. Press Start.")
 _UNSEEN = Look("not seen", "ring", "neutral", "Nothing has been seen of it for a second.")
 
+_WORD_PX = 96
+"""A word that names a camera may be long; the panel is no wider than its dock."""
+
 
 class Swatch(QWidget):
     """A marker's own colour with a rim, so that dark ones are seen on dark ground."""
@@ -108,14 +111,15 @@ class MarkersPanel(QWidget):
             self._shown[k] = row
             look = row.look if row is not None else absent
             mark.set_shape(look.shape, self._scheme.tone(look.tone))
-            word.setText(look.word)
+            word.setText(word.fontMetrics().elidedText(look.word, Qt.TextElideMode.ElideMiddle, _WORD_PX))
+            word.setAccessibleName(look.word)
             spread.setText(row.spread if row is not None else "")
             word.setToolTip(f"{look.meaning}\n{row.detail}" if row is not None else look.meaning)
 
     @property
     def words(self) -> list[str]:
-        """The words shown, in the rig's order."""
-        return [word.text() for *_, word in self._lines]
+        """The words shown, if only their ends, in the rig's order."""
+        return [word.accessibleName() for *_, word in self._lines]
 
     @property
     def spreads(self) -> list[str]:
