@@ -19,12 +19,13 @@ import shutil
 import stat
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TextIO, cast
+
+from rhot_node.threads import Worker
 
 VARIABLE = "NUMBA_CACHE_DIR"
 _KEPT = 3  # folders: of this version of the sources, and of two other checkouts
@@ -148,17 +149,14 @@ def announce_compilation(takes: str = "one to three minutes") -> None:
                 self.began_s = time.monotonic()
                 _tell(f"the numerical code is being compiled, once for these sources; that takes "
                       f"{'some seconds' if is_complete() else takes}.", for_good=True)
-                threading.Thread(target=self._watch, name="says how long it compiles", daemon=True).start()
+                Worker("says how long it compiles", self._tell_time, wait=_pause).start()
 
         def on_end(self, event: object) -> None:
             self.under_way -= 1
 
-        def _watch(self) -> None:
-            assert self.began_s is not None
-            while True:
-                time.sleep(1.0 if _terminal().isatty() else STILL_S)
-                if self.under_way:
-                    _tell(f"compiling, {time.monotonic() - self.began_s:.0f} s so far", for_good=False)
+        def _tell_time(self) -> None:
+            if self.under_way and self.began_s is not None:
+                _tell(f"compiling, {time.monotonic() - self.began_s:.0f} s so far", for_good=False)
 
     global _announced
     if not _announced:
@@ -168,6 +166,10 @@ def announce_compilation(takes: str = "one to three minutes") -> None:
 
 STILL_S = 20.0
 """s: between two lines that say that it still compiles, where a line cannot be rewritten."""
+
+
+def _pause() -> None:
+    time.sleep(1.0 if _terminal().isatty() else STILL_S)
 
 
 def _terminal() -> TextIO:
