@@ -20,7 +20,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "objects"))
 from aligned_streams import FOREIGN_HZ, OUTLIER_M, OUTLIERS, RIG_HZ, make_scene
 from tables import arguments, publish, table
 
-from rhot_app.geometry.transforms import apply, inverse, log_so3
+from rhot_app.estimation.se3 import log_so3
+from rhot_app.geometry.transforms import apply, inverse
 from rhot_app.objects.alignment.report import AlignmentReport, calibrate_alignment
 
 TARGETS = {"origin mm": 0.5, "motion mm": 0.5, "point mm": 0.5, "rotation deg": 0.1, "offset ms": 1.0}

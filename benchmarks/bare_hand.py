@@ -41,8 +41,9 @@ from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, SH
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
 from rhot_app.estimation.filter import gauss_newton_step  # noqa: E402
 from rhot_app.estimation.residual import stack  # noqa: E402
+from rhot_app.estimation.se3 import exp_so3  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
-from rhot_app.geometry.transforms import exp_so3, inverse  # noqa: E402
+from rhot_app.geometry.transforms import inverse  # noqa: E402
 from rhot_app.hand.anatomy import HandAnatomy  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.model import build_model  # noqa: E402

@@ -35,9 +35,9 @@ from rhot_app.calibration.hand.fit import fit_hand  # noqa: E402
 from rhot_app.calibration.hand.landmark_bones import measure_bones  # noqa: E402
 from rhot_app.calibration.hand.marker_places import tracks_of  # noqa: E402
 from rhot_app.calibration.hand.shape import MARKERS  # noqa: E402
+from rhot_app.estimation.se3 import quaternion_from_rotation  # noqa: E402
 from rhot_app.export.landmark_track import states_of_log  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
-from rhot_app.geometry.transforms import quaternion_from_rotation  # noqa: E402
 from rhot_app.hand.anatomy import load_hand  # noqa: E402
 from rhot_app.hand.skeleton import JOINTS  # noqa: E402
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettings  # noqa: E402

@@ -17,7 +17,8 @@ from scipy.signal import savgol_filter
 from tables import arguments, publish, table
 
 from rhot_app.errors import RhotError
-from rhot_app.geometry.transforms import fit_rigid, log_so3
+from rhot_app.estimation.se3 import log_so3
+from rhot_app.geometry.transforms import fit_rigid
 from rhot_app.recording.qualisys import read_qualisys
 
 WINDOW, ORDER = 9, 3  # samples, degree

@@ -25,8 +25,8 @@ from tables import arguments, publish, table
 
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.calibrate import calibrate
+from rhot_app.estimation.se3 import log_so3
 from rhot_app.geometry.camera import LENS, PARAMETERS, PLAIN, full_lens
-from rhot_app.geometry.transforms import log_so3
 
 Array = NDArray[np.float64]
 

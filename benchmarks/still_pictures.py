@@ -27,9 +27,9 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "tests" / "recording")
 from recorded_landmarks import FOLDER, FPS, WHOLE, recording  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
 
+from rhot_app.estimation.se3 import quaternion_from_rotation  # noqa: E402
 from rhot_app.export.landmark_track import landmark_rig_of, states_of_log, with_measured_bones  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
-from rhot_app.geometry.transforms import quaternion_from_rotation  # noqa: E402
 from rhot_app.hand.anatomy import load_hand  # noqa: E402
 from rhot_app.project import CameraPose, Intrinsics, Rig  # noqa: E402
 from rhot_app.recording.landmark_log import HandFilm, write_hand_log  # noqa: E402

@@ -22,8 +22,8 @@ import numpy as np
 from tables import arguments, publish, table
 
 from rhot_app.errors import RhotError
+from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation, rotation_from_quaternion
 from rhot_app.evaluation.data_sets import DataSet, Order, data_set, data_sets_folder
-from rhot_app.geometry.transforms import exp_so3, quaternion_from_rotation, rotation_from_quaternion
 from rhot_app.progress import ProgressLine
 from rhot_app.project import Rig
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults

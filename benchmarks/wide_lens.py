@@ -29,12 +29,12 @@ from tables import arguments, publish, table  # noqa: E402
 from rhot_app.calibration.lens.fit import find_lens  # noqa: E402
 from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate, calibrated_rig  # noqa: E402
 from rhot_app.calibration.stereo.report import StereoFigures  # noqa: E402
+from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation  # noqa: E402
 from rhot_app.evaluation.accuracy import Figures, accuracy, deviations, pooled, worn_by  # noqa: E402
 from rhot_app.evaluation.compare import TRACKERS  # noqa: E402
 from rhot_app.evaluation.data_sets import Order, data_set  # noqa: E402
 from rhot_app.evaluation.track import rig_with, tracked  # noqa: E402
 from rhot_app.geometry.camera import CameraModel, rig_intrinsics  # noqa: E402
-from rhot_app.geometry.transforms import exp_so3, quaternion_from_rotation  # noqa: E402
 from rhot_app.project import CameraPose, Rig  # noqa: E402
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults  # noqa: E402
 

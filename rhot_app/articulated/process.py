@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.articulated.bodies import ANGLES, ROOT_POSE, root_of
+from rhot_app.articulated.bodies import ANGLES, ROOT_POSE
+from rhot_app.estimation.se3 import PoseState, retract
 from rhot_app.hand.articulated_model import STATE_ROOT, ArticulatedModel, root_arrays
-from rhot_app.hand.kinematics import move, rotation_vector
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ START_SD = 1e-3, 0.01, 0.02
 """m, rad and rad: how well a start is known from which templates are taken. They show it no better."""
 
 
-class ConstantVelocity:
+class ConstantVelocity(PoseState):
     """Implements `estimation.residual.Process`. `free` (6 + A,): what moves. `density` (6 + A,): of the white
     acceleration, squared units of the tangent space per s^3; `speed` (6 + A,): standard deviation of velocities."""
 
@@ -48,23 +48,6 @@ class ConstantVelocity:
         state = np.concatenate([root[:3].ravel(), angles, np.zeros(self.pose)])
         return state, np.diag(np.concatenate([self._each(sd), self.speed]) ** 2)
 
-    def retract(self, state: Array, step: Array) -> Array:
-        """See `Process`."""
-        count = self.pose - ROOT_POSE
-        out, root, angles = np.empty_like(state), np.empty((4, 4)), np.empty(count)
-        root[3] = [0.0, 0.0, 0.0, 1.0]
-        move(root_of(state), np.ascontiguousarray(state[ANGLES:ANGLES + count]), np.ascontiguousarray(step[:self.pose]),
-             root, angles)
-        out[:ANGLES], out[ANGLES:ANGLES + count] = root[:3].ravel(), angles
-        out[ANGLES + count:] = state[ANGLES + count:] + step[self.pose:]
-        return out
-
-    def difference(self, state: Array, origin: Array) -> Array:
-        """See `Process`."""
-        to, start = root_of(state), root_of(origin)
-        turn = rotation_vector(to, start)
-        return np.concatenate([to[:3, 3] - start[:3, 3], turn, state[ANGLES:] - origin[ANGLES:]])
-
     def predict(self, state: Array, covariance: Array, dt_s: float) -> tuple[Array, Array]:
         """See `Process`."""
         if dt_s <= 0.0:
@@ -78,7 +61,7 @@ class ConstantVelocity:
         out[pose, velocity] += self.density * dt_s**2 / 2.0
         out[velocity, pose] += self.density * dt_s**2 / 2.0
         out[velocity, velocity] += self.density * dt_s
-        return self.retract(state, step), out
+        return retract(state, step), out
 
     def transition(self, state: Array, dt_s: float) -> Array:
         """See `Process`. The turn within a step is small: its effect on the axes of later turns is left out."""

@@ -30,6 +30,7 @@ from rhot_app.barehand.surface import (
     place_capsules,
     ray_to_capsule,
 )
+from rhot_app.estimation.se3 import exponential
 from rhot_app.geometry.camera import REACH, project_ray
 from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY
 
@@ -396,10 +397,7 @@ def _forearm_row(world, shape, lx, ly, lz, g, row):
         p[i] = world[0, i] * lx + world[1, i] * ly + world[2, i] * lz
         n[i] = world[0, i] * g[0] + world[1, i] * g[1] + world[2, i] * g[2]
     mx, my, mz = p[1] * n[2] - p[2] * n[1], p[2] * n[0] - p[0] * n[2], p[0] * n[1] - p[1] * n[0]
-    angle = math.sqrt(wy * wy + wz * wz)
-    a = math.sin(angle) / angle if angle > 1e-6 else 1.0
-    b = (1.0 - a) / angle**2 if angle > 1e-3 else 1.0 / 6.0
-    c = (1.0 - math.cos(angle)) / angle**2 if angle > 1e-6 else 0.5
-    dot = b * (wy * my + wz * mz)
-    row[POSE + FOREARM_TURN] = a * my + dot * wy - c * mx * wz
-    row[POSE + FOREARM_TURN + 1] = a * mz + dot * wz + c * mx * wy
+    turn, left = np.empty((3, 3)), np.empty((3, 3))
+    exponential(0.0, wy, wz, turn, left)
+    for j in range(2):
+        row[POSE + FOREARM_TURN + j] = left[0, 1 + j] * mx + left[1, 1 + j] * my + left[2, 1 + j] * mz

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.silhouette import CORRELATED, LogOddsMaps, log_odds_maps, score, score_steps, search
 from rhot_app.barehand.surface import SHAPE, Surface
+from rhot_app.estimation.se3 import quaternion_from_rotation, rotation_from_quaternion
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import quaternion_from_rotation, rigid, rotation_from_quaternion
+from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.se3 import exponential
 from rhot_app.hand.dh import ROOT, DhArrays
 from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel
@@ -128,8 +129,8 @@ def place_capsules(surface, world, angles, shape, frames, centres, radii):
     table = DhArrays(dh.parent, dh.theta, d, a, dh.cos_alpha, dh.sin_alpha, dh.angle, dh.sign, dh.point_row,
                      dh.point_offset)
     forward_arrays(table, world, angles, frames, dh.point_offset)
-    whole, turned = np.exp(shape[HAND_SIZE]), np.empty((3, 3))
-    rotation_of(0.0, shape[FOREARM_TURN], shape[FOREARM_TURN + 1], turned)
+    whole, turned, left = np.exp(shape[HAND_SIZE]), np.empty((3, 3)), np.empty((3, 3))
+    exponential(0.0, shape[FOREARM_TURN], shape[FOREARM_TURN + 1], turned, left)
     forearm = np.dot(np.ascontiguousarray(world[:3, :3]), turned)
     for k in range(centres.shape[0]):
         row = surface.row[k]
@@ -148,17 +149,6 @@ def place_capsules(surface, world, angles, shape, frames, centres, radii):
                 else:
                     along = base[i, 0] * x * longer + base[i, 1] * y + base[i, 2] * z
                 centres[k, end, i] = base[i, 3] + whole * along
-
-
-@njit(cache=True)
-def rotation_of(x, y, z, out):
-    """Fill `out` (3, 3) with the rotation of the rotation vector (x, y, z) rad (Rodrigues)."""
-    angle = np.sqrt(x * x + y * y + z * z)
-    cosine, s = np.cos(angle), np.sin(angle) / angle if angle > 1e-6 else 1.0
-    c = (1.0 - cosine) / angle**2 if angle > 1e-6 else 0.5
-    out[0, 0], out[0, 1], out[0, 2] = cosine + c * x * x, c * x * y - s * z, c * x * z + s * y
-    out[1, 0], out[1, 1], out[1, 2] = c * x * y + s * z, cosine + c * y * y, c * y * z - s * x
-    out[2, 0], out[2, 1], out[2, 2] = c * x * z - s * y, c * y * z + s * x, cosine + c * z * z
 
 
 def capsules_of(surface: Surface, world: Array, angles: Array, shape: Array | None = None) -> tuple[Array, Array]:

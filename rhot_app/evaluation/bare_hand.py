@@ -19,8 +19,8 @@ from scipy.stats import chi2
 
 from rhot_app.barehand.start import START_SD, start_pose_file
 from rhot_app.errors import TrackingError
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import exp_so3
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.progress import Progress, silent, within

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.export.plan import Plan, require
 from rhot_app.export.states import ARRAYS, OBJECT_ARRAYS, HandStates, ObjectStates
-from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND
 

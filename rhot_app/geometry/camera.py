@@ -13,7 +13,8 @@ from numba import njit
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
-from rhot_app.geometry.transforms import rigid, rotation_from_quaternion
+from rhot_app.estimation.se3 import rotation_from_quaternion
+from rhot_app.geometry.transforms import rigid
 from rhot_app.project import CameraPose, Intrinsics
 
 Array = NDArray[np.float64]

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.se3 import fill_rotation
 from rhot_app.hand.articulated import Articulated, ArticulatedFrame, Box, Capsule
 from rhot_app.hand.dh import FIXED, ROOT, DhArrays, DhRow, compile_table, riding_points
 from rhot_app.hand.kinematics import add_angle_columns, add_turn, empty_frames, forward_arrays
@@ -153,11 +154,7 @@ def forward_state_arrays(dh: DhArrays, state: Array, root: Array, frames: Array,
 @njit(cache=True)
 def root_arrays(state: Array, root: Array) -> None:
     """Fill `root` (4, 4) world_from_root from the first seven numbers of a state."""
-    w, x, y, z = state[0], state[1], state[2], state[3]
-    s = 2.0 / (w * w + x * x + y * y + z * z)
-    root[0, 0], root[0, 1], root[0, 2] = 1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)
-    root[1, 0], root[1, 1], root[1, 2] = s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)
-    root[2, 0], root[2, 1], root[2, 2] = s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)
+    fill_rotation(state, root)
     for i in range(3):
         root[i, 3] = state[4 + i]
         root[3, i] = 0.0

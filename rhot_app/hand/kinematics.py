@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.se3 import move_pose
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
@@ -143,34 +144,8 @@ def add_turn(out: Array, column: int, ax: float, ay: float, az: float, rx: float
 @njit(cache=True)
 def move(world: Array, angles: Array, step: Array, out_world: Array, out_angles: Array) -> None:
     """Apply a step of twist (rotation on the manifold, in world axes) and angles."""
-    for i in range(4):
-        for j in range(4):
-            out_world[i, j] = world[i, j]
-    angle = math.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
-    c = math.cos(angle)
-    s = math.sin(angle) / angle if angle > 1e-12 else 1.0
-    v = (1.0 - c) / angle ** 2 if angle > 1e-6 else 0.5
-    x, y, z = step[3], step[4], step[5]
-    for j in range(3):
-        a, b, d = world[0, j], world[1, j], world[2, j]
-        along = v * (x * a + y * b + z * d)
-        out_world[0, j] = c * a + s * (y * d - z * b) + along * x
-        out_world[1, j] = c * b + s * (z * a - x * d) + along * y
-        out_world[2, j] = c * d + s * (x * b - y * a) + along * z
-        out_world[j, 3] = world[j, 3] + step[j]
+    move_pose(world, step, out_world)
+    for j in range(4):
+        out_world[3, j] = world[3, j]
     for i in range(angles.shape[0]):
         out_angles[i] = angles[i] + step[TWIST + i]
-
-
-@njit(cache=True)
-def rotation_vector(to: Array, origin: Array) -> tuple[float, float, float]:
-    """The turn, rad in world axes, that takes the rotation of `origin` (4, 4) to that of `to` (4, 4)."""
-    r = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            r[i, j] = to[i, 0] * origin[j, 0] + to[i, 1] * origin[j, 1] + to[i, 2] * origin[j, 2]
-    x, y, z = 0.5 * (r[2, 1] - r[1, 2]), 0.5 * (r[0, 2] - r[2, 0]), 0.5 * (r[1, 0] - r[0, 1])
-    sine = math.sqrt(x * x + y * y + z * z)
-    angle = math.atan2(sine, 0.5 * (r[0, 0] + r[1, 1] + r[2, 2] - 1.0))
-    scale = angle / sine if sine > 1e-9 else 1.0
-    return x * scale, y * scale, z * scale

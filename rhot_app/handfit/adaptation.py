@@ -32,10 +32,10 @@ from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENG
 from rhot_app.barehand.tracker import LENGTH_SD, RADIUS_SD
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.estimation.least_squares import minimise
+from rhot_app.estimation.se3 import retract
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_app.hand.kinematics import move
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, POSE, VELOCITY
+from rhot_app.hand.motion.hand_process import BIAS, POSE, VELOCITY
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.handfit.hand_shape import SHAPE_LIMIT, SIZE, Shapes
 
@@ -232,9 +232,7 @@ class _Iterate:
 
 def _moved(state: Array, step: Array) -> Array:
     """A state after a step of its pose and of the forearm."""
-    out, world, after, angles = state.copy(), np.eye(4), np.empty((4, 4)), np.empty(21)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    move(world, state[ANGLES:VELOCITY], step[:POSE], after, angles)
-    out[:ANGLES], out[ANGLES:VELOCITY] = after[:3].ravel(), angles
+    out = state.copy()
+    out[:VELOCITY] = retract(state[:VELOCITY], step[:POSE])
     out[BIAS + FOREARM_TURN:BIAS + SHAPE] += step[POSE:]
     return out

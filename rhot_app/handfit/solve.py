@@ -23,8 +23,8 @@ from rhot_app.barehand.tracker import FOREARM_SD
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import Dense, minimise
 from rhot_app.estimation.residual import UNIT, Rows, compressed
+from rhot_app.estimation.se3 import pose_difference
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import log_so3
 from rhot_app.hand.kinematics import empty_frames, forward_arrays, jacobian_arrays
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.hand_process import ANGLES, BIAS, POSE, VELOCITY
@@ -134,8 +134,7 @@ class Solver:
     def _prior(self, one: Instant, reference: Instant, palm_sd: tuple[float, float], state: FitState, k: int) -> Rows:
         world, before = one.pose.world_from_palm, reference.pose.world_from_palm
         sd = np.repeat(palm_sd, 3)
-        turned = log_so3(world[:3, :3] @ before[:3, :3].T)
-        error = np.concatenate([-np.concatenate([world[:3, 3] - before[:3, 3], turned]) / sd,
+        error = np.concatenate([-np.array(pose_difference(world, before)) / sd,
                                 self._root @ (reference.pose.angles - one.pose.angles), -one.bend / FOREARM_SD[1:]])
         own, jacobian = state.own(k), np.zeros((OWN, state.size))
         block = np.zeros((OWN, OWN))

@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from rhot_app.barehand.start import start_pose_file
 from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.engine.pipeline import warm_up
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.evaluation.data_sets import Order, Watch, data_set, data_sets_folder
 from rhot_app.evaluation.searched_nodes import SearchedNodes
 from rhot_app.evaluation.track import Timed
-from rhot_app.geometry.transforms import exp_so3, rigid
+from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS, TIP_ROLES, HandPose
 from rhot_app.mouse.model import FLAT_DEG, up_of, with_mouse_model

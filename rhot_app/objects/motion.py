@@ -15,8 +15,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.residual import UNIT, Kernel, Rows, student
+from rhot_app.estimation.se3 import PoseState, difference, exponential, pose_difference, retract
 from rhot_app.geometry.camera import CameraModel, project_ray
-from rhot_app.geometry.transforms import log_so3
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -67,7 +67,7 @@ def pose_of(state: Array) -> Array:
     return np.vstack([state[:VELOCITY].reshape(3, 4), np.eye(4)[3]])
 
 
-class ObjectProcess:
+class ObjectProcess(PoseState):
     """Implements `estimation.residual.Process`: white acceleration that is the stronger, the faster the object moves.
 
     An acceleration of variance s^2 along each axis and correlation time 1 / RATE is white noise of spectral density
@@ -76,16 +76,6 @@ class ObjectProcess:
     """
 
     size = SIZE
-
-    def retract(self, state: Array, step: Array) -> Array:
-        """The state moved by `step` (12,)."""
-        return np.asarray(_retract(state, step))
-
-    def difference(self, state: Array, origin: Array) -> Array:
-        """(12,) the step from `origin` to `state`."""
-        to, frm = state[:VELOCITY].reshape(3, 4), origin[:VELOCITY].reshape(3, 4)
-        return np.concatenate([to[:, 3] - frm[:, 3], log_so3(to[:, :3] @ frm[:, :3].T),
-                               state[VELOCITY:] - origin[VELOCITY:]])
 
     def predict(self, state: Array, covariance: Array, dt_s: float) -> tuple[Array, Array]:
         """State and covariance (12, 12) after `dt_s`."""
@@ -100,13 +90,13 @@ class ObjectProcess:
                 noise[axis, axis] = density * dt_s**3 / 3.0
                 noise[axis, axis + TWIST] = noise[axis + TWIST, axis] = density * dt_s**2 / 2.0
                 noise[axis + TWIST, axis + TWIST] = density * dt_s
-        moved = _retract(state, np.concatenate([dt_s * state[VELOCITY:], np.zeros(TWIST)]))
+        moved = retract(state, np.concatenate([dt_s * state[VELOCITY:], np.zeros(TWIST)]))
         return moved, move @ covariance @ move.T + noise
 
     def transition(self, state: Array, dt_s: float) -> Array:
         """(12, 12) Jacobian of `predict`'s state by `state`."""
         turn, left = np.empty((3, 3)), np.empty((3, 3))
-        _exponential(dt_s * state[15], dt_s * state[16], dt_s * state[17], turn, left)
+        exponential(dt_s * state[15], dt_s * state[16], dt_s * state[17], turn, left)
         move = np.eye(SIZE)
         move[0:3, 6:9] = dt_s * np.eye(3)
         move[3:6, 3:6] = turn
@@ -167,7 +157,7 @@ class StatePrior:
 
     def linearise(self, state: Array) -> Rows:
         """Twelve rows; their Jacobian is 1 to first order in the deviation."""
-        return Rows(ObjectProcess().difference(self.state, state), np.eye(SIZE), self.covariance,
+        return Rows(difference(self.state, state), np.eye(SIZE), self.covariance,
                     first=np.zeros(1, np.int64))
 
 
@@ -187,46 +177,8 @@ class PoseResidual:
         The rotation's error is log(R_measured R^T); its Jacobian by the state is the inverse right one, 1 to first
         order in an error that a gate keeps small.
         """
-        pose = state[:VELOCITY].reshape(3, 4)
-        error = np.concatenate([self.world_from_object[:3, 3] - pose[:, 3],
-                                log_so3(self.world_from_object[:3, :3] @ pose[:, :3].T)])
+        error = np.array(pose_difference(self.world_from_object, state[:VELOCITY].reshape(3, 4)))
         return Rows(error, np.eye(TWIST, SIZE), self.covariance, first=np.zeros(1, np.int64))
-
-
-@njit(cache=True)
-def _exponential(x: float, y: float, z: float, turn: Array, left: Array) -> None:
-    """Fill the rotation (3, 3) of a rotation vector, rad, and its left Jacobian (3, 3)."""
-    square = x * x + y * y + z * z
-    angle = math.sqrt(square)
-    if angle < 1e-4:
-        a, b, c = 1.0 - square / 6.0, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
-    else:
-        a, b = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
-        c = (1.0 - a) / square
-    vector = (x, y, z)
-    cross = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
-    for i in range(3):
-        for j in range(3):
-            outer = vector[i] * vector[j]
-            same = 1.0 if i == j else 0.0
-            turn[i, j] = same * (1.0 - b * square) + a * cross[i][j] + b * outer
-            left[i, j] = same * (1.0 - c * square) + b * cross[i][j] + c * outer
-
-
-@njit(cache=True)
-def _retract(state: Array, step: Array) -> Array:
-    """The state moved by a step of its tangent space."""
-    turn, left, out = np.empty((3, 3)), np.empty((3, 3)), state.copy()
-    _exponential(step[3], step[4], step[5], turn, left)
-    for i in range(3):
-        for j in range(3):
-            out[4 * i + j] = 0.0
-            for k in range(3):
-                out[4 * i + j] += turn[i, k] * state[4 * k + j]
-        out[4 * i + 3] += step[i]
-    for i in range(6):
-        out[12 + i] += step[6 + i]
-    return out
 
 
 @njit(cache=True)
@@ -237,7 +189,7 @@ def _project(state: Array, points: Array, late_s: Array, pose: Array, intrinsics
     arm, here, y = np.empty(3), np.empty(3), np.empty(3)
     for n in range(points.shape[0]):
         late = late_s[n]
-        _exponential(late * state[15], late * state[16], late * state[17], turn, left)
+        exponential(late * state[15], late * state[16], late * state[17], turn, left)
         for i in range(3):
             y[i] = state[4 * i] * points[n, 0] + state[4 * i + 1] * points[n, 1] + state[4 * i + 2] * points[n, 2]
         for i in range(3):

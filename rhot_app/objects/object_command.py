@@ -106,7 +106,7 @@ def _detect(rig: Rig, detector: Any, argument: str) -> FiducialFrame:
 def _pose_fields(pose: ObjectPose) -> dict[str, Any]:
     import numpy as np
 
-    from rhot_app.geometry.transforms import quaternion_from_rotation
+    from rhot_app.estimation.se3 import quaternion_from_rotation
 
     world = pose.world_from_object
     sd = np.sqrt(np.diag(pose.covariance))

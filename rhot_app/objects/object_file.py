@@ -17,7 +17,6 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from rhot_app.errors import ObjectError
-from rhot_app.geometry.transforms import quaternion_from_rotation, rotation_from_quaternion
 from rhot_node.files import PRINTABLE, read_document, write_document
 from rhot_node.wire.messages import FAMILIES
 
@@ -74,6 +73,8 @@ class Tag(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def corners(self) -> Array:
         """(4, 3) m in the object's frame: top left, top right, bottom right, bottom left of the upright tag."""
+        from rhot_app.estimation.se3 import rotation_from_quaternion
+
         half = 0.5 * self.size_mm
         square = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
         return 1e-3 * (square @ rotation_from_quaternion(self.rotation_wxyz).T + np.array(self.translation_mm))
@@ -203,6 +204,8 @@ def plate(name: str, columns: int, rows: int, tag_size_mm: float, gap_mm: float,
 def _tag(family: str, number: int, size_mm: float, rotation: Array, translation_mm: Array) -> Tag:
     if not (size_mm > 0.0 and math.isfinite(size_mm)):
         raise ValueError(f"a tag of {size_mm:g} mm cannot be; give a size above 0")
+    from rhot_app.estimation.se3 import quaternion_from_rotation
+
     w, x, y, z = (float(q) for q in quaternion_from_rotation(rotation))
     tx, ty, tz = (float(t) for t in translation_mm)
     return Tag(family, number, size_mm, (w, x, y, z), (tx, ty, tz))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rhot_app.estimation.least_squares import Dense, minimise
 from rhot_app.estimation.residual import Residual, Rows
+from rhot_app.estimation.se3 import difference, exp_so3, retract
 from rhot_app.geometry.camera import undistort_point, undistort_points
 from rhot_app.geometry.transforms import fit_rigid, inverse, rigid
 from rhot_app.geometry.triangulate import Outcome, triangulate
@@ -23,7 +24,6 @@ from rhot_app.objects.motion import (
     TWIST,
     VELOCITY,
     CameraArrays,
-    ObjectProcess,
     PointResidual,
     VelocityPrior,
     pose_of,
@@ -163,7 +163,7 @@ def _tag_starts(points: ObjectPoints, cameras: CameraArrays, view: ObjectView) -
         _, rotations, translations, _ = cv2.solvePnPGeneric(square, normalised[:, None], np.eye(3), np.zeros(0),
                                                             flags=cv2.SOLVEPNP_IPPE_SQUARE)
         for rotation, translation in zip(rotations, translations, strict=True):
-            camera_from_tag = rigid(cv2.Rodrigues(rotation)[0], translation[:, 0])
+            camera_from_tag = rigid(exp_so3(rotation.ravel()), translation[:, 0])
             if np.isfinite(camera_from_tag).all():
                 starts.append(world_from_camera @ camera_from_tag @ tag_from_object)
     return starts
@@ -216,9 +216,9 @@ def _start(residuals: Sequence[PointResidual], priors: Sequence[Residual], state
         return [replace(one, jacobian=one.jacobian[:, :size])
                 for one in (*points, *(prior.linearise(state) for prior in priors))]
 
-    def retract(state: Array, step: Array) -> Array:
-        return ObjectProcess().retract(state, np.concatenate([step, np.zeros(SIZE - size)]))
-    return Dense(state, rows, retract, size)
+    def moved(state: Array, step: Array) -> Array:
+        return np.asarray(retract(state, np.concatenate([step, np.zeros(SIZE - size)])))
+    return Dense(state, rows, moved, size)
 
 
 def refine(residuals: Sequence[PointResidual], priors: Sequence[Residual], state: Array, size: int) -> Mode | None:
@@ -249,7 +249,7 @@ def _add(modes: list[Mode], mode: Mode | None) -> None:
 
 def same_pose(state: Array, covariance: Array, other: Array, other_covariance: Array) -> bool:
     """Whether two minima are one: nearer than SAME_POSE standard deviations of either."""
-    step = ObjectProcess().difference(state, other)[:TWIST]
+    step = difference(state, other)[:TWIST]
     return bool(min(step @ np.linalg.solve(one[:TWIST, :TWIST], step)
                     for one in (covariance, other_covariance)) < SAME_POSE**2)
 

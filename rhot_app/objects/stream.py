@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import ObjectError
-from rhot_app.geometry.transforms import log_so3, rigid, rotation_from_quaternion
+from rhot_app.estimation.se3 import rotation_from_quaternion, rotation_vector
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.motion import START_SPEED, TWIST, PoseResidual, state_of
 from rhot_app.objects.pose import Mode
 from rhot_app.objects.state import ObjectState
@@ -98,7 +99,7 @@ def noise_of(stream: PoseStream) -> Array:
     if len(stream.t_ns) < SAMPLES:
         raise ObjectError(f"the pose stream has {len(stream.t_ns)} samples; its noise needs {SAMPLES} or "
                           "more. Give a longer recording.")
-    turns = np.array([log_so3(b[:3, :3] @ a[:3, :3].T) for a, b in zip(stream.poses, stream.poses[1:], strict=False)])
+    turns = np.array([rotation_vector(b, a) for a, b in zip(stream.poses, stream.poses[1:], strict=False)])
     variances = []
     for differences in (np.diff(stream.poses[:, :3, 3], n=3, axis=0), np.diff(turns, n=2, axis=0)):
         sd = _TO_SD * float(np.median(np.abs(differences)))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.diagnostics import Diagnostics, Part
 from rhot_app.estimation.filter import FilteredState, Knot
 from rhot_app.estimation.residual import Residual
+from rhot_app.estimation.se3 import difference
 from rhot_app.estimation.track import PREDICTED_NS, Life, TrackFilter
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.objects.motion import SIZE, TWIST, VELOCITY, CameraArrays, ObjectProcess, StatePrior, pose_of
@@ -129,7 +130,7 @@ class PointMeasurement:
         """The estimate and its reversal, if the prediction does not exclude that: a tag's tilt may be taken for the
         opposite one as it goes through the frontal pose."""
         other = reversed_state(self._points, self._cameras, self._view, state)
-        step = ObjectProcess().difference(other, prediction[0])[:TWIST]
+        step = difference(other, prediction[0])[:TWIST]
         if step @ np.linalg.solve(prediction[1][:TWIST, :TWIST], step) > EXCLUDED:
             return None
         residuals = [point_residual(self._points, self._cameras, self._view, self._view.t_ns)]

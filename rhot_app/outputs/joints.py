@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.geometry.transforms import quaternion_from_rotation
+from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import build_model, neutral_pose
 from rhot_app.hand.skeleton import JOINTS, HandPose

@@ -8,7 +8,6 @@ metacarpals in the palm: they are laid from each knuckle towards the carpus, as 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -16,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.se3 import fill_quaternion
 from rhot_app.hand.dh import ROOT
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import HandModel
@@ -111,31 +111,7 @@ def openxr_arrays(mapping: OpenXrMap, world_from_palm: Array, frames: Array, pos
                                    + base[i, 2] * offset[2])
             for j in range(3):
                 turned[i, j] = base[i, 0] * turn[0, j] + base[i, 1] * turn[1, j] + base[i, 2] * turn[2, j]
-        _quaternion(turned, orientations[joint])
-
-
-@njit(cache=True)
-def _quaternion(r: Array, out: Array) -> None:
-    """Unit quaternion wxyz of a rotation, w >= 0; divides by the largest of the four numbers (Shepperd 1978)."""
-    trace = r[0, 0] + r[1, 1] + r[2, 2]
-    largest, best = 0, trace
-    for i in range(3):
-        if r[i, i] > best:
-            largest, best = i + 1, r[i, i]
-    if largest == 0:
-        out[0], out[1], out[2], out[3] = 1.0 + trace, r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
-    else:
-        i = largest - 1
-        j, k = (i + 1) % 3, (i + 2) % 3
-        out[0] = r[k, j] - r[j, k]
-        out[1 + i] = 1.0 + 2.0 * r[i, i] - trace
-        out[1 + j] = r[j, i] + r[i, j]
-        out[1 + k] = r[k, i] + r[i, k]
-    scale = 1.0 / math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
-    if out[0] < 0.0:
-        scale = -scale
-    for i in range(4):
-        out[i] *= scale
+        fill_quaternion(turned, orientations[joint])
 
 
 _Place = tuple[int, Array, Array, float]

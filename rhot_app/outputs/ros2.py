@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from rhot_app.geometry.transforms import quaternion_from_rotation
+from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.hand.skeleton import ANGLES
 from rhot_app.outputs.joints import Sample
 from rhot_app.project import OTHER_HAND

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.geometry.transforms import quaternion_from_rotation
+from rhot_app.estimation.se3 import quaternion_from_rotation, rotation_from_quaternion
 from rhot_app.outputs.joints import HandSample, Sample
 from rhot_app.outputs.openxr import OPENXR_JOINTS
 from rhot_app.outputs.osc import UdpSink, bundles, osc_message
@@ -63,7 +63,7 @@ def bone_poses(hand: HandSample, bones: Bones) -> tuple[Array, Array]:
     The hand's own are in the room, as if nothing stood above it. `hand` has the joints of OpenXR.
     """
     assert hand.orientations is not None
-    turned = _matrices(hand.orientations[bones.joints])
+    turned = rotation_from_quaternion(np.roll(hand.orientations[bones.joints], 1, axis=-1))
     forward, up = -_MIRROR * turned[:, :, 2], _MIRROR * turned[:, :, 1]
     world = np.stack([forward, up, np.cross(forward, up)], axis=2) @ bones.rest.transpose(0, 2, 1)
     places = _MIRROR * hand.positions[bones.joints]
@@ -101,12 +101,3 @@ class VmcSink(UdpSink):
 
 def _basis(forward: Array, up: Array) -> Array:
     return np.stack([forward, up, np.cross(forward, up)], axis=1)
-
-
-def _matrices(xyzw: Array) -> Array:
-    """Rotations (N, 3, 3) of unit quaternions (N, 4)."""
-    x, y, z, w = xyzw.T
-    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
-    return np.moveaxis(np.array(rows), 2, 0)

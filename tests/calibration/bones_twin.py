@@ -12,7 +12,7 @@ from rhot_app.calibration.hand import marker_places as hand_prior
 from rhot_app.calibration.hand.bundle_model import Poses, expected
 from rhot_app.calibration.hand.marker_places import PALM, MarkerPlace, MarkerTracks
 from rhot_app.calibration.hand.shape import MARKERS, HandUnknowns
-from rhot_app.geometry.transforms import exp_so3
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, BONES, FINGERS, FLEXIONS

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.corners import BoardView, detect
 from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
-from rhot_app.geometry.transforms import exp_so3, rigid
+from rhot_app.estimation.se3 import exp_so3
+from rhot_app.geometry.transforms import rigid
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,9 @@ from rhot_app.calibration.board.boards import Board, Chessboard
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.lens.fit import LensStart
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.geometry.camera import CameraModel, full_lens, intrinsics_row
-from rhot_app.geometry.transforms import exp_so3, inverse, rigid
+from rhot_app.geometry.transforms import inverse, rigid
 
 Array = NDArray[np.float64]
 

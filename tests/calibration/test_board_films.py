@@ -20,7 +20,8 @@ from rhot_app.calibration.lens.intrinsics import solve
 from rhot_app.calibration.lens.views import read_views
 from rhot_app.calibration.stereo.reading import read_shared
 from rhot_app.errors import CalibrationError
-from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
+from rhot_app.estimation.se3 import exp_so3, log_so3
+from rhot_app.geometry.transforms import rigid
 
 BOARD = Chessboard(9, 6, 0.030)
 FPS = 25.0

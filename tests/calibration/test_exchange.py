@@ -34,8 +34,9 @@ from rhot_app.calibration.commands.output import FORMAT_NAMES
 from rhot_app.calibration.exchange.formats import FORMATS, read_files
 from rhot_app.calibration.exchange.records import ForeignCamera, Stated
 from rhot_app.errors import CalibrationError
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.geometry.camera import CameraModel, intrinsics_row, lens_parameters
-from rhot_app.geometry.transforms import exp_so3, inverse, rigid
+from rhot_app.geometry.transforms import inverse, rigid
 from rhot_app.project import Intrinsics
 
 Array = NDArray[np.float64]

@@ -22,8 +22,8 @@ from published_cameras import (
 from rhot_app.__main__ import main
 from rhot_app.calibration.exchange.formats import FORMATS
 from rhot_app.calibration.lens.intrinsics import load_intrinsics
+from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import exp_so3, quaternion_from_rotation
 from rhot_app.project import CameraCalibration, CameraPose, Rig, load_rig, save_rig
 from rhot_app.rig_history import versions
 from rhot_node.files import resource_path

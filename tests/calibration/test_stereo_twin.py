@@ -19,8 +19,9 @@ from rhot_app.calibration.stereo.points import locate
 from rhot_app.calibration.stereo.report import StereoFigures, StereoReport
 from rhot_app.calibration.stereo.ruler import RulerReading, read_ruler
 from rhot_app.errors import CalibrationError
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.geometry.camera import CameraModel, full_lens, intrinsics_row
-from rhot_app.geometry.transforms import exp_so3, inverse, rigid
+from rhot_app.geometry.transforms import inverse, rigid
 
 
 def figures(report: StereoReport) -> StereoFigures:

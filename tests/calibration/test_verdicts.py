@@ -19,8 +19,9 @@ from rhot_app.calibration.lens.intrinsics import solve
 from rhot_app.calibration.stereo.calibrate import calibrate, rig_findings
 from rhot_app.calibration.stereo.ruler import RulerResult, ruler_finding
 from rhot_app.calibration.verdict import Grade, Verdict, told_apart
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.geometry.camera import full_lens
-from rhot_app.geometry.transforms import exp_so3, rigid
+from rhot_app.geometry.transforms import rigid
 
 
 @pytest.mark.parametrize(("value", "limit", "decimals", "text"), [

@@ -14,7 +14,8 @@ from rhot_app.calibration.bundle.model import BundleState
 from rhot_app.calibration.stereo.start import place_world
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
-from rhot_app.geometry.transforms import exp_so3, inverse, rigid
+from rhot_app.estimation.se3 import exp_so3
+from rhot_app.geometry.transforms import inverse, rigid
 
 NAMES = ("left", "right")
 UP_BOARD = rigid(np.diag([1.0, -1.0, -1.0]), np.zeros(3))  # table_from_board of a board that lies as it should

@@ -19,8 +19,8 @@ from recorded_landmarks import FOLDER, FPS, WHOLE, needs_recording, recording
 from test_track_command import LEFT, needs_networks, table_of
 
 from rhot_app.__main__ import main
+from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettings, landmark_markers, save_rig
 from rhot_node.pictures import open_video
 

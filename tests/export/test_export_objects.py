@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from rhot_app.api import export, open_recording
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.export.states import VALIDITIES, HandStates
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import exp_so3, rigid
+from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.objects.object_file import cube, save_object
 from rhot_app.objects.state import Validity

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation
 from rhot_app.geometry.camera import (
     CameraModel,
     intrinsics_row,
@@ -16,7 +17,6 @@ from rhot_app.geometry.camera import (
     undistort_point,
     undistort_with_slope,
 )
-from rhot_app.geometry.transforms import exp_so3, quaternion_from_rotation
 from rhot_app.project import CameraPose, Intrinsics
 
 LENSES = {

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.geometry.camera import ball, ellipsoid, point_rays
-from rhot_app.geometry.transforms import exp_so3
 from rhot_app.geometry.triangulate import triangulate
 
 FOCAL = 530.0

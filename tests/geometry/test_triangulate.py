@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation
 from rhot_app.geometry.camera import CameraModel, undistort_point
-from rhot_app.geometry.transforms import exp_so3, quaternion_from_rotation
 from rhot_app.geometry.triangulate import Outcome, triangulate
 from rhot_app.project import CameraPose, Intrinsics
 

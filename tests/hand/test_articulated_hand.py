@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hand_samples import random_pose
 
-from rhot_app.geometry.transforms import quaternion_from_rotation
+from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.hand.articulated import articulated_hand, load_articulated, save_articulated
 from rhot_app.hand.articulated_model import build_articulated, forward_state, state_jacobian
 from rhot_app.hand.kinematics import forward, jacobian

@@ -5,7 +5,7 @@ import pytest
 from hand_samples import natural_angles, natural_motion, random_world, rotation_about
 from scipy.spatial.transform import Rotation
 
-from rhot_app.hand.kinematics import forward, rotation_vector
+from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.hand.solvers.finger_ik import solve_fingers
@@ -184,11 +184,3 @@ def test_stretched_time_frees_the_fit_from_the_past(right_hand):
     assert soon is not None and late is not None
     assert rotation_error_deg(late.pose.world_from_palm, pose.world_from_palm) < rotation_error_deg(
         soon.pose.world_from_palm, pose.world_from_palm)
-
-
-def test_rotation_vector_matches_scipy():
-    rng = np.random.default_rng(13)
-    for _ in range(20):
-        to, origin = random_world(rng), random_world(rng)
-        expected = Rotation.from_matrix(to[:3, :3] @ origin[:3, :3].T).as_rotvec()
-        np.testing.assert_allclose(rotation_vector(to, origin), expected, atol=1e-8)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from shipped_rig import RIGHT_MODEL as MODEL
 
-from rhot_app.geometry.transforms import exp_so3
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.model import with_locked
 from rhot_app.hand.motion.hand_process import FASTEST, PALM_SPREAD, SLOWEST, HandProcess

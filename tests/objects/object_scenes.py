@@ -7,8 +7,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import exp_so3, rigid
+from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import build_model
 from rhot_app.objects.object_file import ObjectModel, cube, plate

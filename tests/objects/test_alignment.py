@@ -14,7 +14,8 @@ from scipy.stats import chi2
 from rhot_app.__main__ import main
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
-from rhot_app.geometry.transforms import apply, exp_so3, fit_rigid, inverse, log_so3, quaternion_from_rotation, rigid
+from rhot_app.estimation.se3 import exp_so3, log_so3, quaternion_from_rotation
+from rhot_app.geometry.transforms import apply, fit_rigid, inverse, rigid
 from rhot_app.objects.alignment.alignment_file import load_alignment, save_alignment, to_alignment
 from rhot_app.objects.alignment.drift import DriftMonitor
 from rhot_app.objects.alignment.fit import align

@@ -11,7 +11,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "estimation"))
 
 
-from rhot_app.geometry.transforms import exp_so3, rigid
+from rhot_app.estimation.se3 import exp_so3
+from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model, neutral_pose

@@ -6,7 +6,7 @@ import numpy as np
 from object_scenes import CUBE, PERIOD_NS, hand_poses, wide_cameras
 from tag_pictures import render
 
-from rhot_app.geometry.transforms import log_so3
+from rhot_app.estimation.se3 import log_so3
 from rhot_app.objects.observations import fiducial_frame
 from rhot_app.objects.state import Validity
 from rhot_app.objects.track import ObjectTracker

@@ -13,7 +13,8 @@ from object_scenes import CUBE, wide_cameras
 from tag_pictures import render
 
 from rhot_app.__main__ import main
-from rhot_app.geometry.transforms import exp_so3, log_so3, rigid, rotation_from_quaternion
+from rhot_app.estimation.se3 import exp_so3, log_so3, rotation_from_quaternion
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.object_file import ObjectMarker, ObjectModel, save_object
 from rhot_app.project import Rig, load_rig, save_rig
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults

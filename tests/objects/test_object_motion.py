@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from object_scenes import hand_poses, wide_cameras
 
-from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
+from rhot_app.estimation.se3 import exp_so3, log_so3
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.motion import (
     RATE,
     SIZE,

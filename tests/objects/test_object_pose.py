@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from object_scenes import CUBE, NOISE_PX, TAG, facing_tags, observe, wide_cameras
 
-from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
+from rhot_app.estimation.se3 import exp_so3, log_so3
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.motion import CameraArrays
 from rhot_app.objects.object_file import ObjectMarker, ObjectModel, plate
 from rhot_app.objects.observations import MarkerPoints, ObjectPoints

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rhot_app.errors import ObjectError
-from rhot_app.geometry.transforms import exp_so3, log_so3, quaternion_from_rotation, rigid
+from rhot_app.estimation.se3 import exp_so3, log_so3, quaternion_from_rotation
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.state import Validity
 from rhot_app.objects.stream import PoseStream, noise_of, read_pose_stream, track_stream
 

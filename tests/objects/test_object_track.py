@@ -14,7 +14,8 @@ from object_scenes import CUBE, PERIOD_NS, ROW_NS, TAG, hand_poses, observe, wid
 
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.errors import ObjectError
-from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
+from rhot_app.estimation.se3 import exp_so3, log_so3
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.object_file import ObjectModel, plate
 from rhot_app.objects.observations import FiducialFrame
 from rhot_app.objects.pose import Mode

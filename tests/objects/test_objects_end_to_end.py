@@ -19,8 +19,9 @@ from scene import EXPOSURE_NS, ROW_TIME_NS, Scene, draw
 from tag_pictures import render
 
 from rhot_app.engine.client import EngineClient
+from rhot_app.estimation.se3 import exp_so3, log_so3
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.object_file import cube, save_object
 from rhot_app.objects.state import ObjectState, Validity
 from rhot_app.project import RigNode, load_rig, with_object

@@ -10,7 +10,8 @@ import pytest
 from object_scenes import wide_cameras
 from tag_pictures import render
 
-from rhot_app.geometry.transforms import exp_so3, rigid
+from rhot_app.estimation.se3 import exp_so3
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.object_file import plate
 from rhot_node.detect.tags import TagDetector, family_number
 from rhot_node.errors import SettingsError

@@ -15,8 +15,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettings
 from rhot_app.recording.landmark_log import LandmarkTable, read_landmark_table, write_landmark_log

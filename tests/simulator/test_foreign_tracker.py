@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from patience import eventually
 
-from rhot_app.geometry.transforms import inverse, rigid, rotation_from_quaternion
+from rhot_app.estimation.se3 import rotation_from_quaternion
+from rhot_app.geometry.transforms import inverse, rigid
 from rhot_app.objects.alignment.motion_stream import MotionStream
 from rhot_app.objects.alignment.report import FAIR_M, LASTING_M, REACH_M, calibrate_alignment, coverage_of_motion
 from rhot_app.simulator.film.scene_objects import make_object

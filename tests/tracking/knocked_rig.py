@@ -9,7 +9,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from rhot_app.geometry.transforms import exp_so3, quaternion_from_rotation, rigid, rotation_from_quaternion
+from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation, rotation_from_quaternion
+from rhot_app.geometry.transforms import rigid
 from rhot_app.project import CameraPose, Rig
 from rhot_app.simulator.film.ideal_observations import ORDINARY, ObservationNoise, ideal_observations
 from rhot_app.simulator.film.shot import make_shot

@@ -16,8 +16,9 @@ from shipped_rig import TWO_PIS
 from rhot_app.calibration.check.checks import check_rig
 from rhot_app.engine.pipeline import warm_up
 from rhot_app.errors import RigError
+from rhot_app.estimation.se3 import exp_so3, log_so3
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
+from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model, neutral_pose
 from rhot_app.objects.object_file import ObjectMarker, ObjectModel, SphereShape, plate, save_object

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from rhot_app.errors import RigError
-from rhot_app.geometry.transforms import exp_so3, rigid
+from rhot_app.estimation.se3 import exp_so3
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.object_file import CylinderShape, ObjectModel, SphereShape, cube, plate, save_object
 from rhot_app.objects.state import ObjectState, Validity, unknown_object
 from rhot_app.project import Rig, RigObject, load_rig, with_object

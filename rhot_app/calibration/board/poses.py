@@ -18,8 +18,9 @@ from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.bundle.adjustment import Bundle, adjust
 from rhot_app.calibration.bundle.model import POINT, BoardFreedom, LensFreedom, Observations
 from rhot_app.estimation.quantiles import f_tail
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.geometry.camera import lens_rays
-from rhot_app.geometry.transforms import apply, exp_so3, rigid
+from rhot_app.geometry.transforms import apply, rigid
 from rhot_app.progress import Progress, silent
 
 Array = NDArray[np.float64]

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.geometry.camera import LENS, linearise_lenses, own_parameters
-from rhot_app.geometry.transforms import exp_so3
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from rhot_app.calibration.exchange.documents import Entry, listed
 from rhot_app.calibration.exchange.records import ForeignCamera, Stated, focal_of, lens_of, refuse_model
 from rhot_app.errors import CalibrationError
-from rhot_app.geometry.transforms import exp_so3, log_so3, rigid
+from rhot_app.estimation.se3 import exp_so3, log_so3
+from rhot_app.geometry.transforms import rigid
 
 
 def read_anipose(documents: Sequence[Entry], stated: Stated) -> list[ForeignCamera]:

@@ -15,7 +15,8 @@ from rhot_app.calibration.check.checks import all_pairs, lens_figures, lens_find
 from rhot_app.calibration.exchange.records import ForeignCamera
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
-from rhot_app.geometry.transforms import inverse, quaternion_from_rotation, rigid, rotation_from_quaternion
+from rhot_app.estimation.se3 import quaternion_from_rotation, rotation_from_quaternion
+from rhot_app.geometry.transforms import inverse, rigid
 from rhot_app.project import CameraPose, Rig, RigNode
 
 Array = NDArray[np.float64]

@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.calibration.hand.shape import MARKERS, ROOTS, TURNS, HandUnknowns, left_jacobian
+from rhot_app.calibration.hand.shape import MARKERS, ROOTS, TURNS, HandUnknowns
+from rhot_app.estimation.se3 import left_jacobian
 from rhot_app.hand.dh import ROOT, DhArrays
 from rhot_app.hand.kinematics import TWIST, forward_arrays, jacobian_arrays, move
 from rhot_app.hand.skeleton import ANGLES, FLEXIONS

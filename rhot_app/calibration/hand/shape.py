@@ -29,7 +29,6 @@ from rhot_app.calibration.hand.marker_places import (
     proportion_sd,
     root_proportion_sd,
 )
-from rhot_app.geometry.transforms import skew
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.landmarks import ANATOMY_SD_M
 from rhot_app.hand.model import HandModel, build_model
@@ -173,16 +172,6 @@ class HandUnknowns:
         part, scatter = TIP_PART if place.segment == DISTAL else _INNER_PART
         return (np.array([part * bone, 0.0, radius]), np.array([scatter * bone, _ACROSS_SD_M, _ACROSS_SD_M]),
                 float(part))
-
-
-def left_jacobian(vector: Array) -> Array:
-    """(3, 3) J with exp(vector + d) = exp(J d) exp(vector) to first order (Sola 2018, eq. 145)."""
-    angle = float(np.linalg.norm(vector))
-    if angle < 1e-6:
-        return np.eye(3) + 0.5 * skew(vector)
-    cross = skew(vector / angle)
-    return np.asarray(np.eye(3) + (1.0 - np.cos(angle)) / angle * cross
-                      + (1.0 - np.sin(angle) / angle) * (cross @ cross))
 
 
 def _numbers(values: Array, digits: int) -> tuple[float, float, float]:

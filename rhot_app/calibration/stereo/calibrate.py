@@ -25,8 +25,9 @@ from rhot_app.calibration.stereo.ruler import RulerReading, baseline_finding, re
 from rhot_app.calibration.stereo.start import Link, PlacedShot, WorldFrame, all_links, place_shot, spanning_tree
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
+from rhot_app.estimation.se3 import quaternion_from_rotation, rotation_from_quaternion
 from rhot_app.geometry.camera import lens_parameters, rig_intrinsics
-from rhot_app.geometry.transforms import inverse, quaternion_from_rotation, rigid, rotation_from_quaternion
+from rhot_app.geometry.transforms import inverse, rigid
 from rhot_app.progress import Progress, silent
 from rhot_app.project import CameraCalibration, CameraPose, Rig, RigNode
 

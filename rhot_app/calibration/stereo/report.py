@@ -29,8 +29,9 @@ from rhot_app.calibration.stereo.adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo.points import Squares, epipolar_px, locate, measure_squares
 from rhot_app.calibration.stereo.ruler import RulerResult
 from rhot_app.calibration.verdict import Verdict
+from rhot_app.estimation.se3 import exp_so3, log_so3
 from rhot_app.geometry.camera import LENS
-from rhot_app.geometry.transforms import exp_so3, inverse, log_so3
+from rhot_app.geometry.transforms import inverse
 
 Array = NDArray[np.float64]
 

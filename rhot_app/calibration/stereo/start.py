@@ -16,7 +16,8 @@ from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import Dense, minimise
 from rhot_app.estimation.residual import UNIT, Rows
-from rhot_app.geometry.transforms import apply, exp_so3, inverse, log_so3, rigid
+from rhot_app.estimation.se3 import exp_so3, log_so3
+from rhot_app.geometry.transforms import apply, inverse, rigid
 
 # -- relative pose of two cameras by consensus -------------------------------------------------------------------------
 # A shot proposes its own answer; the one that most shots agree with wins, and whoever disagrees is named. Nothing

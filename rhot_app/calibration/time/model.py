@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.time.tracks import CameraTracks, interpolate
-from rhot_app.geometry.transforms import skew
+from rhot_app.estimation.se3 import skew
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import ExportError
+from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.export.formats.bones import PARENTS, TIPS, TURNING, Skeleton, skeleton_of
 from rhot_app.export.plan import Plan, file_from_frame, frame_up, require
 from rhot_app.export.states import HandStates
-from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, build_model

@@ -18,8 +18,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.gauss_markov import integrated, integrated_noise, matern52, matern52_noise
+from rhot_app.estimation.se3 import PoseState, retract
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.kinematics import move, rotation_vector
 from rhot_app.hand.motion.null_space import most_probable_pose
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ BIAS_S = 1.0
 _GROUPS = np.array([0] * 3 + [1] * 3 + [2] * 21)
 
 
-class HandProcess:
+class HandProcess(PoseState):
     """Implements `estimation.residual.Process`; M markers.
 
     `dh` has a point for each marker; without points there is no null-space reset. `limits` (21, 2) rad.
@@ -97,14 +97,6 @@ class HandProcess:
             grown = np.sqrt(np.maximum(np.minimum(factor, most), 1.0))
             covariance[place] *= grown[:, None]
             covariance[:, place] *= grown
-
-    def retract(self, state: Array, step: Array) -> Array:
-        """See `Process`."""
-        return _retract(state, step)
-
-    def difference(self, state: Array, origin: Array) -> Array:
-        """See `Process`."""
-        return _difference(state, origin)
 
     def predict(self, state: Array, covariance: Array, dt_s: float) -> tuple[Array, Array]:
         """See `Process`. Long times are taken in steps in which the rates change little."""
@@ -157,33 +149,6 @@ class HandProcess:
         out = copy.copy(self)
         out._slowest = out._fastest = np.max([self.rates(state) for state in states], axis=0)
         return out
-
-
-@njit(cache=True)
-def _retract(state, step):
-    out = state.copy()
-    world, moved, angles = np.eye(4), np.empty((4, 4)), np.empty(21)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    move(world, state[ANGLES:VELOCITY], step[:POSE], moved, angles)
-    out[:ANGLES] = moved[:3].copy().reshape(12)
-    out[ANGLES:VELOCITY] = angles
-    for i in range(POSE, step.shape[0]):
-        out[VELOCITY - POSE + i] = state[VELOCITY - POSE + i] + step[i]
-    return out
-
-
-@njit(cache=True)
-def _difference(state, origin):
-    out = np.empty(state.shape[0] - BIAS + MOTION)
-    to, start = state[:ANGLES].reshape(3, 4), origin[:ANGLES].reshape(3, 4)
-    for i in range(3):
-        out[i] = to[i, 3] - start[i, 3]
-    out[3], out[4], out[5] = rotation_vector(to, start)
-    for i in range(21):
-        out[6 + i] = state[ANGLES + i] - origin[ANGLES + i]
-    for i in range(POSE, out.shape[0]):
-        out[i] = state[VELOCITY - POSE + i] - origin[VELOCITY - POSE + i]
-    return out
 
 
 @njit(cache=True)
@@ -260,14 +225,12 @@ def _propagate(state, mean, rate, dt, blocks, turn):
         step[i] = a[0, 1] * velocity + a[0, 2] * acceleration + (a[0, 0] - 1.0) * away
         state[VELOCITY + i] = a[1, 0] * away + a[1, 1] * velocity + a[1, 2] * acceleration
         state[ACCELERATION + i] = a[2, 0] * away + a[2, 1] * velocity + a[2, 2] * acceleration
-    world, moved, angles = np.eye(4), np.empty((4, 4)), np.empty(21)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    move(world, state[ANGLES:VELOCITY], step, moved, angles)
+    moved = retract(state[:VELOCITY], step)
+    world, after = state[:ANGLES].reshape(3, 4), moved[:ANGLES].reshape(3, 4)
     for i in range(3):
         for j in range(3):
-            turn[i, j] = moved[i, 0] * world[j, 0] + moved[i, 1] * world[j, 1] + moved[i, 2] * world[j, 2]
-    state[:ANGLES] = moved[:3].copy().reshape(12)
-    state[ANGLES:VELOCITY] = angles
+            turn[i, j] = after[i, 0] * world[j, 0] + after[i, 1] * world[j, 1] + after[i, 2] * world[j, 2]
+    state[:VELOCITY] = moved
 
 
 @njit(cache=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.estimation.residual import Rows
-from rhot_app.geometry.transforms import exp_so3
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.hand.motion.hand_process import BIAS, MOTION, WORLD
 from rhot_app.project import PalmPlane
 

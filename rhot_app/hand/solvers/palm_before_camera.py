@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.estimation.se3 import exp_so3
 from rhot_app.geometry.transforms import rigid
 
 Array = NDArray[np.float64]
@@ -23,7 +24,7 @@ def palms_before_camera(points: Array, rays: Array, camera_from_world: Array) ->
     rotation, shift = camera_from_world[:, :3], camera_from_world[:, 3]
     places = []
     for vector, away in zip(turns, shifts, strict=True):
-        turn, away = cv2.Rodrigues(vector)[0], away.ravel()
+        turn, away = exp_so3(vector.ravel()), away.ravel()
         middle = turn @ points.mean(axis=0) + away
         line = middle / np.linalg.norm(middle)
         mirrored = (np.eye(3) - 2.0 * np.outer(line, line)) @ turn @ np.diag([1.0, 1.0, -1.0])

@@ -15,9 +15,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.se3 import pose_difference
 from rhot_app.geometry.transforms import best_rotation, fit_rigid, rigid
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.kinematics import TWIST, forward, forward_arrays, jacobian_arrays, move, rotation_vector
+from rhot_app.hand.kinematics import TWIST, forward, forward_arrays, jacobian_arrays, move
 from rhot_app.hand.linear import factorise, solve_in_box, substitute
 from rhot_app.hand.model import HandModel, neutral_pose
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
@@ -246,10 +247,10 @@ def _cost(points: Array, world: Array, angles: Array, mean: Array, information: 
         for j in range(angles.shape[0]):
             total += (angles[i] - mean[i]) * information[i, j] * (angles[j] - mean[j])
     if dt < np.inf:
-        turn = rotation_vector(world, previous_world)
+        moved = pose_difference(world, previous_world)
         for i in range(3):
-            total += (turn[i] / (ROTATION_DRIFT * math.sqrt(dt))) ** 2
-            total += ((world[i, 3] - previous_world[i, 3]) / (TRANSLATION_DRIFT * math.sqrt(dt))) ** 2
+            total += (moved[3 + i] / (ROTATION_DRIFT * math.sqrt(dt))) ** 2
+            total += (moved[i] / (TRANSLATION_DRIFT * math.sqrt(dt))) ** 2
         for i in range(angles.shape[0]):
             total += ((angles[i] - previous_angles[i]) / (ANGLE_DRIFT * math.sqrt(dt))) ** 2
     return 0.5 * total
@@ -278,10 +279,9 @@ def _normal_equations(points: Array, jacobian: Array, world: Array, angles: Arra
         for i in range(3):
             _add_residual(jacobian[row, i], measured[i] - points[row, i], weight, first, last, matrix, right)
     if dt < np.inf:
-        turn = rotation_vector(world, previous_world)
-        for i in range(3):
-            _pull(i, previous_world[i, 3] - world[i, 3], TRANSLATION_DRIFT * math.sqrt(dt), matrix, right)
-            _pull(3 + i, -turn[i], ROTATION_DRIFT * math.sqrt(dt), matrix, right)
+        moved = pose_difference(world, previous_world)
+        for i in range(TWIST):
+            _pull(i, -moved[i], (TRANSLATION_DRIFT if i < 3 else ROTATION_DRIFT) * math.sqrt(dt), matrix, right)
         for i in range(count):
             _pull(TWIST + i, previous_angles[i] - angles[i], ANGLE_DRIFT * math.sqrt(dt), matrix, right)
 

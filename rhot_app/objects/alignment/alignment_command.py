@@ -84,7 +84,7 @@ def _check(path: Path, foreign: MotionStream, rig: MotionStream, *, as_json: boo
 
 
 def _fields(report: AlignmentReport) -> dict[str, Any]:
-    from rhot_app.geometry.transforms import quaternion_from_rotation
+    from rhot_app.estimation.se3 import quaternion_from_rotation
 
     fit, coverage = report.fit, report.coverage
     return {

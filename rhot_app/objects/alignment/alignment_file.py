@@ -15,7 +15,8 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from rhot_app.errors import CalibrationError
-from rhot_app.geometry.transforms import quaternion_from_rotation, rigid, rotation_from_quaternion
+from rhot_app.estimation.se3 import quaternion_from_rotation, rotation_from_quaternion
+from rhot_app.geometry.transforms import rigid
 from rhot_app.project import Metres
 from rhot_node.files import read_document, write_document
 

@@ -12,10 +12,11 @@ from scipy.ndimage import median_filter
 from rhot_app.estimation.least_squares import fit_linear
 from rhot_app.estimation.quantiles import chi_squared_isf
 from rhot_app.estimation.residual import student
+from rhot_app.estimation.se3 import skew
 from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.alignment.alignment_file import Alignment
 from rhot_app.objects.alignment.fit import LASTING_M, LASTING_S
-from rhot_app.objects.alignment.model import GAP_S, skews
+from rhot_app.objects.alignment.model import GAP_S
 from rhot_app.objects.alignment.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
@@ -119,7 +120,7 @@ class DriftMonitor:
         predicted = turned + rig[:3, 3]
         speed = np.gradient(median_filter(predicted, (5, 1)), times, axis=0)  # outliers would have the largest speeds
         jacobian = np.zeros((len(times), 3, 10))
-        jacobian[:, :, 0:3], jacobian[:, :, 3:6] = np.eye(3), -skews(turned)
+        jacobian[:, :, 0:3], jacobian[:, :, 3:6] = np.eye(3), -skew(turned)
         jacobian[:, :, 6:9], jacobian[:, :, 9] = rig[:3, :3] @ poses[:, :3, :3], -speed
         return observed - predicted, jacobian
 

@@ -25,7 +25,8 @@ from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import LEAST_DAMPING, Dense, fit_linear, minimise
 from rhot_app.estimation.quantiles import chi_squared
 from rhot_app.estimation.residual import Rows, student
-from rhot_app.geometry.transforms import best_rotation, rigid, skew
+from rhot_app.estimation.se3 import skew
+from rhot_app.geometry.transforms import best_rotation, rigid
 from rhot_app.objects.alignment.model import GAP_S, ROTATION, TRANSLATION, AlignmentEstimate, AlignmentModel
 from rhot_app.objects.alignment.motion_stream import MotionStream
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rhot_app.geometry.transforms import exp_so3
+from rhot_app.estimation.se3 import exp_so3, inverse_left_jacobian, skew
 from rhot_app.objects.alignment.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
@@ -93,33 +93,19 @@ class AlignmentModel:
         error = seen - predicted - estimate.centre
         jacobian = np.zeros((len(error), 3, self.size))
         jacobian[:, :, TRANSLATION] = np.eye(3)
-        jacobian[:, :, ROTATION] = -skews(predicted)
+        jacobian[:, :, ROTATION] = -skew(predicted)
         jacobian[:, :, POINT] = estimate.rotation @ device
         jacobian[:, :, 9] = (-(speed + np.cross(turning, arm)) @ estimate.rotation.T if self.at_rig else -seen_speed)
         if not self.poses:
             return error, jacobian, np.empty((0, 3)), np.empty((0, 3, self.size))
         predicted_rotation = estimate.rotation @ device @ estimate.body
         turned = Rotation.from_matrix(seen_rotation @ predicted_rotation.transpose(0, 2, 1)).as_rotvec()
-        # a left turn d of the prediction changes the error by the inverse right Jacobian of SO(3), to fourth order
-        half = skews(turned)
-        turn = np.eye(3) + 0.5 * half + half @ half / 12.0
+        # a left turn d of the prediction changes the error by the inverse right Jacobian of SO(3)
+        turn = inverse_left_jacobian(-turned)
         by = np.zeros((len(turned), 3, self.size))
         by[:, :, ROTATION] = turn
         by[:, :, BODY] = turn @ predicted_rotation
-        rate = -(turning @ estimate.rotation.T) if self.at_rig else -_left(turned, seen_turning)
-        by[:, :, 9] = np.einsum("nij,nj->ni", turn, rate) if self.at_rig else rate
+        rate, slope = ((turning @ estimate.rotation.T, turn) if self.at_rig else
+                       (seen_turning, inverse_left_jacobian(turned)))
+        by[:, :, 9] = -np.einsum("nij,nj->ni", slope, rate)
         return error, jacobian, turned, by
-
-
-def skews(vectors: Array) -> Array:
-    """(N, 3, 3) matrices of the cross products with vectors (N, 3)."""
-    out = np.zeros((len(vectors), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -vectors[:, 2], vectors[:, 1], -vectors[:, 0]
-    return out - out.transpose(0, 2, 1)
-
-
-def _left(turned: Array, rate: Array) -> Array:
-    """Change of rotation errors (N, 3) by a left turn at `rate` (N, 3) of the observed rotation: the inverse left
-    Jacobian of SO(3), to fourth order."""
-    half = skews(turned)
-    return np.asarray(np.einsum("nij,nj->ni", np.eye(3) - 0.5 * half + half @ half / 12.0, rate))

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation, rotation_from_quaternion
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import exp_so3, quaternion_from_rotation, rotation_from_quaternion
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.kinematics import forward

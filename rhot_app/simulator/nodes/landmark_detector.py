@@ -14,8 +14,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import quaternion_from_rotation
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.landmarks import LASTING_S

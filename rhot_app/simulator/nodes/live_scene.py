@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rhot_app.errors import SimulatorError
-from rhot_app.geometry.transforms import quaternion_from_rotation, rigid
+from rhot_app.estimation.se3 import quaternion_from_rotation
+from rhot_app.geometry.transforms import rigid
 from rhot_app.simulator.film.scene_objects import SceneObject, make_object
 from rhot_app.simulator.film.shot import camera_seed
 from rhot_app.simulator.nodes.remote import CoverRequest, LampRequest, Request, ShowRequest, TrackerRequest

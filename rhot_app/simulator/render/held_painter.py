@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.estimation.se3 import exp_so3, rotation_from_quaternion
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.geometry.transforms import exp_so3, rigid, rotation_from_quaternion
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.object_file import BoxShape, ObjectModel, Tag, load_object
 from rhot_app.simulator.render.exposure_samples import FrameTime
 from rhot_app.simulator.render.painter import Box, Image, PoseSource, Solids

@@ -18,7 +18,7 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from rhot_app.errors import RecordingError, SimulatorError
-from rhot_app.geometry.transforms import skew
+from rhot_app.estimation.se3 import skew
 from rhot_app.hand.kinematics import TWIST, forward, jacobian
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS, HandPose

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import RhotError
-from rhot_app.geometry.transforms import rigid, rotation_from_quaternion, skew
+from rhot_app.estimation.se3 import rotation_from_quaternion, skew
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.alignment.alignment_file import Alignment, load_alignment
 from rhot_app.objects.observations import MeasuredPose
 from rhot_app.objects.pose import Validity

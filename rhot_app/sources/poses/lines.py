@@ -16,7 +16,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.geometry.transforms import rigid, rotation_from_quaternion
+from rhot_app.estimation.se3 import rotation_from_quaternion
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.pose import Validity
 from rhot_app.objects.stream import FARTHEST_M
 from rhot_app.sources.poses.source import ForeignPose, StreamNoise

@@ -111,7 +111,7 @@ def figures(poses: Sequence[ForeignPose]) -> dict[str, Any]:
 
 def write_poses(path: Path, poses: Sequence[ForeignPose]) -> None:
     """Write the CSV that ``rhot calibrate alignment --foreign`` reads. Raises SourceError."""
-    from rhot_app.geometry.transforms import quaternion_from_rotation
+    from rhot_app.estimation.se3 import quaternion_from_rotation
     from rhot_app.objects.stream import HEADER
     from rhot_node.files import write_atomically
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.check.health import FAIR_ERROR_PX
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
-from rhot_app.geometry.transforms import quaternion_from_rotation
+from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.project import CameraCalibration, CameraPose, Rig
 
 Array = NDArray[np.float64]

@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 from rhot_app.calibration.check.camera_calibration import calibration_error
 from rhot_app.estimation.change_point import ChangePoint, find_change
 from rhot_app.estimation.quantiles import chi_squared_tail
+from rhot_app.estimation.se3 import exp_so3, log_so3
 from rhot_app.geometry.camera import CameraModel, point_rays, undistort_point
-from rhot_app.geometry.transforms import exp_so3, inverse, log_so3, rigid
+from rhot_app.geometry.transforms import inverse, rigid
 from rhot_app.geometry.triangulate import Outcome, triangulate
 from rhot_app.project import Rig
 from rhot_app.tracking.locate import EXACT_PX2

@@ -16,7 +16,7 @@ from rhot_app.calibration.check.camera_calibration import (
     offset_text,
 )
 from rhot_app.engine.status import NodeStatus
-from rhot_app.geometry.transforms import rotation_from_quaternion
+from rhot_app.estimation.se3 import rotation_from_quaternion
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, RigNode
 from rhot_app.state import HandState, Knowledge
 from rhot_app.ui.models.meters import unused_frames

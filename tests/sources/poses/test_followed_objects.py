@@ -14,7 +14,8 @@ from patience import eventually
 
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.errors import RecordingError, RigError, SourceError
-from rhot_app.geometry.transforms import exp_so3, log_so3, quaternion_from_rotation, rigid
+from rhot_app.estimation.se3 import exp_so3, log_so3, quaternion_from_rotation
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.alignment.alignment_file import Alignment, RigidTransform, save_alignment
 from rhot_app.objects.object_file import ObjectModel, SphereShape, cube, save_object
 from rhot_app.objects.observations import MeasuredPose

@@ -9,7 +9,8 @@ import pytest
 from fake_openvr import Device, FakeOpenVr
 
 from rhot_app.errors import SourceError
-from rhot_app.geometry.transforms import exp_so3, rigid
+from rhot_app.estimation.se3 import exp_so3
+from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.pose import Validity
 from rhot_app.sources.poses.steamvr import LOOK_NS, SteamVrPoses
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD, Chessboard
 from rhot_app.calibration.board.corners import BoardView, detect
-from rhot_app.geometry.transforms import exp_so3, inverse, rigid, rotation_from_quaternion
+from rhot_app.estimation.se3 import exp_so3, rotation_from_quaternion
+from rhot_app.geometry.transforms import inverse, rigid
 from rhot_app.project import Rig
 from rhot_app.ui.backend.feed import Picture
 

@@ -17,7 +17,7 @@ from wizard_rig import FakeRigAsker
 from rhot_app.calibration.board.boards import STANDARD_BOARD, Chessboard
 from rhot_app.calibration.board.size_check import Beyond
 from rhot_app.calibration.check.checks import check_rig
-from rhot_app.geometry.transforms import rotation_from_quaternion
+from rhot_app.estimation.se3 import rotation_from_quaternion
 from rhot_app.project import CameraPose, load_rig
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards.framework.plan import Plan
