@@ -1,7 +1,7 @@
 """The life of a track: when it is predicted only, wrong, or lost; and its filter, in master time.
 
-A track begins with a state that something has shown, and lives by accepted observations. Hands and objects, by
-markers, landmarks, contours or tags, live by the same rules.
+A track begins with a measured state and lasts as long as observations are accepted. The rules are the same for hands
+and objects, and for markers, landmarks, contours and tags.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ class Life:
         self.accepted_ns = self.plausible_ns = NEVER
 
     def begin(self, t_ns: int) -> None:
-        """It begins, by what shows it at `t_ns`."""
+        """Begin the track with a state measured at `t_ns`."""
         self.ever = self.alive = True
         self.accepted_ns = self.plausible_ns = t_ns
 
     def end(self) -> None:
-        """It is lost, or wrong."""
+        """End the track, which is lost or wrong."""
         self.alive = False
 
     def observe(self, t_ns: int, *, accepted: bool = True, plausible: bool = True) -> None:
-        """Observations of `t_ns` were weighed. `accepted`: some; `plausible`: most."""
+        """Note observations of `t_ns`. `accepted`: whether some passed the gate; `plausible`: whether most did."""
         if accepted:
             self.accepted_ns = max(self.accepted_ns, t_ns)
         if plausible:

@@ -15,7 +15,7 @@ from rhot_app.project import OTHER_HAND
 from rhot_app.state import HandState
 
 FRAME: Final = "rig"
-_NO_TURN: Final = (0.0, 0.0, 0.0, 1.0)
+_IDENTITY_XYZW: Final = (0.0, 0.0, 0.0, 1.0)
 
 
 class _Cdr:
@@ -74,7 +74,7 @@ def _pose_array(t_ns: int, points: list[list[float]]) -> bytes:
     cdr.header(t_ns)
     cdr.numbers("I", len(points))
     for point in points:
-        cdr.numbers("d", *point, *_NO_TURN)
+        cdr.numbers("d", *point, *_IDENTITY_XYZW)
     return bytes(cdr.data)
 
 

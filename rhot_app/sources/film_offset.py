@@ -52,7 +52,7 @@ _DEMUXERS: Final = "mov,matroska,avi,mpegts,mpeg"  # no playlists, which name ot
 
 @dataclass(frozen=True, slots=True)
 class FilmOffset:
-    """`seconds` to add to a film's times, and their standard deviation."""
+    """What to add to a film's times, s, and its standard deviation."""
 
     seconds: float
     std_s: float

@@ -72,14 +72,14 @@ class CameraObservations:
 class Tracker:
     """Fed with every frame as it arrives, asked for a state when one may be due. One thread only.
 
-    What a tracker has nothing to do with, as objects, images or smoothing, it leaves as it is here.
+    A tracker overrides what it handles. The defaults here ignore objects and images, and smooth nothing.
     """
 
     smooths: ClassVar[bool] = False
     """Whether its states use the whole recording; they come late, by `states` and `finish` only."""
 
     key_frames: KeyFrames | None = None
-    """What tells most of a bare hand's shape, of a tracker by contours. Any thread may read."""
+    """The frames that tell most of a bare hand's shape; None for a tracker without contours. Any thread may read."""
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in. Cheap: called for every datagram even when flooded."""
@@ -125,7 +125,7 @@ class Tracker:
         """Have everything compiled that frames like those of the start do not reach, then forget."""
 
     def wait(self) -> None:
-        """Until what is being looked for beside the frames is found or not. A replay calls it; live, nobody waits."""
+        """Wait until searches on other threads have ended. A replay calls it; live, nobody waits."""
 
 
 CameraFrame = CameraObservations | ObjectFrame | ImageFrame

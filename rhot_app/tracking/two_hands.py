@@ -24,15 +24,14 @@ _PER_OBSERVATION = ("pixels", "covariances", "diameters", "qualities", "flags")
 _PER_MARKER = ("marker_positions", "marker_raw_positions", "marker_covariances", "marker_knowledge",
                "epipolar_error_px")
 _PER_CAMERA = ("camera_pixels", "camera_flags")
-_WORK = ("triangulate", "filter", "solve")
-"""Stages that are gone through for one hand after the other."""
-
+_STAGES = ("triangulate", "filter", "solve")
+"""Stages of the latency that run for one hand after the other."""
 
 OneHand = TypeVar("OneHand", bound=Tracker)
 
 
 class TwoHands(Tracker, Generic[OneHand]):
-    """For a rig with an `other_hand`: states of its `hand`, whose `other` is of the other one.
+    """For a rig with an `other_hand`: states of its `hand`; their field `other` is the state of the other hand.
 
     The arrays of a state's markers are those of the whole rig; its `other` has its own markers only.
     """
@@ -108,7 +107,7 @@ class TwoHands(Tracker, Generic[OneHand]):
         arrays: dict[str, Any] = {name: self._gather(getattr(hand, name), getattr(other, name), axis)
                                  for axis, names in enumerate((_PER_MARKER, _PER_CAMERA)) for name in names}
         latency = hand.latency_s | {stage: hand.latency_s.get(stage, 0.0) + other.latency_s.get(stage, 0.0)
-                                    for stage in _WORK}
+                                    for stage in _STAGES}
         return replace(hand, sequence=self._sequence - 1, marker_ids=self._ids, latency_s=latency,
                        other=replace(other, sequence=self._sequence - 1), **arrays)
 

@@ -33,7 +33,7 @@ _CAPTURE_TYPE, _MMAP, _DISCRETE = 1, 1, 1
 _MOST: Final = 256  # of an enumeration; a driver that never ends one is broken
 
 EXPOSURE_TIME_BY_CAMERA: Final = 0, 3  # V4L2_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY
-EXPOSURE_UNIT_US: Final = 100.0
+EXPOSURE_UNIT_US: Final = 100.0  # of V4L2_CID_EXPOSURE_ABSOLUTE
 
 USUAL: Final = 640, 480, 30.0
 """What most webcams have, and what a node asks for by itself."""
@@ -92,7 +92,7 @@ class Automatics:
 
 
 def read_automatics(path: str, ioctl: Ioctl = fcntl.ioctl) -> Automatics:
-    """Ask a webcam's driver; it may be in use."""
+    """What a webcam's driver says of its automatic modes; the camera may be in use."""
     try:
         handle = os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError:

@@ -1,5 +1,7 @@
-"""What the pictures of a camera, their rate and its controls say against it: one judgement for a node's report, for
-``rhot-node doctor`` and for the preview of a camera that is being chosen."""
+"""Faults of a camera, by its pictures, their rate and its controls: black, too dark, slow, or on automatic modes.
+
+A node's report, ``rhot-node doctor`` and the preview of a camera that is being chosen judge by the same rules.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +17,10 @@ from rhot_node.errors import CameraError
 from rhot_node.health.checks import BLACK_PICTURE, Check, is_black
 
 WINDOW_NS: Final = 2_000_000_000
-"""Over which the rate is measured."""
+"""ns over which the rate is measured."""
 
 SHORT: Final = 0.75
-"""Of the rate that was asked for: less is said. A webcam in the dark halves its rate."""
+"""Share of the requested rate below which a camera is reported as slow. A webcam in the dark halves its rate."""
 
 DARK_LUMA: Final = 63.0
 """Grey level of a mean luma: two stops below 18 % grey, which automatic exposure aims at (sRGB: 118)."""
@@ -26,8 +28,8 @@ DARK_LUMA: Final = 63.0
 AUTOMATIC: Final = {"automatic exposure off": "exposure", "automatic white balance off": "white balance"}
 """Settings that a camera may refuse, and what it then goes on changing by itself."""
 
-_READ_S = 0.1
-_STEP_PX = 8
+_READ_S = 0.1  # longest wait for a frame
+_STEP_PX = 8  # from pixel to pixel whose luma is averaged
 _SILENT_READS = 50  # of _READ_S without a frame: as long as a webcam is given for its first one
 
 
@@ -84,7 +86,7 @@ def check_rate(rate_hz: float | None, asked_hz: float | None, luma: float, *, ex
 
 
 def check_automatic(refused: Sequence[str]) -> Check | None:
-    """That automatic exposure or white balance cannot be turned off; None where both are off."""
+    """A warning where automatic exposure or white balance cannot be turned off; None where both are off."""
     left = [what for setting, what in AUTOMATIC.items() if setting in refused]
     if not left:
         return None

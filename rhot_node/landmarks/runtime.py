@@ -49,7 +49,7 @@ def open_network(data: bytes, runtime: str, threads: int) -> Network:
 def _litert(data: bytes, threads: int) -> Network:
     from ai_edge_litert.interpreter import Interpreter
 
-    with _unheard():
+    with _stderr_silenced():
         interpreter: Any = Interpreter(model_content=data, num_threads=threads)
         interpreter.allocate_tensors()
     image = interpreter.get_input_details()[0]["index"]
@@ -65,7 +65,7 @@ def _litert(data: bytes, threads: int) -> Network:
 
 
 @contextlib.contextmanager
-def _unheard() -> Iterator[None]:
+def _stderr_silenced() -> Iterator[None]:
     """Keeps what LiteRT writes to standard error, which no setting of it turns off, away from a terminal; its errors
     are raised all the same."""
     try:

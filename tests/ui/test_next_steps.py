@@ -59,11 +59,13 @@ def test_each_tick_comes_from_what_the_rig_says():
 
 
 def test_the_cameras_times_are_unknown_until_they_are_measured():
-    rig = placed(with_lenses(first_rig(TWO, bare=True)))
-
     def step(rig: Rig):
-        return next(one for one in next_steps(answers_of(rig), rig, networks=True, printed=True, reasons=())
+        return next(one for one in next_steps(Answers("bare", 2), rig, networks=True, printed=True, reasons=())
                     if one.action == "time")
+
+    for unplaced in (first_rig(TWO, bare=True), first_rig(TWO[:1], bare=True)):
+        assert "half a frame" in step(unplaced).meaning and " ms" not in step(unplaced).meaning
+    rig = placed(with_lenses(first_rig(TWO, bare=True)))
     assert not step(rig).done and "half a frame" in step(rig).meaning
     left, right = rig.nodes
     measured = (left, msgspec.structs.replace(right, time_offset_s=0.0032, time_offset_sd_s=2e-4))

@@ -1,8 +1,8 @@
-"""AprilGrids in pictures: their tags are read by themselves, because black squares touch them in every corner.
+"""Detection of AprilGrids in pictures.
 
-The squares join all tags to one dark region. Where white is widened by some pixels they fall apart, as the squares of a
-chessboard do in OpenCV's findChessboardCorners; quadrilaterals are found there, and their bits are read in the picture
-itself.
+Black squares touch every corner of a tag and join all tags to one dark region, in which OpenCV's detector finds no tag.
+A dilation of white separates them, as in OpenCV's findChessboardCorners. Quadrilaterals are found in the dilated
+picture, and their bits are read in the picture itself.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ Gray = NDArray[np.uint8]
 
 _SMALL_PX = 1000  # longest side: pictures below are read at twice their size
 FEWEST_TAGS = 2
-"""From which on tags tell where the board is."""
+"""Fewest tags that locate the board."""
 
-_WIDENED_PX = (1, 2, 4)  # on each side
-_CELL_PX = 4
+_DILATIONS_PX = (1, 2, 4)  # of white, on each side
+_CELL_PX = 4  # side of a bit in the rectified tag
 _WRONG_BITS = 3  # of 36, at most; codes differ in 11 and more (Olson 2011, 36h11)
-_CLEAR = 0.8  # of the cells of the border, and beside it
+_CLEAR = 0.8  # least share of the border's cells that are dark, and of the cells around that are light
 _CONTRAST = 20.0  # grey levels
-_MOST = 0.7  # of the tags that are read
-_OFF = 0.2  # of a tag's side: tags farther from their place belong to another board
-_SPACING = 0.02  # of a tag's side: other spacings are another board
+_INLIERS = 0.7  # least share of the tags that are read
+_MISPLACED = 0.2  # of a tag's side: tags farther from their place belong to another board
+_SPACING_OFF = 0.02  # of a tag's side: spacings that differ by more are another board's
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,21 +74,21 @@ def measured_spacing(grid: Array) -> float:
 
 def has_spacing(grid: Array, board: AprilGrid) -> bool:
     """Whether the tags are as far apart as the board says, as far as that is seen."""
-    return not abs(measured_spacing(grid) - board.spacing) > _SPACING
+    return not abs(measured_spacing(grid) - board.spacing) > _SPACING_OFF
 
 
 def read_tags(gray: Gray, enlarged: float = 1.0, *, border: int = TAG_BORDER_BITS, enough: int = 1000) -> TagsSeen:
-    """Tags of the family, by a black border of `border` bits; `enlarged`: how many times more than usual; no more are
-    looked for than `enough`."""
+    """Tags with a black border of `border` bits. The picture is enlarged `enlarged` times, small ones twice as much.
+    Larger dilations are tried until `enough` tags are read."""
     scale = enlarged * (2.0 if max(gray.shape) < _SMALL_PX else 1.0)
     picture = gray if scale == 1.0 else np.asarray(cv2.resize(gray, None, fx=scale, fy=scale,
                                                               interpolation=cv2.INTER_CUBIC), np.uint8)
     best: dict[int, tuple[int, Array]] = {}
     doubled: set[int] = set()
-    for reach in _WIDENED_PX:
+    for dilation_px in _DILATIONS_PX:
         if len(best) >= enough:
             break
-        for number, wrong, corners in _tags(picture, reach, border):
+        for number, wrong, corners in _tags(picture, dilation_px, border):
             before = best.get(number)
             if before is not None and np.abs(before[1] - corners).max() > 0.5 * _side_px(corners):
                 doubled.add(number)
@@ -99,14 +99,13 @@ def read_tags(gray: Gray, enlarged: float = 1.0, *, border: int = TAG_BORDER_BIT
     return TagsSeen(ids, (corners + 0.5) / scale - 0.5)
 
 
-def _tags(picture: Gray, reach: int, border: int) -> list[tuple[int, int, Array]]:
-    """(number, wrong bits, corners (4, 2) px) of the tags whose quadrilaterals are seen with white widened by `reach`
-    px."""
+def _tags(picture: Gray, dilation_px: int, border: int) -> list[tuple[int, int, Array]]:
+    """(number, wrong bits, corners (4, 2) px) of the tags that a dilation of white by `dilation_px` separates."""
     cells = TAG_BITS + 2 * border
     around = cells + 2  # and what is beside the tag
     side, rim = cells * _CELL_PX, 1.0 * _CELL_PX
-    widened = cv2.dilate(picture, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
-    found, _, rejected = _quads().detectMarkers(widened)
+    kernel = np.ones(2 * (2 * dilation_px + 1,), np.uint8)
+    found, _, rejected = _detector().detectMarkers(cv2.dilate(picture, kernel))
     target = (np.array([[0, 0], [side, 0], [side, side], [0, side]]) + rim - 0.5).astype(np.float32)
     tags = []
     for quad in (np.asarray(one, np.float64).reshape(4, 2) for one in (*found, *rejected)):
@@ -114,7 +113,7 @@ def _tags(picture: Gray, reach: int, border: int) -> list[tuple[int, int, Array]
         if length < cells:  # less than a pixel a bit
             continue
         middle = quad.mean(axis=0)
-        quad = middle + (quad - middle) * (1.0 + 2.0 * reach / length)
+        quad = middle + (quad - middle) * (1.0 + 2.0 * dilation_px / length)
         turned = cv2.getPerspectiveTransform(quad.astype(np.float32), target)
         patch = cv2.warpPerspective(picture, turned, (around * _CELL_PX, around * _CELL_PX),
                                     borderMode=cv2.BORDER_REPLICATE).reshape(around, _CELL_PX, around, _CELL_PX)
@@ -126,8 +125,9 @@ def _tags(picture: Gray, reach: int, border: int) -> list[tuple[int, int, Array]
 
 
 def _decoded(cells: Array, border: int) -> tuple[int, int, int] | None:
-    """(number, quarter turns, wrong bits) of the grey levels of a tag's cells and of those around it; None where they
-    are no tag: its border dark, and light beside it but for the corners."""
+    """(number, quarter turns, wrong bits) of a tag, by the grey levels of its `cells` and of the ring around it.
+
+    None for no tag: its border is dark, and the ring is light but for the corners."""
     light = cells > 0.5 * float(cells.min() + cells.max())
     beside = np.concatenate([light[0, 1:-1], light[-1, 1:-1], light[1:-1, 0], light[1:-1, -1]])
     tag = light[1:-1, 1:-1]
@@ -151,10 +151,10 @@ def place_tags(seen: TagsSeen, board: AprilGrid) -> Array | None:
     if len(places) < FEWEST_TAGS:
         return None
     sides = float(np.median([_side_px(corners) for corners in seen.corners]))
-    _, inlier = cv2.findHomography(places.reshape(-1, 2), seen.corners.reshape(-1, 2), cv2.RANSAC, _OFF * sides)
+    _, inlier = cv2.findHomography(places.reshape(-1, 2), seen.corners.reshape(-1, 2), cv2.RANSAC, _MISPLACED * sides)
     fits = np.zeros(len(places), bool) if inlier is None else np.asarray(
         np.asarray(inlier, bool).reshape(-1, 4).all(axis=1))
-    if np.count_nonzero(fits) < max(FEWEST_TAGS, _MOST * len(fits)) or np.any(fits & (row >= board.tag_rows)):
+    if np.count_nonzero(fits) < max(FEWEST_TAGS, _INLIERS * len(fits)) or np.any(fits & (row >= board.tag_rows)):
         return None
     grid = np.full((board.rows, board.cols, 2), np.nan)
     top, left = 2 * (board.tag_rows - 1 - row[fits, None]), 2 * col[fits, None]
@@ -184,7 +184,7 @@ def tag_cells(number: int) -> NDArray[np.bool_]:
 
 
 @functools.lru_cache(maxsize=1)
-def _quads() -> cv2.aruco.ArucoDetector:
+def _detector() -> cv2.aruco.ArucoDetector:
     parameters = cv2.aruco.DetectorParameters()
     parameters.markerBorderBits = TAG_BORDER_BITS
     return cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11), parameters)

@@ -30,8 +30,8 @@ from rhot_app.errors import CalibrationError
 Array = NDArray[np.float64]
 
 DEFAULT_DICTIONARY = "DICT_4X4_50"
-FEWEST, MOST = 3, 60  # inner corners per side: OpenCV's detectors need three
-SMALLEST_M, LARGEST_M = 0.0005, 1.0  # a printed square
+FEWEST, MOST = 3, 60  # inner corners or circles per side: OpenCV's detectors need three
+SMALLEST_M, LARGEST_M = 0.0005, 1.0  # a printed square, tag or spacing
 
 
 class _Sized(Protocol):
@@ -92,10 +92,12 @@ class Lattice:
 class Chessboard(Lattice):
     """A plain chessboard with `cols` x `rows` inner corners (one less than squares) of `square_m` metres.
 
-    The first corner is the one whose outer square is black, where the colours tell the board's ends apart, that is when
-    one of `cols` and `rows` is odd and the other even (the common 9x6). Otherwise the pattern turned by 180 degrees is
-    the same pattern, and the first corner is the one towards the picture's upper left: then two cameras agree only
-    when both stand upright. Raises CalibrationError for impossible numbers.
+    When one of `cols` and `rows` is odd and the other even (the common 9x6), the colours tell the board's ends apart.
+    The first corner is then the one whose outer square is black. Otherwise the pattern turned by 180 degrees is the
+    same, and the first corner is the one towards the picture's upper left. Two cameras then agree only when both stand
+    upright.
+
+    Raises CalibrationError for impossible numbers.
     """
 
     cols: int
@@ -103,7 +105,8 @@ class Chessboard(Lattice):
     square_m: float
 
     def __post_init__(self) -> None:
-        _check(self.cols, self.rows, self.square_m)
+        _check(self.cols, self.rows)
+        _check_length(self.square_m, "square", "one side of a square")
 
     @property
     def one_way_up(self) -> bool:
@@ -138,7 +141,8 @@ class CharucoBoard(Lattice):
     legacy: bool = False
 
     def __post_init__(self) -> None:
-        _check(self.cols, self.rows, self.square_m)
+        _check(self.cols, self.rows)
+        _check_length(self.square_m, "square", "one side of a square")
         if not 0.2 * self.square_m < self.marker_m < 0.95 * self.square_m:
             raise CalibrationError(f"Markers of {self.marker_m * 1e3:g} mm do not go into squares of "
                                    f"{self.square_m * 1e3:g} mm: measure both, about 3:4 is usual.")
@@ -219,9 +223,7 @@ class AprilGrid(Lattice):
         if not (2 <= self.tag_cols <= MOST // 2 and 2 <= self.tag_rows <= MOST // 2):
             raise CalibrationError(f"An AprilGrid of {self.size_text} tags is not possible: each side has 2 to "
                                    f"{MOST // 2}.")
-        if not SMALLEST_M <= self.tag_m <= LARGEST_M:
-            raise CalibrationError(f"A tag of {self.tag_m * 1e3:g} mm is not possible: measure the black side of one "
-                                   f"and give it in millimetres, {SMALLEST_M * 1e3:g} to {LARGEST_M * 1e3:g}.")
+        _check_length(self.tag_m, "tag", "the black side of one")
         if not 0.1 <= self.spacing <= 1.0:
             raise CalibrationError(f"A spacing of {self.spacing:g} is not possible: it is the gap between two tags as "
                                    "a part of a tag's side, 0.3 for instance.")
@@ -293,7 +295,8 @@ class CircleGrid(Lattice):
     square_m: float
 
     def __post_init__(self) -> None:
-        _check(self.cols, self.rows, self.square_m)
+        _check(self.cols, self.rows, "circles")
+        _check_length(self.square_m, "spacing", "from one row of circles to the next")
 
     def object_points(self) -> Array:
         """(N, 3) m, the centres; every other row stands to the right by the spacing."""
@@ -370,13 +373,16 @@ def parse_size(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def _check(cols: int, rows: int, square_m: float) -> None:
+def _check(cols: int, rows: int, counted: str = "inner corners") -> None:
     if not (FEWEST <= cols <= MOST and FEWEST <= rows <= MOST):
-        raise CalibrationError(f"A board of {cols}x{rows} inner corners is not possible: each side has {FEWEST} to "
+        raise CalibrationError(f"A board of {cols}x{rows} {counted} is not possible: each side has {FEWEST} to "
                                f"{MOST}.")
-    if not SMALLEST_M <= square_m <= LARGEST_M:
-        raise CalibrationError(f"A square of {square_m * 1e3:g} mm is not possible: measure one side of a square and "
-                               f"give it in millimetres, {SMALLEST_M * 1e3:g} to {LARGEST_M * 1e3:g}.")
+
+
+def _check_length(length_m: float, name: str, measured: str) -> None:
+    if not SMALLEST_M <= length_m <= LARGEST_M:
+        raise CalibrationError(f"A {name} of {length_m * 1e3:g} mm is not possible: measure {measured} and give it in "
+                               f"millimetres, {SMALLEST_M * 1e3:g} to {LARGEST_M * 1e3:g}.")
 
 
 STANDARD_BOARD = Chessboard(*parse_size(BOARD), 1e-3 * SQUARE_MM)

@@ -1,8 +1,8 @@
 """OpenCV's asymmetric grid of circles in pictures: each centre to a hundredth of a pixel.
 
-The middle of a circle's picture is not the picture of its middle: perspective and distortion move it (Heikkila 2000).
-By how much follows from the grid itself: a smooth map from the board to the picture is fitted to all centres, and
-carries the circles' rims along.
+The centroid of a circle's image is not the image of its centre: perspective and distortion move it (Heikkila 2000).
+The bias follows from the grid itself: a smooth map from the board to the picture is fitted to all centres, and the
+circles' rims are mapped by it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _OFF = 0.25  # of the spacing: centres farther from their places are of another 
 _WINDOW = 0.5 * float(np.sqrt(2.0))  # of the spacing: halfway to the nearest circle
 _PAPER = (0.75, 0.95)  # of the spacing, from a circle's middle: there, between its neighbours, is white paper
 _CONTRAST = 10.0  # grey levels
-_ROUNDS = 3
+_ITERATIONS = 3
 _STEP = 2.0 * np.pi / 24
 _RIM = np.sqrt(_STEP / np.sin(_STEP)) * np.exp(1j * _STEP * np.arange(24))  # a polygon of the circle's area
 
@@ -97,10 +97,10 @@ def _blobs(picture: Gray) -> cv2.SimpleBlobDetector:
 # -- centres to a fraction of a pixel ----------------------------------------------------------------------------------
 
 def _refined(gray: Gray, rough: Array, board: CircleGrid) -> Centres | None:
-    """The circles' centres (N, 2): centroids of their ink, less what perspective and distortion move these by."""
+    """The circles' centres (N, 2): centroids of their ink, less the bias by perspective and distortion."""
     places = board.object_points()[:, :2] / board.square_m
     pixels = rough
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATIONS):
         smooth = _SmoothMap.fit(places, pixels)
         measured = [_ink(gray, pixel, slope) for pixel, slope in zip(pixels, smooth.slopes(places), strict=True)]
         if any(one is None for one in measured):
@@ -173,7 +173,7 @@ class _SmoothMap:
                          for move in (np.array([step, 0.0]), np.array([0.0, step]))], axis=-1)
 
     def displacements(self, places: Array, radius: float) -> Array:
-        """(N, 2) px, how far the middles of circles' pictures are from the pictures of their middles."""
+        """(N, 2) px, from the images of the circles' centres to the centroids of the circles' images."""
         rims = self(places[:, None] + radius * np.stack([_RIM.real, _RIM.imag], -1))
         return np.array([_centroid(rim) for rim in rims]) - self(places)
 

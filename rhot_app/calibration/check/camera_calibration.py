@@ -91,13 +91,14 @@ def offset_text(node: RigNode) -> str:
 
 def times_text(rig: Rig) -> str:
     """How far apart the cameras' times are, in a sentence."""
-    unknown, first = times_unknown(rig), rig.nodes[0].name
-    if unknown:
-        return (f"Not known for {' and '.join(unknown)}: cameras that are not synchronised may be up to half a frame "
-                "apart.")
     if rig.calibration is not None and rig.calibration.method == "exact":
         return "As simulated."
-    return " ".join(f"{node.name} against {first}: {offset_text(node)}." for node in rig.nodes[1:])
+    first, *others = rig.nodes
+    unknown = [node.name for node in others if node.time_offset_sd_s is None]
+    if unknown or not others:
+        return (f"Not measured{' for ' if unknown else ''}{' and '.join(unknown)}: cameras that are not synchronised "
+                "may be up to half a frame apart.")
+    return " ".join(f"{node.name} against {first.name}: {offset_text(node)}." for node in others)
 
 
 def lengths_text(rig: Rig) -> str:

@@ -64,9 +64,11 @@ class Moment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilmFrames:
-    """The `moments` that were chosen of films, in the order of time; how many frames were `searched` of each film, in
-    how many of them the board was `found`, the frame of each in which it is `stillest`, with its view, and of films
-    without a board some pictures, to find out why."""
+    """The `moments` that were chosen of films, in the order of time.
+
+    `searched`: how many frames of each film. For each film, `found`: in how many of them the board is; `stillest`: the
+    frame in which it moves least, with its view; `unexplained`: some pictures where it has no board, to find out why.
+    """
 
     moments: tuple[Moment, ...]
     searched: int

@@ -1,4 +1,4 @@
-"""What is still to be done: what somebody has, one camera or two, and the steps that follow, with ticks."""
+"""The panel of the next steps: two questions about what is there, and the steps that follow, with ticks."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class NextSteps(QWidget):
         self._timer.start()
 
     def begin(self) -> None:
-        """Show the steps of the rig that is open, by what it says of itself."""
+        """Answer the questions by the rig that is open, and show its steps."""
         rig = self._rig()
         if rig is not None:
             answers = answers_of(rig)
@@ -190,14 +190,12 @@ class NextSteps(QWidget):
 
 
 def _write_board(path: Path) -> Path:
-    """The usual chessboard on A4. Raises CalibrationError."""
-    from rhot_app.calibration.board.boards import Chessboard, parse_size
-    from rhot_app.calibration.board.standard_board import BOARD as SIZE
-    from rhot_app.calibration.board.standard_board import SQUARE_MM
+    """Write the standard chessboard on A4. Raises RhotError."""
+    from rhot_app.calibration.board.boards import STANDARD_BOARD
     from rhot_app.calibration.board.target import write_target
 
     try:
-        write_target(path, Chessboard(*parse_size(SIZE), 1e-3 * SQUARE_MM), "A4")
+        write_target(path, STANDARD_BOARD, "A4")
     except OSError as exc:
         raise RhotError(f"{path}: cannot be written ({exc.strerror}).") from exc
     return path

@@ -36,7 +36,7 @@ class Step:
 
 
 def answers_of(rig: Rig) -> Answers:
-    """What the rig as it is would be answered."""
+    """The answers that fit the rig as it is."""
     return Answers("paint" if rig.painted else "bare", 1 if len(rig.nodes) == 1 else 2)
 
 

@@ -18,6 +18,7 @@ from rhot_app.calibration.verdict import Finding
 from rhot_app.progress import Progress, within
 from rhot_app.sources.film_offset import FilmOffset, offset_sentence, offsets_of
 from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.wizards.models.board_form import OTHER_BOARD
 from rhot_app.ui.wizards.models.drawing import board_marks
 from rhot_app.ui.wizards.models.step import AnnotatedPicture, Step, StepView, Task
 
@@ -27,8 +28,11 @@ Began = Literal["together", "sound", "flash"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilmShots:
-    """What films show: the `shots` that were chosen, a view of each camera or None, what they say of the board's size,
-    the frame in which each camera's board is `stillest`, and the `offsets` of films that were aligned."""
+    """What films show: the `shots` that were chosen, each with a view of each camera or None.
+
+    `size`: what they say against the board's size. `stillest`: the frame in which each camera's board moves least.
+    `offsets`: of films that were aligned.
+    """
 
     shots: tuple[BoardShot, ...]
     size: Finding | None
@@ -104,8 +108,8 @@ class Films:
             sentence = "Choose another film, or the live cameras." if self.problem else "One moment: films are read."
             return StepView(sentence, hint=self.problem)
         if self.read.size is not None:
-            return StepView("Go back: the board is another one than the form says.",
-                            hint=f"{self.read.size.figure} {self.read.size.cause}", annotated=self.read.stillest)
+            return StepView(OTHER_BOARD, hint=f"{self.read.size.figure} {self.read.size.cause}",
+                            annotated=self.read.stillest)
         said = f"{len(self.read.shots)} frames were chosen."
         if self.read.offsets:
             said += f" {offset_sentence(self.read.offsets, self.began)}"
@@ -137,7 +141,7 @@ class FilmedStep(Step):
         raise NotImplementedError
 
     def use_live(self) -> None:
-        """No films any more."""
+        """Leave the films out, and what was taken of them."""
         self.films.forget()
         self.begin()
 
