@@ -272,9 +272,8 @@ def one_camera_advice(rig: Rig) -> list[Advice]:
         return [Advice("info", f"{by} alone does not find a hand by painted markers. {remedy}, or track a bare hand.",
                        mender, lasting=True, subject="calibration")]
     waiting = f" until {names} {'is' if len(apart) == 1 else 'are'} put together with it" if apart else ""
-    guess = ("" if len(used) > 1 else " How far the hand is follows from its size"
-             + (f" and a lens that is assumed to see {Intrinsics.ASSUMED_DEG:.0f} degrees: a guess."
-                if used[0].intrinsics.nominal else "."))
+    guess = ("" if len(used) > 1 else " The distance is a guess, by the hand's size"
+             + (f" and an assumed lens ({Intrinsics.ASSUMED_DEG:.0f} degrees)." if used[0].intrinsics.nominal else "."))
     return [Advice("info", f"{by} alone tracks the hand{waiting}.{guess}", mender, lasting=True,
                    subject="calibration")]
 

@@ -103,7 +103,8 @@ def assumed_rig(videos: list[str]) -> Rig:
     """A rig of one camera whose lens is assumed, for one video. Raises RecordingError."""
     if len(videos) != 1:
         raise RecordingError(f"{len(videos)} videos need a calibrated rig with a camera for each; give it with --rig. "
-                             "One video alone is tracked without." if videos else
+                             "rhot calibrate stereo makes one from films of a board, rhot calibrate import from "
+                             "another program's calibration. One video alone is tracked without." if videos else
                              "give a video, or a rig with --rig and a video of each camera.")
     lens = Intrinsics.assumed(*picture_size(input_file(videos[0])))
     return Rig("one assumed camera", (RigNode(1, "camera", lens),))

@@ -92,7 +92,7 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
         rig = assumed_rig(paths)
         lens = rig.nodes[0].intrinsics
         said.append(f"Without --rig the lens is assumed to see {lens.ASSUMED_DEG:.0f} degrees across (focal length "
-                    f"{lens.fx:.0f} px) and the hand to be of usual size; distances are as wrong as these.")
+                    f"{lens.fx:.0f} px) and the hand to be of usual size; distances are wrong by as much as these are.")
         given = {rig.nodes[0].name: paths[0]}
     from rhot_app.progress import ProgressLine
     from rhot_node.compiled import announce_compilation

@@ -170,13 +170,13 @@ def test_what_one_camera_cannot_know_is_said() -> None:
     rig = Rig("bare", painted.nodes)
     assert one_camera_advice(rig) == []
     alone, = one_camera_advice(msgspec.structs.replace(rig, nodes=(left,)))
-    assert "left alone" in alone.text and "assumed to see 60" in alone.text and not alone.mender
+    assert "left alone" in alone.text and "assumed lens (60" in alone.text and not alone.mender
     apart = msgspec.structs.replace(rig, nodes=(left, msgspec.structs.replace(right, pose_known=False)))
     advice, = one_camera_advice(apart)
     assert "until right is put together" in advice.text and advice.mender == "stereo"
     calibrated = msgspec.structs.replace(left, intrinsics=Intrinsics(640, 480, 530.0, 530.0, 318.0, 240.0))
     known, = one_camera_advice(msgspec.structs.replace(rig, nodes=(calibrated,)))
-    assert "its size" in known.text and "assumed" not in known.text
+    assert "the hand's size" in known.text and "assumed" not in known.text
     findings = check_rig(msgspec.structs.replace(apart, nodes=(calibrated, msgspec.structs.replace(
         apart.nodes[1], intrinsics=calibrated.intrinsics)))).verdict.findings
     codes = {finding.code for finding in findings}

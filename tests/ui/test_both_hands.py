@@ -14,6 +14,8 @@ from two_hands_engine import ASIDE, TwoHandsEngine, one_hand_rig, two_hand_rig
 
 from rhot_app.engine import status
 from rhot_app.project import TrackerSettings
+from rhot_app.simulator.nodes.landmark_detector import landmark_rig
+from rhot_app.state import Condition, no_hand
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.models.words import hand_names
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
@@ -182,6 +184,15 @@ def test_every_marker_has_one_label(scene, state):
     places, texts = scene.marker_labels()
     assert sorted(texts) == sorted(two_hand_rig().markers.ids)
     assert np.asarray(places) == pytest.approx(to_display(state.marker_positions))
+
+
+def test_of_landmarks_wrist_and_fingertips_have_labels(themed, qtbot):
+    rig, view = landmark_rig(), SceneView(DARK)
+    qtbot.addWidget(view)
+    view.show_rig(rig)
+    state = no_hand(0, Condition.TRACKING, tuple(node.name for node in rig.nodes), markers=rig.markers.ids)
+    view.show_state(replace(state, marker_positions=np.zeros((21, 3))))
+    assert len(view.marker_labels()[1]) == len(view.marker_labels()[0]) == 6
 
 
 def test_both_stand_on_a_table(state):

@@ -137,9 +137,10 @@ def board_of(args: argparse.Namespace) -> Board:
     from rhot_app.calibration.exchange.boards import SUFFIXES, read_board
 
     if args.board is not None and args.board.lower().endswith(SUFFIXES):
-        if any(one is not None for one in (args.board_kind, args.square_mm, args.marker_mm, args.tag_spacing)):
-            raise CalibrationError(f"{args.board} says what the board is; leave --kind, --square-mm, --marker-mm and "
-                                   "--tag-spacing out, or give the size by numbers.")
+        told = (args.board_kind, args.square_mm, args.marker_mm, args.tag_spacing)
+        if any(one is not None for one in told) or args.dictionary or args.legacy_pattern:
+            raise CalibrationError(f"{args.board} says what the board is; leave --kind, --square-mm, --marker-mm, "
+                                   "--tag-spacing, --dictionary and --legacy-pattern out, or give the size by numbers.")
         return read_board(input_file(args.board))
     kind = args.board_kind or ("chessboard" if args.marker_mm is None else "charuco")
     return make_board(kind, args.board, square_mm=args.square_mm, marker_mm=args.marker_mm,

@@ -176,9 +176,12 @@ def _yaml(text: str, path: Path) -> Any:
                 parts = open_parts.pop()
                 open_parts[-1].append(_table(parts, path) if isinstance(event, yaml.MappingEndEvent) else parts)
     except yaml.YAMLError as exc:
-        what = printable(" ".join(str(exc).split()))[:200]
-        raise CalibrationError(f"{path}: not valid YAML ({what}). Files of OpenCV, ROS and "
-                               "Kalibr (YAML), anipose and caliscope (TOML) are read.") from exc
+        mark = getattr(exc, "problem_mark", None)
+        where = "" if mark is None else f"line {mark.line + 1}: "
+        what = printable(" ".join(str(getattr(exc, "problem", None) or exc).split()))[:80]
+        raise CalibrationError(f"{path}: none of the files that are read: those of OpenCV, ROS and Kalibr are YAML, "
+                               f"which this is not ({where}{what}); those of anipose and caliscope end in .toml."
+                               ) from exc
     if len(open_parts[0]) != 1:
         raise CalibrationError(f"{path}: one document is needed, it has {len(open_parts[0])}.")
     return open_parts[0][0]

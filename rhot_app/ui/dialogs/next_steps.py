@@ -65,7 +65,7 @@ class NextSteps(QWidget):
         self.marks = [ShapeMark(16) for _ in range(_MOST_STEPS)]
         self.buttons = [QPushButton() for _ in range(_MOST_STEPS)]
         self.verdict = Sentence(2)
-        self.never = QCheckBox("Not by itself any more")
+        self.never = QCheckBox("Do not open by itself")
         self.never.setToolTip("Do not show these steps by themselves. Calibrate, What to do next shows them.")
         self.never.setChecked(not settings.flag(NEXT_STEPS))
         self.never.toggled.connect(lambda never: settings.set_flag(NEXT_STEPS, not never))

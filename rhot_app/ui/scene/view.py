@@ -215,10 +215,15 @@ class SceneView(GLViewWidget):
         return pixels_of(to_display(camera_like(places, self._up)), self._projection(), (self.width(), self.height()))
 
     def marker_labels(self) -> tuple[Array, list[str]]:
-        """Where the markers' names stand, (N, 3) m in the scene's frame, and these names; none without a state."""
-        if self._state is None or not self._show_labels:
+        """Where the markers' names stand, (N, 3) m in the scene's frame, and these names; none without a state. Of
+        landmarks only wrist and fingertips have one: twenty-one would cover the hand."""
+        if self._state is None or self._rig is None or not self._show_labels:
             return np.empty((0, 3)), []
-        return to_display(self._state.marker_positions), [short_name(name) for name in self._state.marker_ids]
+        inner = {marker.id for marker in self._rig.markers.markers if marker.shape == "landmark"
+                 and not (marker.role or "").endswith(("_tip", "_wrist"))}
+        named = [k for k, name in enumerate(self._state.marker_ids) if name not in inner]
+        return (to_display(self._state.marker_positions[named]),
+                [short_name(self._state.marker_ids[k]) for k in named])
 
     def _projection(self) -> QMatrix4x4:
         return self.projectionMatrix(self.getViewport(), self.getViewport()) * self.viewMatrix()
