@@ -251,6 +251,20 @@ def test_one_camera_alone_begins_with_a_hand_of_the_files_size():
     assert np.abs(errors @ line).max() < 0.15 * DISTANCE_M
 
 
+def test_what_one_camera_cannot_show_lies_along_its_own_rays():
+    """The other one, 40 degrees aside, delivers frames without a hand; they are the newest half of the time."""
+    blind = [replace(frame, pixels=np.full_like(frame.pixels, np.nan), flags=np.full_like(
+        frame.flags, int(MarkerFlag.LOST))) if frame.camera else frame for frame in detected_landmarks(RIG, hand(), 1)]
+    tracked = [state for state in states_of(RIG, blind) if state.tracked][-20:]
+    assert len(tracked) == 20
+    centre = np.array(RIG.nodes[0].pose.translation_m)
+    for state in tracked:
+        assert state.condition is Condition.PARTIAL
+        away = state.joint_positions[0] - centre
+        longest = np.linalg.eigh(state.joint_covariances[0])[1][:, -1]
+        assert abs(longest @ away) > np.cos(np.radians(8.0)) * np.linalg.norm(away)
+
+
 def test_a_hand_that_one_camera_sees_a_moment_before_the_other_is_tracking_with_both():
     frames = [frame for frame in detected_landmarks(RIG, hand(), 1)
               if frame.camera == 0 or frame.t_row0_master_ns > EPOCH_NS + 10**8]

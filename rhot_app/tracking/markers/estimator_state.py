@@ -181,7 +181,8 @@ class EstimatorStates:
                    rig.cameras, self._shapes, raw, raw_covariances, errors)
         if by_one:
             covariance = covariance.copy()
-            self._doubt_distance(newest.camera, points, covariances, state, covariance)
+            seeing = int(np.argmax(observations.times.max(axis=1)))
+            self._doubt_distance(seeing, points, covariances, state, covariance)
         palm = _conclude(covariance, covariances, shown, m.finger, markers, joints, angles, angle_sd)
         # two frames may be missing, but not of most markers: without any, a fast hand is centimetres off
         in_sight = (not by_one
