@@ -20,6 +20,14 @@ from rhot_app.hand.skeleton import ANGLES
 from rhot_app.objects.object_file import Name, ObjectModel, load_object, require_distinct
 from rhot_node.files import decode_document, read_document, read_json, resource_path, write_document
 from rhot_node.markers import MarkerSet, load_markers
+from rhot_node.wire.messages import (
+    BROADCAST_PORT,
+    CONTROL_PORT,
+    PAIRING_PORT,
+    PREVIEW_PORT,
+    U32_MAX,
+    UDP_PORT,
+)
 
 FORMAT: Final = "rhot-rig"
 VERSION: Final = 1
@@ -93,19 +101,19 @@ class CameraPose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class RigNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One camera node: how to reach it and how its camera looks at the world."""
 
-    node_id: Annotated[int, Meta(ge=1, le=2**32 - 1)]
+    node_id: Annotated[int, Meta(ge=1, le=U32_MAX)]
     name: Name
     intrinsics: Intrinsics
     pose: CameraPose = CameraPose()
     address: Address = "127.0.0.1"
-    udp_port: Port = 47800  # the node's: start, stop, clock
-    control_port: Port = 47801  # the node's: settings, state, stills
-    preview_port: Port = 47802  # the node's: preview stream
+    udp_port: Port = UDP_PORT  # the node's: start, stop, clock
+    control_port: Port = CONTROL_PORT  # the node's: settings, state, stills
+    preview_port: Port = PREVIEW_PORT  # the node's: preview stream
     data_port: Port = 0  # the master's: observations; 0 takes any free port and tells the node
     text_datagrams: bool = False  # accept the thesis's text datagrams on data_port (untrusted)
     time_offset_s: Annotated[float, Meta(ge=-10, le=10)] = 0.0  # calibrated correction added to this camera's times
     time_offset_sd_s: Annotated[float, Meta(ge=0, le=10)] | None = None  # of that; None: nobody has measured it
-    pairing_port: Port = 47803  # the node's: who it is, pairing
+    pairing_port: Port = PAIRING_PORT  # the node's: who it is, pairing
     public_key: PublicKey = ""  # the node's; empty: the node is not paired, and what it says is untrusted
     pose_known: bool = True  # whether `pose` was measured or set; without, the camera is shown and not tracked with
 
@@ -119,7 +127,7 @@ class Broadcast(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where start and stop are broadcast, besides being sent to every node's own address."""
 
     address: Address = "255.255.255.255"
-    port: Port = 47799
+    port: Port = BROADCAST_PORT
 
 
 class OneEuroSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

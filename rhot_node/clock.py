@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import socket
 import struct
 import time
@@ -27,22 +28,24 @@ class NodeClock:
         """Node time at which this machine's monotonic clock shows `t_host_ns`."""
         return t_host_ns + self.offset_ns + round((t_host_ns - self.origin_ns) * self.drift_ppm * 1e-6)
 
-    def to_host_ns(self, t_node_ns: int) -> int:
-        """Inverse of `from_host_ns`, to the nanosecond rounding."""
-        elapsed = (t_node_ns - self.offset_ns - self.origin_ns) / (1.0 + self.drift_ppm * 1e-6)
-        return self.origin_ns + round(elapsed)
-
 
 # -- kernel receive time -----------------------------------------------------------------------------------------------
 # The kernel stamps with the wall clock (SO_TIMESTAMPNS). It is brought to the monotonic clock by their difference
 # measured right after the read; when the wall clock was set in between, the stamp is not used.
 
-SO_TIMESTAMPNS = 35  # Linux; not in the socket module of Python 3.11
-SO_RXQ_OVFL = 40
-ANCILLARY_SIZE = socket.CMSG_SPACE(16) + socket.CMSG_SPACE(4)
+class LinuxOption(enum.IntEnum):
+    """Options of sockets that the module `socket` does not name (Linux, asm-generic/socket.h)."""
 
+    RCVBUFFORCE = 33
+    TIMESTAMPNS = 35
+    RXQ_OVFL = 40
+
+
+_TIMESTAMPNS, _RXQ_OVFL = int(LinuxOption.TIMESTAMPNS), int(LinuxOption.RXQ_OVFL)
 _TIMESPEC = struct.Struct("@ll")
 _COUNT = struct.Struct("@I")
+ANCILLARY_SIZE = socket.CMSG_SPACE(_TIMESPEC.size) + socket.CMSG_SPACE(_COUNT.size)
+
 _STEP_NS = 300_000  # more than reading two clocks can differ by
 _PAUSE_NS = 20_000  # between two looks at clocks: somebody else had the processor
 _ATTEMPTS = 4
@@ -54,8 +57,8 @@ Ancillary = list[tuple[int, int, bytes]]
 
 def ask_for_times(sock: socket.socket) -> None:
     """Have the kernel stamp every datagram and tell how many it had to drop."""
-    sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
-    sock.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
+    sock.setsockopt(socket.SOL_SOCKET, LinuxOption.TIMESTAMPNS, 1)
+    sock.setsockopt(socket.SOL_SOCKET, LinuxOption.RXQ_OVFL, 1)
 
 
 class KernelTime:
@@ -69,10 +72,10 @@ class KernelTime:
         """Monotonic time at which the kernel received the datagram that was just read, and now, ns."""
         stamp_ns = None
         for _, kind, data in ancillary:
-            if kind == SO_TIMESTAMPNS and len(data) >= _TIMESPEC.size:
+            if kind == _TIMESTAMPNS and len(data) >= _TIMESPEC.size:
                 seconds, nanoseconds = _TIMESPEC.unpack_from(data)
                 stamp_ns = seconds * 1_000_000_000 + nanoseconds
-            elif kind == SO_RXQ_OVFL and len(data) >= _COUNT.size:
+            elif kind == _RXQ_OVFL and len(data) >= _COUNT.size:
                 self.overflowed = _COUNT.unpack_from(data)[0]
         difference_ns, now_ns = _measure()
         change_ns = abs(difference_ns - self._difference_ns)

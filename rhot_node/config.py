@@ -11,9 +11,17 @@ from msgspec import Meta
 
 from rhot_node.clock import NodeClock
 from rhot_node.errors import SettingsError
-from rhot_node.files import PRINTABLE, decode_document, read_document, write_document
+from rhot_node.files import PRINTABLE, read_document, write_document
 from rhot_node.markers import MarkerSet
-from rhot_node.wire.messages import FAMILIES
+from rhot_node.wire.messages import (
+    BROADCAST_PORT,
+    CONTROL_PORT,
+    FAMILIES,
+    PAIRING_PORT,
+    PREVIEW_PORT,
+    U32_MAX,
+    UDP_PORT,
+)
 
 FORMAT: Final = "rhot-node"
 VERSION: Final = 1
@@ -91,14 +99,14 @@ class ClockSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Everything a node is told. A port of 0 takes any free one."""
 
-    node_id: Annotated[int, Meta(ge=1, le=2**32 - 1)]
+    node_id: Annotated[int, Meta(ge=1, le=U32_MAX)]
     name: Annotated[str, Meta(min_length=1, max_length=64, pattern=PRINTABLE)]
     markers: MarkerSet
     bind_address: str = "0.0.0.0"
-    udp_port: Port = 47800
-    control_port: Port = 47801
-    preview_port: Port = 47802
-    broadcast_port: Annotated[int, Meta(ge=1, le=65535)] | None = 47799
+    udp_port: Port = UDP_PORT
+    control_port: Port = CONTROL_PORT
+    preview_port: Port = PREVIEW_PORT
+    broadcast_port: Annotated[int, Meta(ge=1, le=65535)] | None = BROADCAST_PORT
     detector: str = "fast"
     """Or "reference"; "landmarks" or "landmarks:lite": the hand networks beside "fast"; "keypoints:NAME", a model card;
     "plug:NAME", a detector plug-in."""
@@ -108,7 +116,7 @@ class NodeSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     late_frames: Literal["send", "drop"] = "send"  # frames whose processing took longer than the budget (RHOT 7.2)
     budget_ms: Annotated[float, Meta(gt=0, le=10_000)] | None = None  # None: as long as a frame lasts
     clock: ClockSettings = ClockSettings()
-    pairing_port: Port = 47803
+    pairing_port: Port = PAIRING_PORT
     trust: Literal["paired", "open"] = "paired"  # open: whoever reaches the node may do everything with it
     announce: bool = True  # by zeroconf, unless the node is bound to this machine
     format: Literal["rhot-node"] = FORMAT
@@ -143,11 +151,6 @@ RESTART_FIELDS = ("node_id", "bind_address", "udp_port", "control_port", "previe
 def load_settings(path: Path) -> NodeSettings:
     """Read a settings file; raises SettingsError naming file and field."""
     return read_document(path, NodeSettings, format_name=FORMAT, version=VERSION, error=SettingsError)
-
-
-def parse_settings(data: bytes, where: str) -> NodeSettings:
-    """Decode a settings document; `where` begins every error message. Raises SettingsError."""
-    return decode_document(data, NodeSettings, format_name=FORMAT, version=VERSION, where=where, error=SettingsError)
 
 
 def save_settings(path: Path, settings: NodeSettings) -> None:

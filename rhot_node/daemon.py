@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Reporting, Rewindable
+from rhot_node.capture.camera import FIRST_FRAME_S, Camera, EndOfRecording, Frame, Reporting, Rewindable
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings, NodeSettings
 from rhot_node.detect.image import Detector
@@ -25,6 +25,7 @@ from rhot_node.slice_search import SliceSearch
 from rhot_node.tag_search import TagSearch
 from rhot_node.threads import Watch, complaints
 from rhot_node.wire.messages import (
+    U32_MAX,
     Fiducials,
     ForegroundPart,
     HandLandmarks,
@@ -38,9 +39,8 @@ log = logging.getLogger(__name__)
 
 READ_S = 0.05  # how long to wait for a frame before looking at everything else
 REOPEN_S = 1.0  # between tries to open a lost camera
-U32_MAX = 2**32 - 1
 _LIGHT_PERIOD_S = 1.0
-_OPENING_S = 10.0  # a webcam is given five seconds for its first frame
+_OPENING_S = 2.0 * FIRST_FRAME_S
 _READS = "reads the camera"
 _SENDS = "sends what was found"
 

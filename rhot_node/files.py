@@ -25,23 +25,28 @@ from rhot_node.errors import nearest, printable
 
 T = TypeVar("T")
 
-BYTES_MAX: Final = 256 << 20
+KIB: Final = 1 << 10
+MIB: Final = 1 << 20
+"""Bytes (IEC 80000-13)."""
+
+BYTES_MAX: Final = 256 * MIB
 """Of a file that is read as a whole: an uncompressed picture of a large camera, a network."""
 
-TABLE_BYTES_MAX: Final = 64 << 20
+TABLE_BYTES_MAX: Final = 64 * MIB
 TABLE_LINES_MAX: Final = 1_000_000
 """Of a text table: an hour of landmarks at 100 Hz has a third of either."""
 
-ARRAYS_BYTES_MAX: Final = 512 << 20
+ARRAYS_BYTES_MAX: Final = 512 * MIB
 """Of the arrays in an archive, unpacked."""
 
-JSON_BYTES_MAX: Final = 16 << 20
+JSON_BYTES_MAX: Final = 16 * MIB
 JSON_DEPTH_MAX: Final = 64
 """Objects and lists within each other; the deepest of our documents has nine."""
 
 PRINTABLE: Final = r"\A[^\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]*\Z"
 """Pattern of a field that people read: no control characters, also not those that turn the direction of writing."""
 
+_READABLE = stat.S_IRUSR | stat.S_IWUSR | stat.S_IRGRP | stat.S_IROTH
 _STRING = re.compile(rb'"(?:[^"\\]++|\\.)*+"', re.DOTALL)
 _BRACKETS = re.compile(rb"[\[\]{}]")
 _OTHER_FILES = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"),
@@ -93,7 +98,7 @@ def decode_json(data: bytes, where: str, error: type[Exception], format_name: st
     Raises `error`: not JSON, more than 16 MiB, nested deeper than 64, or a number that is not finite.
     """
     if len(data) > JSON_BYTES_MAX:
-        raise error(f"{where}: more than {JSON_BYTES_MAX >> 20} MiB, so no {format_name} file. Is it the right file?")
+        raise error(f"{where}: more than {JSON_BYTES_MAX // MIB} MiB, so no {format_name} file. Is it the right file?")
     if _depth(data) > JSON_DEPTH_MAX:
         raise error(f"{where}: lists and objects nested deeper than {JSON_DEPTH_MAX}, so no {format_name} file. "
                     "Is it the right file?")
@@ -233,7 +238,7 @@ def read_input(path: Path, limit: int = BYTES_MAX) -> bytes:
     with open_input(path) as file:
         data = file.read(limit + 1)
     if len(data) > limit:
-        size = f"{limit >> 20} MiB" if limit >= 1 << 20 else f"{limit >> 10} KiB"
+        size = f"{limit // MIB} MiB" if limit >= MIB else f"{limit // KIB} KiB"
         raise OSError(errno.EFBIG, f"it has more than {size}", str(path))
     return data
 
@@ -254,7 +259,7 @@ def open_archive(path: Path) -> Iterator[BinaryIO]:
         with zipfile.ZipFile(file) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
         if size > ARRAYS_BYTES_MAX:
-            raise OSError(errno.EFBIG, f"it unpacks to more than {ARRAYS_BYTES_MAX >> 20} MiB", str(path))
+            raise OSError(errno.EFBIG, f"it unpacks to more than {ARRAYS_BYTES_MAX // MIB} MiB", str(path))
         file.seek(0)
         yield file
 
@@ -333,8 +338,7 @@ def replacing(path: Path, *, private: bool = False) -> Iterator[BinaryIO]:
             file.flush()
             os.fsync(file.fileno())
         if not private:
-            mode = path.stat().st_mode & 0o777 if path.exists() else 0o644
-            Path(name).chmod(mode)
+            Path(name).chmod(stat.S_IMODE(path.stat().st_mode) if path.exists() else _READABLE)
         Path(name).replace(path)
         sync_folder(path)
     except BaseException:

@@ -14,9 +14,7 @@ from rhot_node.capture.camera import Frame
 from rhot_node.clock import NodeClock
 from rhot_node.network.session import Stream
 from rhot_node.threads import HANG_S, Worker
-from rhot_node.wire.messages import Fiducials, ForegroundPart, HandLandmarks, SliceEdges
-
-U32_MAX = 2**32 - 1
+from rhot_node.wire.messages import U32_MAX, Fiducials, ForegroundPart, HandLandmarks, SliceEdges
 
 Work = TypeVar("Work")
 Found = Fiducials | HandLandmarks | SliceEdges | ForegroundPart

@@ -11,11 +11,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from rhot_node.files import MIB
+
 PERIOD_S: Final = 60.0
 LINES_AT_ONCE: Final = 10
 """Lines of one place in the program: so many, then one in each period."""
 
-LOG_BYTES_MAX: Final = 1 << 20
+LOG_BYTES_MAX: Final = MIB
 """A log file is kept aside when it is longer, and the one before it removed."""
 
 _SUBJECTS_MAX = 32  # told apart at a time; all further ones count as one

@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from rhot_node.errors import SettingsError
-from rhot_node.files import PRINTABLE, decode_document, read_document, write_document
+from rhot_node.files import PRINTABLE, read_document, write_document
 
 FORMAT: Final = "rhot-markers"
 VERSION: Final = 1
@@ -137,11 +137,6 @@ class MarkerSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def load_markers(path: Path) -> MarkerSet:
     """Read a marker file; raises SettingsError naming file and field."""
     return read_document(path, MarkerSet, format_name=FORMAT, version=VERSION, error=SettingsError)
-
-
-def parse_markers(data: bytes, where: str) -> MarkerSet:
-    """Decode a marker document from bytes; `where` names its origin in errors. Raises SettingsError."""
-    return decode_document(data, MarkerSet, format_name=FORMAT, version=VERSION, where=where, error=SettingsError)
 
 
 def save_markers(path: Path, markers: MarkerSet) -> None:

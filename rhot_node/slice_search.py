@@ -18,12 +18,12 @@ from rhot_node.detect.edges import Edges, find_edges, noise_of
 from rhot_node.detect.foreground import foreground_map
 from rhot_node.detect.image import YuvImage
 from rhot_node.foreground_store import ForegroundStore, rgb_of
-from rhot_node.frame_search import U32_MAX, FrameSearch, SearchSender, Waiting
+from rhot_node.frame_search import FrameSearch, SearchSender, Waiting
 from rhot_node.network.session import Stream
 from rhot_node.wire.codec import EDGES_FIT, FOREGROUND_FIT
 from rhot_node.wire.edges import pack_edges
 from rhot_node.wire.foreground_map import pack_map
-from rhot_node.wire.messages import ForegroundPart, SliceEdges, Slices
+from rhot_node.wire.messages import U32_MAX, ForegroundPart, SliceEdges, Slices
 from rhot_node.wire.slices import unpack_slices
 
 VALID_S = 1.0

@@ -37,6 +37,7 @@ from rhot_node.wire.messages import (
     Start,
     StartEntry,
 )
+from rhot_node.wire.plausible import IMAGE_SIZE_MAX
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]
@@ -53,7 +54,6 @@ _BOUND_NS = 10_000  # of the times in a table
 FIRST_NS = _BEGIN_NS + 10 * _EXCHANGE_NS
 """Master time, ns, of the first frame of a log that is made of tables."""
 _SESSION, _LONGEST_S = 1, 86_400.0
-_LARGEST_PX = 16_384.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ def _parse(path: Path, names: list[str], rows: Iterable[dict[str, str]], fps: fl
                         (np.diff(times, prepend=-math.inf) <= 0.0, "a time that is not after the one before"),
                         (~((scores >= 0.0) & (scores <= 1.0)), "a score that is not from 0 to 1"),
                         (~((sigma > 0.0) & (sigma <= 1e3)), "a sigma_px that is not from 0 to 1000"),
-                        ((np.abs(pixels) > _LARGEST_PX).any(axis=(1, 2)), "a pixel in no image")):
+                        ((np.abs(pixels) > IMAGE_SIZE_MAX).any(axis=(1, 2)), "a pixel in no image")):
         if wrong.any():
             raise RecordingError(f"{path}: line {int(np.argmax(wrong)) + 2} has {what}.")
     return LandmarkTable(times, pixels, scores, sigma)

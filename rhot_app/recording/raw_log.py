@@ -26,21 +26,22 @@ import numpy as np
 
 from rhot_app.errors import RecordingError, note_loss
 from rhot_app.project import Rig, parse_rig
-from rhot_node.files import decode_json, open_input
+from rhot_node.files import JSON_BYTES_MAX, KIB, MIB, decode_json, open_input
 from rhot_node.terminal import add_examples
+from rhot_node.wire.plausible import TIME_MAX_NS
 
 MAGIC: Final = b"RHOTLOG\0"
 VERSION: Final = 2
-HEADER_MAX: Final = 16 << 20
+HEADER_MAX: Final = JSON_BYTES_MAX
 PAYLOAD_MAX: Final = 65535  # the longest UDP datagram
 
 _BLOCK = 4096  # of a disk: what one bad block destroys; each copy of the header fills whole ones
-_BUFFER = 1 << 16
-_SCAN_MAX = 1 << 20  # bytes searched at a time for the next sound record
+_BUFFER = 64 * KIB
+_SCAN_MAX = MIB  # bytes searched at a time for the next sound record
 
 _PREFIX = struct.Struct("<8sHHI")
 _RECORD = struct.Struct("<BIqI")
-_CRC = struct.Struct("<I")
+_LENGTH = _CRC = struct.Struct("<I")
 
 
 class RecordKind(enum.IntEnum):
@@ -156,7 +157,7 @@ def wall_clock_offset_ns(about: dict[str, Any], first_t_master_ns: int) -> int |
         return None
     since = (created if created.tzinfo else created.replace(tzinfo=UTC)) - datetime.fromtimestamp(0, UTC)
     since_ns = since // timedelta(microseconds=1) * 1000
-    return since_ns - at_ns if type(at_ns) is int and 0 <= at_ns <= since_ns < 2**62 else None
+    return since_ns - at_ns if type(at_ns) is int and 0 <= at_ns <= since_ns < TIME_MAX_NS else None
 
 
 def encode_header(rig: Rig, about: dict[str, Any], *, marks_end: bool = False) -> bytes:
@@ -394,11 +395,11 @@ def _first_sound(block: bytes, limit: int) -> int | None:
     if count <= 0:
         return None
     values = np.frombuffer(block, np.uint8)
-    length_at = _RECORD.size - 4  # little-endian: a length of at most 65535 ends with two zeros
+    length_at = _RECORD.size - _LENGTH.size  # little-endian: a length of at most 65535 ends with two zeros
     possible = (values[:count] != 0) & (values[length_at + 2:][:count] == 0) & (values[length_at + 3:][:count] == 0)
     view = memoryview(block)
     for begin in np.flatnonzero(possible).tolist():
-        end = begin + _RECORD.size + block[begin + length_at] + 256 * block[begin + length_at + 1]
+        end = begin + _RECORD.size + _LENGTH.unpack_from(block, begin + length_at)[0]
         if end + _CRC.size <= len(block) and _CRC.unpack_from(block, end)[0] == zlib.crc32(view[begin:end]):
             return int(begin)
     return None

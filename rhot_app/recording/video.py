@@ -25,7 +25,7 @@ from rhot_app.project import Rig, RigNode
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.recorder import free_bytes
 from rhot_node.errors import NodeError, printable
-from rhot_node.files import decode_message, replacing
+from rhot_node.files import MIB, decode_message, replacing
 from rhot_node.keys import KeyPair, connect_with
 from rhot_node.network.context import Context
 from rhot_node.video.avi import read_stamps
@@ -35,7 +35,7 @@ PATIENCE_S: Final = 30.0
 """How long a node may be silent before its video is given up until the next try."""
 
 _ANSWER_S = 3.0
-_ANSWER_MAX = 8 << 20  # bytes; the longest honest answer is a list of some ten thousand videos
+_ANSWER_MAX = 8 * MIB  # bytes; the longest honest answer is a list of some ten thousand videos
 _LOOK_S = 0.5
 
 COLUMNS = ("frame_number", "t_node_ns", "exposure_ns", "row_time_ns")

@@ -18,7 +18,7 @@ from rhot_app.progress import Progress, silent
 from rhot_node.errors import WireError
 from rhot_node.network.presence import SERVICE, Presence, is_loopback, own_interfaces, presence_of
 from rhot_node.wire.codec import decode, encode
-from rhot_node.wire.messages import Find, Here, NodeState
+from rhot_node.wire.messages import BROADCAST_PORT, U32_MAX, Find, Here, NodeState
 
 if TYPE_CHECKING:
     from zeroconf import ServiceStateChange, Zeroconf
@@ -26,9 +26,6 @@ if TYPE_CHECKING:
 
 # -- discovery by broadcast --------------------------------------------------------------------------------------------
 # Anybody can answer anything. What comes back is good for showing and for trying an address, nothing else.
-
-BROADCAST_PORT = 47799
-"""Where nodes listen for broadcasts unless their settings say otherwise."""
 
 _EVERYBODY = "255.255.255.255"
 _DATAGRAM_MAX = 1024
@@ -63,7 +60,7 @@ class FindSocket:
     def ask(self, node_id: int = 0, also: Sequence[tuple[str, int]] = ()) -> int:
         """Ask everybody in reach, or only `node_id`, who he is; `also`: further (address, port). Returns how many
         networks and addresses could be asked."""
-        self._sequence = (self._sequence + 1) & 0xFFFFFFFF
+        self._sequence = (self._sequence + 1) & U32_MAX
         question = encode(Find(node_id, self._sequence, self._nonce))
         asked = 0
         for target in [*((address, self._port) for address in self._broadcasts()), *also]:

@@ -10,7 +10,7 @@ from rhot_app.project import Rig
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.validation import DatagramValidator, refuse_without_key, tagged_by
 from rhot_node.wire.codec import Seal, encode
-from rhot_node.wire.messages import ClockReply, ClockRequest, Message, NodeState
+from rhot_node.wire.messages import U32_MAX, ClockReply, ClockRequest, Message, NodeState
 
 SILENT_NS = 700_000_000
 """A node that neither answers nor sends for so long is called silent."""
@@ -81,7 +81,7 @@ class NodeLink:
 
     def request(self, t1_master_ns: int) -> ClockRequest:
         """The next clock request, to be sent now; it tells the node which session its master runs."""
-        self._sequence = (self._sequence + 1) & 0xFFFFFFFF
+        self._sequence = (self._sequence + 1) & U32_MAX
         request = ClockRequest(self.node.node_id, self.wanted, self._sequence, t1_master_ns)
         self.sent(request)
         return request

@@ -52,7 +52,8 @@ def _words(found: Search, seconds: float) -> str:
 
 def _askable(node: FoundNode) -> list[str]:
     """Its addresses as `rhot pair` takes them: with the pairing port where it is not the usual one."""
-    from rhot_app.sources.pairing import PAIRING_PORT, NodeAddress
+    from rhot_app.sources.pairing import NodeAddress
+    from rhot_node.wire.messages import PAIRING_PORT
     port = node.presence.pairing_port
     return [address if port == PAIRING_PORT else str(NodeAddress(address, port)) for address in node.addresses]
 

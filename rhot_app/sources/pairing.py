@@ -22,8 +22,8 @@ from rhot_node.files import PRINTABLE, decode_message
 from rhot_node.keys import Name
 from rhot_node.network.context import Context
 from rhot_node.network.pairing import NO_CODE, NONCE_LENGTH, Transcript, proof, proves, read_code
+from rhot_node.wire.messages import PAIRING_PORT, U32_MAX
 
-PAIRING_PORT = 47803
 TIMEOUT_S = 2.0
 _ANSWER_MAX = 4096  # bytes
 
@@ -55,7 +55,7 @@ def read_address(text: str) -> tuple[str, int | None]:
 class Introduction(msgspec.Struct, frozen=True):
     """What a node says of itself to anybody. Whether it is true shows when it proves its key."""
 
-    node_id: Annotated[int, Meta(ge=1, le=2**32 - 1)]
+    node_id: Annotated[int, Meta(ge=1, le=U32_MAX)]
     name: Name
     state: Annotated[str, Meta(max_length=64, pattern=PRINTABLE)]
     trust: Literal["open", "unpaired", "paired"]

@@ -19,7 +19,8 @@ from rhot_app.recording.raw_log import RecordKind, RecordSink
 from rhot_app.sources.node_link import CLOCK_REPLY, NodeLink
 from rhot_app.sources.validation import DatagramValidator, Verified
 from rhot_app.tracking.tracker import CameraFrame
-from rhot_node.clock import ANCILLARY_SIZE, KernelTime, ask_for_times
+from rhot_node.clock import ANCILLARY_SIZE, KernelTime, LinuxOption, ask_for_times
+from rhot_node.files import MIB
 from rhot_node.threads import Worker
 
 # -- thread priority ---------------------------------------------------------------------------------------------------
@@ -55,7 +56,7 @@ def hurry_this_thread() -> None:
 
 # -- receiving thread --------------------------------------------------------------------------------------------------
 
-RECEIVE_BUFFER = 4 << 20
+RECEIVE_BUFFER = 4 * MIB
 """Bytes asked of the kernel: half a second of a 10,000 datagrams/s flood (each costs the kernel ~800 bytes)."""
 
 BURST = 256
@@ -70,7 +71,6 @@ NEWEST = 8
 
 DATAGRAM_MAX = 4096  # bytes; 64 markers need 2.1 kB, and a longer datagram is refused for its length
 
-SO_RCVBUFFORCE = 33
 _WAIT = struct.pack("@ll", 0, 200_000)  # a blocked read returns after 0.2 s to see whether it shall end
 
 Deliver = Callable[[list[CameraFrame]], None]
@@ -91,7 +91,7 @@ def open_data_socket(port: int, node_name: str) -> socket.socket:
         raise SourceError(f"node {node_name}: UDP port {port} cannot be opened ({exc.strerror}). Stop the program that "
                           "uses it, or give the node another data_port in the rig (0 takes any free one).") from exc
     try:
-        sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BUFFER)
+        sock.setsockopt(socket.SOL_SOCKET, LinuxOption.RCVBUFFORCE, RECEIVE_BUFFER)
     except OSError:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, _WAIT)

@@ -11,7 +11,7 @@ from rhot_node.errors import WireError
 from rhot_node.wire.codec import SLICES_FIT
 from rhot_node.wire.edges import EdgeTable
 from rhot_node.wire.foreground_map import unpack_map
-from rhot_node.wire.messages import ForegroundPart, SliceEdges, Slices
+from rhot_node.wire.messages import U32_MAX, ForegroundPart, SliceEdges, Slices
 from rhot_node.wire.slices import SLICES_MAX, pack_slices, unpack_slices
 
 REMEMBERED = 64
@@ -19,8 +19,6 @@ REMEMBERED = 64
 
 FRAMES = 4
 """Frames of which some parts have come and others may follow."""
-
-U32 = 0xFFFFFFFF
 
 Answer = SliceEdges | ForegroundPart
 _Key = tuple[type, int, int]
@@ -42,13 +40,13 @@ class NodeSearches:
     def ask(self, request: SliceRequest, node_id: int, session: int, size: tuple[int, int]) -> list[Slices]:
         """The messages of a request, which is remembered; slices beyond SLICES_MAX must not be asked for."""
         assert len(request.slices) <= SLICES_MAX
-        self._number = (self._number + 1) & U32
+        self._number = (self._number + 1) & U32_MAX
         self._remember(self._number, request)
         parts = max(1, -(-len(request.slices) // SLICES_FIT))
         found = []
         for part in range(parts):
             own = request.slices[part * SLICES_FIT:(part + 1) * SLICES_FIT]
-            self._sequence = (self._sequence + 1) & U32
+            self._sequence = (self._sequence + 1) & U32_MAX
             found.append(Slices(node_id, session, self._sequence, self._number, *size, len(request.slices), part, parts,
                                 request.map_step, pack_slices(own)))
         return found

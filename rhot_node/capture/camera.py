@@ -5,11 +5,17 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import CameraError
-from rhot_node.files import read_input
+from rhot_node.files import MIB, read_input
+
+FIRST_FRAME_S: Final = 5.0
+"""s that a camera may take from being opened to its first frame. Chosen."""
+
+SILENCE_S: Final = 3.0
+"""s without a frame after which a camera is gone. Chosen, longer than the longest exposure of `CameraSettings`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +144,7 @@ class DelayedStart:
 def read_start_file(path: Path) -> int | None:
     """Host monotonic ns in a start file, None while it does not exist; write it elsewhere and rename it to `path`."""
     try:
-        text = read_input(path, 1 << 20).decode("ascii", "replace").strip()
+        text = read_input(path, MIB).decode("ascii", "replace").strip()
     except FileNotFoundError:
         return None
     except OSError as exc:

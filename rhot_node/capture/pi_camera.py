@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from rhot_node.capture.camera import Frame
+from rhot_node.capture.camera import FIRST_FRAME_S, SILENCE_S, Frame
 from rhot_node.capture.sensors import Box, choose_preset, make_controls, mid_exposure_ns, read_out
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
@@ -22,8 +22,6 @@ from rhot_node.errors import CameraError
 
 log = logging.getLogger(__name__)
 
-FIRST_FRAME_S = 5.0
-SILENCE_S = 3.0
 BUFFERS = 6
 BIT_DEPTH = 10  # of the sensor's mode
 STREAM = "main"

@@ -1,6 +1,6 @@
 """Sensors of Pi cameras: their modes by name, and when each image row was exposed. Pure.
 
-The numbers are those of the kernel's drivers. Rate and row time are taken from the limits that the camera states when
+Rate and row time are taken from the limits that the camera states when
 it is open, because drivers have changed the pixel clock of the same mode (103 or 206 frames/s of the IMX219's 640x480).
 """
 
@@ -11,8 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
+
 from rhot_node.config import CameraSettings
 from rhot_node.errors import CameraError
+from rhot_node.files import read_document, resource_path
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +30,7 @@ class Preset:
     rate_hz: float
     blank_rows: int
     rolling: bool
-    lens: tuple[int, float] | None
+    lens: tuple[int, float] | None = None
 
     @property
     def title(self) -> str:
@@ -35,12 +38,14 @@ class Preset:
         return f"preset {self.name} ({self.sensor}, {self.size[0]} x {self.size[1]} px)"
 
 
-_IMX219_LENS = (3280, 62.2)
-PRESETS = (
-    Preset("wide", "imx219", (1640, 1232), 41.85, 32, True, _IMX219_LENS),
-    Preset("fast", "imx219", (640, 480), 206.65, 32, True, _IMX219_LENS),  # the middle 1280 x 960, binned
-    Preset("global", "imx296", (1456, 1088), 60.38, 30, False, None),
-)
+class _Sensors(msgspec.Struct):
+    """``resources/cameras/pi_sensors.json``."""
+
+    presets: tuple[Preset, ...]
+
+
+PRESETS = read_document(resource_path("cameras", "pi_sensors.json"), _Sensors, format_name="rhot-sensors", version=1,
+                        error=CameraError).presets
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from struct import Struct
 import msgspec
 import numpy as np
 
-from rhot_node.capture.camera import Frame
+from rhot_node.capture.camera import FIRST_FRAME_S, SILENCE_S, Frame
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import from_i420
@@ -28,8 +28,6 @@ from rhot_node.files import decode_message
 MAGIC = b"RYUV"
 SETTINGS_MAGIC = b"RSET"
 VERSION = 1
-CONNECT_S = 5.0  # how long to wait for the twin to listen and to send its first frame
-SILENCE_S = 3.0  # after this long without a frame the twin counts as gone
 CATCH_UP_FRAMES = 8  # waiting frames thrown away in one read, at most; a flood must not keep us here
 
 _HEADER = Struct("<4sHHIIqII8x")
@@ -103,7 +101,7 @@ def take_settings(received: bytearray) -> CameraSettings | None:
 class StreamCamera:
     """A live twin as a camera. When several frames wait, only the newest is used; the number shows the gap."""
 
-    def __init__(self, path: Path, settings: CameraSettings, clock: NodeClock, *, connect_s: float = CONNECT_S,
+    def __init__(self, path: Path, settings: CameraSettings, clock: NodeClock, *, connect_s: float = FIRST_FRAME_S,
                  silence_s: float = SILENCE_S) -> None:
         """Connect, tell the twin the settings and receive the first frame; raises CameraError when there is none within
         `connect_s`."""

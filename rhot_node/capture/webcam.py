@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import enum
 import logging
 import re
 import socket
@@ -17,8 +18,8 @@ from urllib.parse import SplitResult, urlsplit
 import cv2
 import numpy as np
 
-from rhot_node.capture.camera import Frame, available_delay_ns
-from rhot_node.capture.v4l2 import EXPOSURE_UNIT_US, Automatics, read_automatics
+from rhot_node.capture.camera import FIRST_FRAME_S, SILENCE_S, Frame, available_delay_ns
+from rhot_node.capture.v4l2 import EXPOSURE_UNIT_US, Automatics, ExposureMode, read_automatics
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, from_bgr
@@ -27,11 +28,8 @@ from rhot_node.threads import OneShotThread
 
 log = logging.getLogger(__name__)
 
-FIRST_FRAME_S = 5.0
-SILENCE_S = 3.0
 OLDEST_STAMP_NS = 1_000_000_000
 """A frame that is read is never older: a stamp that is, is of another clock than the monotonic one."""
-V4L2_EXPOSURE_MANUAL = 1
 
 
 class Capture(Protocol):
@@ -143,11 +141,16 @@ class Webcam(GrabbedCamera):
 
 # -- network cameras ---------------------------------------------------------------------------------------------------
 
-PORTS = {"http": 80, "https": 443, "rtsp": 554, "rtsps": 322}
-"""Schemes of network cameras and their ports (RFC 9110, RFC 7826)."""
+class Scheme(enum.IntEnum):
+    """Schemes of network cameras and their ports (RFC 9110, RFC 7826)."""
 
-ANSWER_S = 3.0
-"""A camera of the local network answers within a fraction of this."""
+    HTTP = 80
+    HTTPS = 443
+    RTSP = 554
+    RTSPS = 322
+
+
+PORTS = {scheme.name.lower(): scheme.value for scheme in Scheme}
 
 _REMEDY = "Does the program that sends them still run, and is the address right?"
 
@@ -194,7 +197,7 @@ def _split_url(url: str) -> SplitResult:
 def _require_answer(parts: SplitResult, name: str) -> None:
     place = parts.hostname or "", parts.port or PORTS[parts.scheme]
     try:
-        socket.create_connection(place, ANSWER_S).close()
+        socket.create_connection(place, SILENCE_S).close()
     except (OSError, UnicodeError) as exc:
         why = "no answer" if isinstance(exc, TimeoutError) else getattr(exc, "strerror", None) or "no such host"
         raise CameraError(f"{name}: nobody answers at {place[0]}, port {place[1]} ({why}). {_REMEDY}") from exc
@@ -212,7 +215,7 @@ def configure(capture: Capture, settings: CameraSettings) -> list[str]:
         ("height", cv2.CAP_PROP_FRAME_HEIGHT, settings.height),
         ("fps", cv2.CAP_PROP_FPS, settings.fps),
         ("one buffer", cv2.CAP_PROP_BUFFERSIZE, 1),
-        ("automatic exposure off", cv2.CAP_PROP_AUTO_EXPOSURE, V4L2_EXPOSURE_MANUAL),
+        ("automatic exposure off", cv2.CAP_PROP_AUTO_EXPOSURE, ExposureMode.MANUAL),
         ("automatic white balance off", cv2.CAP_PROP_AUTO_WB, 0),
         ("exposure_us", cv2.CAP_PROP_EXPOSURE, max(1.0, round(settings.exposure_us / EXPOSURE_UNIT_US))),
         ("gain", cv2.CAP_PROP_GAIN, settings.gain),

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_node.capture.camera import Camera, Reporting
+from rhot_node.capture.camera import FIRST_FRAME_S, Camera, Reporting
 from rhot_node.errors import CameraError
 from rhot_node.health.checks import BLACK_PICTURE, Check, is_black
 
@@ -30,7 +30,7 @@ AUTOMATIC: Final = {"automatic exposure off": "exposure", "automatic white balan
 
 _READ_S = 0.1  # longest wait for a frame
 _STEP_PX = 8  # from pixel to pixel whose luma is averaged
-_SILENT_READS = 50  # of _READ_S without a frame: as long as a webcam is given for its first one
+_SILENT_READS = round(FIRST_FRAME_S / _READ_S)
 
 
 class RateMeter:

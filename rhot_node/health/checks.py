@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_node.files import KIB, MIB
 from rhot_node.health.machine import Machine, Throttled
 
 # -- result of a check -------------------------------------------------------------------------------------------------
@@ -50,9 +51,9 @@ def worst(checks: list[Check]) -> Level:
 
 HOT_C = 75.0
 TOO_HOT_C = 80.0  # here the firmware begins to slow the processor down
-MEMORY_LOW = 150 << 20  # bytes; a node takes up to 250 MB when it starts anew
-MEMORY_OUT = 50 << 20
-RECEIVE_BUFFER_MIN = 128 << 10  # bytes; a node is sent a few datagrams per second
+MEMORY_LOW = 150 * MIB  # bytes; a node takes up to 250 MB when it starts anew
+MEMORY_OUT = 50 * MIB
+RECEIVE_BUFFER_MIN = 128 * KIB  # bytes; a node is sent a few datagrams per second
 POWER_REMEDY = ("Use the board's own power supply (5.1 V; 3 A, for a Pi 5 5 A) with its own cable, and take other USB "
                 "devices off.")
 COOL_REMEDY = "Give it a heat sink or a fan and free air; a closed case needs a fan."
@@ -106,7 +107,7 @@ def check_memory(available_bytes: int | None) -> Check:
     """Memory that is left."""
     if available_bytes is None:
         return Check("memory", "unknown", "It does not tell how much memory is free.")
-    text = f"{available_bytes / (1 << 20):.0f} MB of memory are free"
+    text = f"{available_bytes / MIB:.0f} MB of memory are free"
     if available_bytes < MEMORY_LOW:
         return Check("memory", "error" if available_bytes < MEMORY_OUT else "warning", f"Only {text}.",
                      "End other programs, or use the Lite system without a desktop.")
@@ -160,7 +161,7 @@ def check_network(machine: Machine) -> list[Check]:
                                "(for good: docs/pi.md)."))
     buffer = machine.receive_buffer_max()
     if buffer is not None and buffer < RECEIVE_BUFFER_MIN:
-        found.append(Check("receive_buffer", "warning", f"Sockets may buffer {buffer // 1024} KiB only.",
+        found.append(Check("receive_buffer", "warning", f"Sockets may buffer {buffer // KIB} KiB only.",
                            "Allow more: `sudo sysctl -w net.core.rmem_max=212992`."))
     return found
 

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from enum import IntFlag
 from pathlib import Path
 
+from rhot_node.files import KIB
+
 COMMAND_S = 2.0
 Run = Callable[[Sequence[str]], str | None]
 """Runs a command; its standard output, None when it is not there or fails."""
@@ -87,7 +89,7 @@ class Machine:
     def available_bytes(self) -> int | None:
         """Memory that a program could still get."""
         found = re.search(r"^MemAvailable:\s*(\d+) kB$", self._text("proc/meminfo") or "", re.MULTILINE)
-        return None if found is None else 1024 * int(found[1])
+        return None if found is None else KIB * int(found[1])
 
     def limits_memory(self) -> bool:
         """Whether the kernel can hold a service to its memory limit; Raspberry Pi OS has that off."""

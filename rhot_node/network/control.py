@@ -17,6 +17,7 @@ import zmq
 
 from rhot_node.config import NodeSettings
 from rhot_node.errors import LinkError, printable
+from rhot_node.files import MIB
 from rhot_node.keys import NodeTrust, serve_with
 from rhot_node.logs import LogLimit
 from rhot_node.network.context import Context
@@ -28,7 +29,7 @@ from rhot_node.threads import Worker
 
 log = logging.getLogger(__name__)
 
-REQUEST_MAX = 1 << 20  # bytes; the longest honest request is a marker set
+REQUEST_MAX = MIB  # bytes; the longest honest request is a marker set
 PREVIEWS_QUEUED = 2  # a slow viewer misses pictures instead of piling them up
 NOT_PAIRED = b'{"ok": false, "error": "this master is not paired with the node any more."}'
 _REBIND_S = 0.02

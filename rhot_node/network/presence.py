@@ -14,7 +14,7 @@ from msgspec import Meta
 
 from rhot_node.keys import Name
 from rhot_node.wire.codec import VERSION
-from rhot_node.wire.messages import Find, Here, NodeState, TrustState
+from rhot_node.wire.messages import U32_MAX, Find, Here, NodeState, TrustState
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,15 +65,14 @@ def is_loopback(address: str) -> bool:
 SERVICE: Final = "_rhot-node._udp.local."
 
 _INSTANCE_BYTES_MAX = 63
-_U32_MAX = 2**32 - 1
 _Port = Annotated[int, Meta(ge=1, le=65535)]
 
 
 class _Properties(msgspec.Struct):
     """The properties; others may be there in a later version."""
 
-    id: Annotated[int, Meta(ge=1, le=_U32_MAX)]
-    boot: Annotated[int, Meta(ge=0, le=_U32_MAX)]
+    id: Annotated[int, Meta(ge=1, le=U32_MAX)]
+    boot: Annotated[int, Meta(ge=0, le=U32_MAX)]
     name: Name
     control: _Port
     preview: _Port

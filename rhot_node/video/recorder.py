@@ -11,6 +11,7 @@ import functools
 import hashlib
 import logging
 import os
+import stat
 import threading
 import time
 from collections import deque
@@ -24,22 +25,23 @@ from msgspec import Meta
 from rhot_node.capture.camera import Frame
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import NodeError, VideoError
-from rhot_node.files import open_input, read_document, write_document
+from rhot_node.files import KIB, MIB, open_input, read_document, write_document
 from rhot_node.threads import OneShotThread
 from rhot_node.video.avi import BYTES_MAX, Stamp, append_picture, begin_video, encode_picture, finish_video
+from rhot_node.wire.messages import U32_MAX
 
 log = logging.getLogger(__name__)
 
 FORMAT: Final = "rhot-node-video"
 VERSION: Final = 1
 
-READ_MAX: Final = 256 << 10
+READ_MAX: Final = 256 * KIB
 """Bytes of one `read`: some milliseconds of a network, so that other requests are not kept waiting."""
 
 LEASE_S: Final = 15.0
 """A master that records repeats its start every three seconds; after five that were not heard the video ends."""
 
-FREE_MIN: Final = 512 << 20
+FREE_MIN: Final = 512 * MIB
 """Bytes of the disk that are left to the system: a Pi whose disk is full no longer starts cleanly."""
 
 QUEUE_FRAMES: Final = 16
@@ -109,7 +111,7 @@ class VideoRecorder:
                                  "it. Begin a new recording.")
             self.stop()
             try:
-                self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+                self.folder.mkdir(mode=stat.S_IRWXU, parents=True, exist_ok=True)
                 self._require_room()
             except OSError as exc:
                 raise VideoError(f"{self.folder}: no video can be written there ({exc.strerror}).") from exc
@@ -175,8 +177,8 @@ class VideoRecorder:
 
     def _require_room(self) -> None:
         if self._free(self.folder) < FREE_MIN:
-            raise VideoError(f"the node's disk has less than {FREE_MIN >> 20} MiB left, so no video is recorded. Fetch "
-                             "the videos that it has, or make room.")
+            raise VideoError(f"the node's disk has less than {FREE_MIN // MIB} MiB left, so no video is recorded. "
+                             "Fetch the videos that it has, or make room.")
 
     def _mend(self, names: list[str]) -> None:
         _step_back()
@@ -222,7 +224,7 @@ class _Take:
             return
         image = frame.image
         copy = YuvImage(image.y.copy(), image.u.copy(), image.v.copy())
-        stamp = Stamp(frame.number & 0xFFFFFFFF, frame.t_node_ns, frame.exposure_ns, frame.row_time_ns)
+        stamp = Stamp(frame.number & U32_MAX, frame.t_node_ns, frame.exposure_ns, frame.row_time_ns)
         with self._changed:
             if len(self._queue) >= self._queue_frames:
                 self._queue.popleft()
@@ -291,7 +293,7 @@ class _Take:
     def _look(self, now_s: float) -> None:
         """End it when the disk is nearly full, or nobody wants it any more."""
         if self._free(self._path.parent) < FREE_MIN:
-            self.end(f"The node's disk has less than {FREE_MIN >> 20} MiB left.")
+            self.end(f"The node's disk has less than {FREE_MIN // MIB} MiB left.")
         elif now_s - self._heard_s > self._lease_s:
             self.end("The master was not heard any more.")
 

@@ -8,6 +8,12 @@ from dataclasses import dataclass
 
 import msgspec
 
+U32_MAX = 2**32 - 1
+"""Of a field of 32 bits: sequence and frame numbers begin anew behind it."""
+
+BROADCAST_PORT, UDP_PORT, CONTROL_PORT, PREVIEW_PORT, PAIRING_PORT = 47799, 47800, 47801, 47802, 47803
+"""A node's ports unless its settings say otherwise (docs/node.md)."""
+
 
 class NodeState(enum.IntEnum):
     """Life of a node: it starts, is ready, streams between start and stop, and says so when something broke."""

@@ -35,21 +35,21 @@ class Driver:
 
     def ioctl(self, handle: int, request: int, data: bytearray) -> None:
         camera = self.cameras[Path(f"/proc/self/fd/{handle}").readlink().name]
-        if request == v4l2.QUERYCAP:
+        if request == v4l2.Request.QUERYCAP:
             struct.pack_into("<16s32s32sIII", data, 0, b"uvcvideo", camera.card.encode(), b"usb-0000:00:14.0-1", 0,
                              CAPTURE | METADATA | DEVICE_CAPS, camera.capabilities)
-        elif request == v4l2.REQBUFS:
+        elif request == v4l2.Request.REQBUFS:
             if camera.held:
                 raise OSError(errno.EBUSY, "busy")
-        elif request == v4l2.G_CTRL:
+        elif request == v4l2.Request.G_CTRL:
             control = struct.unpack_from("<I", data)[0]
             self._has(control in camera.controls)
             struct.pack_into("<i", data, 4, camera.controls[control])
-        elif request == v4l2.ENUM_FMT:
+        elif request == v4l2.Request.ENUM_FMT:
             index = struct.unpack_from("<I", data)[0]
             self._has(index < len(camera.formats))
             struct.pack_into("<I", data, 44, 1000 + index)
-        elif request == v4l2.ENUM_FRAMESIZES:
+        elif request == v4l2.Request.ENUM_FRAMESIZES:
             index, pixel_format = struct.unpack_from("<II", data)
             sizes = camera.formats[pixel_format - 1000]
             self._has(index < (1 if camera.steps else len(sizes)))

@@ -7,10 +7,8 @@ from pathlib import Path
 from fake_v4l2 import CAPTURE, METADATA, Driver, FakeCamera
 
 from rhot_node.capture.v4l2 import (
-    AUTO_WHITE_BALANCE,
-    EXPOSURE_ABSOLUTE,
-    EXPOSURE_AUTO,
     Automatics,
+    Control,
     Device,
     Mode,
     list_devices,
@@ -54,7 +52,8 @@ def test_the_mode_is_the_usual_one_or_the_nearest_that_is_not_slow(tmp_path: Pat
 
 def test_what_a_driver_says_of_its_automatic_modes(tmp_path: Path) -> None:
     def read(**controls: int) -> Automatics:
-        ids = {"exposure": EXPOSURE_AUTO, "time": EXPOSURE_ABSOLUTE, "balance": AUTO_WHITE_BALANCE}
+        ids = {"exposure": Control.EXPOSURE_AUTO, "time": Control.EXPOSURE_ABSOLUTE,
+               "balance": Control.AUTO_WHITE_BALANCE}
         camera = FakeCamera(controls={ids[name]: value for name, value in controls.items()})
         return read_automatics(str(tmp_path / "video0"), Driver(tmp_path, {"video0": camera}).ioctl)
     assert read(exposure=3, time=666, balance=1) == Automatics(True, True, 66_600.0)

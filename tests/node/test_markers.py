@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from rhot_node.errors import SettingsError
-from rhot_node.files import resource_path
-from rhot_node.markers import MarkerSet, load_markers, parse_markers, save_markers
+from rhot_node.files import decode_document, resource_path
+from rhot_node.markers import MarkerSet, load_markers, save_markers
 
 CHROMA = {"cb": -89.2, "cr": 26.3}
 
@@ -21,7 +21,8 @@ def marker_file(**fields: Any) -> bytes:
 
 
 def read(**fields: Any) -> MarkerSet:
-    return parse_markers(marker_file(**fields), "mine.json")
+    return decode_document(marker_file(**fields), MarkerSet, format_name="rhot-markers", version=1, where="mine.json",
+                           error=SettingsError)
 
 
 def test_a_file_from_before_patches_means_whole_segments(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -117,7 +118,7 @@ def prepare(sources: Sequence[CameraSource], names: Sequence[str] = (), base: Ri
         rig, reason = _kept_rig(path, cameras, bare) or first_rig(cameras, bare=bare), "opening cameras"
     if side is not None and side != rig.hand.side:
         rig = msgspec.structs.replace(rig, hand=load_hand(resource_path("hands", f"{side}.json")), other_hand=None)
-    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    path.parent.mkdir(mode=stat.S_IRWXU, parents=True, exist_ok=True)
     accept(path, rig, reason)
     write_document(_set_path(path), CameraSet(cameras))
     return Prepared(path, (*film_remarks(sources), *_rig_remarks(rig, bare)))

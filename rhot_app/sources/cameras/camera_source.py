@@ -84,7 +84,7 @@ def _network_camera(url: str) -> CameraSource:
     except CameraError as exc:
         raise SourceError(str(exc)) from exc
     camera.close()
-    return CameraSource(url, shown_url(url), *camera.size, USUAL[2])
+    return CameraSource(url, shown_url(url), *camera.size, USUAL.fps)
 
 
 def _recorded(path: Path) -> CameraSource:
@@ -94,14 +94,14 @@ def _recorded(path: Path) -> CameraSource:
     if path.is_dir() and (path / HEADER_NAME).exists():
         header = read_header(path)
         seconds = 1e-9 * (header.times_ns[-1] - header.times_ns[0]) if len(header.times_ns) > 1 else 0.0
-        fps = (len(header.times_ns) - 1) / seconds if seconds > 0.0 else USUAL[2]
+        fps = (len(header.times_ns) - 1) / seconds if seconds > 0.0 else USUAL.fps
         return CameraSource(f"yuv:{path}", path.name, header.width, header.height, fps, seconds)
     pictures = picture_files(path)
     if path.is_dir() and not pictures:
         raise SourceError(f"{path}: this folder has no pictures. Name a folder of pictures, or a film in it.")
     if pictures:
         height, width = read_picture(pictures[0]).shape[:2]
-        return CameraSource(str(path), path.name, _even(width), _even(height), USUAL[2], len(pictures) / USUAL[2])
+        return CameraSource(str(path), path.name, _even(width), _even(height), USUAL.fps, len(pictures) / USUAL.fps)
     capture = open_video(path)
     try:
         read, picture = capture.read() if capture.isOpened() else (False, None)
@@ -111,7 +111,7 @@ def _recorded(path: Path) -> CameraSource:
         fps, count = float(capture.get(cv2.CAP_PROP_FPS)), float(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     finally:
         capture.release()
-    fps = fps if 0.1 <= fps <= 1000.0 else USUAL[2]
+    fps = fps if 0.1 <= fps <= 1000.0 else USUAL.fps
     return CameraSource(str(path), path.name, _even(picture.shape[1]), _even(picture.shape[0]), fps, count / fps)
 
 

@@ -12,6 +12,7 @@ import contextlib
 import json
 import os
 import signal
+import stat
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -68,7 +69,7 @@ def run(rig_path: Path, log_path: Path | None, over: Callable[[], bool]) -> None
     cameras, rig, folder = camera_set_of(rig_path), load_rig(rig_path), nodes_folder(rig_path)
     if cameras is None or len(cameras.cameras) != len(rig.nodes):
         raise SourceError(f"{rig_path}: its list of cameras is missing. Choose the cameras again.")
-    folder.mkdir(mode=0o700, exist_ok=True)
+    folder.mkdir(mode=stat.S_IRWXU, exist_ok=True)
     films = Films(cameras, folder / "start")
     settings = [node_settings(camera, node, rig, _kept_settings(folder, node.name))
                 for camera, node in zip(cameras.cameras, rig.nodes, strict=True)]
