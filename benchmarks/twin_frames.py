@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.geometry.camera import CameraModel, ellipsoid, undistort_point
+from rhot_app.geometry.camera import CameraModel, undistort_point
 from rhot_app.simulator.film.shot import make_renderer, make_shot
 from rhot_app.simulator.render.body import CYLINDER, HandBody
 from rhot_app.simulator.render.painter import PoseSource
@@ -98,7 +98,7 @@ def moving_frames(scene: Scene, motion: str, index: int, frames: int) -> Iterato
 
 def places(body: HandBody, camera: CameraModel, source: PoseSource, t_row0_s: float, row_time_s: float) -> Array:
     """(M, 2) px: the centroid of each painted solid's outline, of a band the middle of the silhouette of its ellipsoid
-    (`geometry.silhouette`: what the master takes its place for), at the time of the very row it is in."""
+    (`geometry.camera.point_rays`: what the master takes its place for), at the time of the very row it is in."""
     transforms, angles = source.sample(np.array([t_row0_s]))
     rows = camera.project(body.marker_positions(transforms, angles)[0])[:, 1]
     points = np.full((body.marker_count, 2), np.nan)
@@ -116,7 +116,7 @@ def places(body: HandBody, camera: CameraModel, source: PoseSource, t_row0_s: fl
 def _band_middle(camera: CameraModel, solid: Array, size: Array) -> Array:
     """(2,) px: the centre of the conic that the ellipsoid of a cylinder in the camera's frame is seen as."""
     centre, axes = solid[:3], solid[3:].reshape(3, 3).T
-    shape = ellipsoid(axes, size)
+    shape = (axes * np.square(size)) @ axes.T
     depth2 = centre[2] ** 2 - shape[2, 2]
     ray = np.append((centre[:2] * centre[2] - shape[:2, 2]) / depth2, 1.0)
     world_from_camera = np.linalg.inv(camera.camera_from_world)

@@ -46,6 +46,9 @@ FARTHEST_DEG = 88.0
 """From the axis: farther rays belong to no lens here, because x and y then grow without bound."""
 _FARTHEST = math.tan(math.radians(FARTHEST_DEG)) ** 2
 
+NEAREST_M = 0.02
+"""m: nearer to a camera's plane than its housing, nothing is seen."""
+
 
 @njit(cache=True, inline="always")
 def is_wide(lens: Array) -> bool:
@@ -252,24 +255,53 @@ def pixels_per_metre_facing(slope: Array, camera_from_world: Array) -> float:
     return math.sqrt(abs(a * d - b * c))
 
 
+@njit(cache=True, inline="always")
+def camera_coordinates(camera: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A world point, m, along a camera's axes; `camera` (3, 4) camera_from_world."""
+    return (camera[0, 3] + camera[0, 0] * x + camera[0, 1] * y + camera[0, 2] * z,
+            camera[1, 3] + camera[1, 0] * x + camera[1, 1] * y + camera[1, 2] * z,
+            camera[2, 3] + camera[2, 0] * x + camera[2, 1] * y + camera[2, 2] * z)
+
+
+@njit(cache=True)
+def project_ray_with_slope(x: float, y: float, depth: float, camera: Array, intrinsics: Array, pixel: Array,
+                           slope: Array) -> bool:
+    """pixel = f(x, y), slope = f'(x, y) (R_xy - (x, y) R_z) / depth: f the lens, R the rows of `camera` (3, 4).
+
+    Fills `pixel` (2,) px of the ray (x, y, 1), and `slope` (2, 3) px/m by the world point that lies on it at `depth` m.
+    False, with nothing filled, beyond the lens's reach.
+    """
+    if not x * x + y * y <= intrinsics[REACH]:
+        return False
+    pixel[0], pixel[1], ux, uy, vx, vy = project_ray(x, y, intrinsics)
+    for k in range(3):
+        dx, dy = (camera[0, k] - x * camera[2, k]) / depth, (camera[1, k] - y * camera[2, k]) / depth
+        slope[0, k], slope[1, k] = ux * dx + uy * dy, vx * dx + vy * dy
+    return True
+
+
+@njit(cache=True)
+def project_point(x: float, y: float, z: float, camera: Array, intrinsics: Array, pixel: Array, slope: Array) -> bool:
+    """The projection of a world point (x, y, z) m, for all compiled code: fills `pixel` (2,) px and its Jacobian `slope`
+    (2, 3) px/m; False, with nothing filled, where the camera cannot see it.
+
+    `camera` (3, 4) or (4, 4) camera_from_world, m; `intrinsics` (13,). A residual of a point p on a moving body has the
+    Jacobian slope @ dp.
+    """
+    a, b, depth = camera_coordinates(camera, x, y, z)
+    if not depth > NEAREST_M:
+        return False
+    return project_ray_with_slope(a / depth, b / depth, depth, camera, intrinsics, pixel, slope)
+
+
 @njit(cache=True)
 def project_with_slope(points: Array, camera_from_world: Array, intrinsics: Array) -> tuple[Array, Array]:
     """Raw pixels (N, 2) of world points (N, 3) m and their slopes (N, 2, 3) px/m; NaN where the camera sees nothing."""
-    count = len(points)
-    pixels, slopes, local = np.empty((count, 2)), np.empty((count, 2, 3)), np.empty(3)
-    for n in range(count):
-        for k in range(3):
-            local[k] = (camera_from_world[k, 3] + camera_from_world[k, 0] * points[n, 0]
-                        + camera_from_world[k, 1] * points[n, 1] + camera_from_world[k, 2] * points[n, 2])
-        if not local[2] > 0.0:
+    pixels, slopes = np.empty((len(points), 2)), np.empty((len(points), 2, 3))
+    for n in range(len(points)):
+        if not project_point(points[n, 0], points[n, 1], points[n, 2], camera_from_world, intrinsics, pixels[n],
+                             slopes[n]):
             pixels[n], slopes[n] = math.nan, math.nan
-            continue
-        x, y = local[0] / local[2], local[1] / local[2]
-        pixels[n, 0], pixels[n, 1], ux, uy, vx, vy = project_ray(x, y, intrinsics)
-        for k in range(3):
-            dx = (camera_from_world[0, k] - x * camera_from_world[2, k]) / local[2]
-            dy = (camera_from_world[1, k] - y * camera_from_world[2, k]) / local[2]
-            slopes[n, 0, k], slopes[n, 1, k] = ux * dx + uy * dy, vx * dx + vy * dy
     return pixels, slopes
 
 
@@ -390,8 +422,3 @@ def point_rays(rays: Array, cameras: Array, shape: Array, position: Array, out: 
 def ball(radius: float) -> Array:
     """Shape matrix (3, 3) m^2 of a sphere; of a point for radius 0."""
     return radius**2 * np.eye(3)
-
-
-def ellipsoid(rotation: Array, half_axes: Array) -> Array:
-    """Shape matrix (3, 3) m^2 of an ellipsoid whose `half_axes` (3,) m lie along the columns of `rotation` (3, 3)."""
-    return np.asarray((rotation * np.square(half_axes)) @ rotation.T)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.estimation.se3 import fill_rotation
 from rhot_app.hand.articulated import Articulated, ArticulatedFrame, Box, Capsule
 from rhot_app.hand.dh import FIXED, ROOT, DhArrays, DhRow, compile_table, riding_points
-from rhot_app.hand.kinematics import add_angle_columns, add_turn, empty_frames, forward_arrays
+from rhot_app.hand.kinematics import TWIST, empty_frames, forward_arrays, jacobian_arrays
 from rhot_app.hand.model import Variant, linear_variant
 
 Array = NDArray[np.float64]
@@ -169,14 +169,11 @@ def state_jacobian_arrays(dh: DhArrays, state: Array, root: Array, frames: Array
     """
     w, x, y, z = state[0], state[1], state[2], state[3]
     s = 2.0 / (w * w + x * x + y * y + z * z)
-    out[:] = 0.0
+    jacobian_arrays(dh, root, frames, points, out[:, :, STATE_ROOT - TWIST:])
     for point in range(points.shape[0]):
-        px, py, pz = points[point]
-        rx, ry, rz = px - root[0, 3], py - root[1, 3], pz - root[2, 3]
-        add_turn(out[point], 0, -s * x, -s * y, -s * z, rx, ry, rz)
-        add_turn(out[point], 1, s * w, s * z, -s * y, rx, ry, rz)
-        add_turn(out[point], 2, -s * z, s * w, s * x, rx, ry, rz)
-        add_turn(out[point], 3, s * y, -s * x, s * w, rx, ry, rz)
         for i in range(3):
-            out[point, i, 4 + i] = 1.0
-        add_angle_columns(dh, root, frames, point, px, py, pz, STATE_ROOT, out[point])
+            row = out[point, i]
+            tx, ty, tz, rx, ry, rz = row[1], row[2], row[3], s * row[4], s * row[5], s * row[6]
+            row[0], row[1] = -x * rx - y * ry - z * rz, w * rx + z * ry - y * rz
+            row[2], row[3] = w * ry + x * rz - z * rx, y * rx - x * ry + w * rz
+            row[4], row[5], row[6] = tx, ty, tz

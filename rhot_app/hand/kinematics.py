@@ -80,65 +80,62 @@ def forward_arrays(dh: DhArrays, world_from_root: Array, angles: Array, frames: 
 
 @njit(cache=True)
 def jacobian_arrays(dh: DhArrays, world_from_root: Array, frames: Array, points: Array, out: Array) -> None:
-    """Fill `out` (P, 3, 6 + angles) from what `forward_arrays` filled; columns as `jacobian` says.
-
-    A row's angle turns everything behind it about the z axis of the row's parent frame (Rehg eq. 2.16).
-    """
+    """Fill `out` (P, 3, 6 + angles) from what `forward_arrays` filled; columns as `jacobian` says."""
     out[:] = 0.0
     for point in range(points.shape[0]):
-        px, py, pz = points[point]
-        for i in range(3):
-            out[point, i, i] = 1.0
-        add_turn(out[point], 3, 1.0, 0.0, 0.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
-                  pz - world_from_root[2, 3])
-        add_turn(out[point], 4, 0.0, 1.0, 0.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
-                  pz - world_from_root[2, 3])
-        add_turn(out[point], 5, 0.0, 0.0, 1.0, px - world_from_root[0, 3], py - world_from_root[1, 3],
-                  pz - world_from_root[2, 3])
-        add_angle_columns(dh, world_from_root, frames, point, px, py, pz, TWIST, out[point])
+        x, y, z = points[point]
+        point_jacobian(dh, world_from_root, frames, dh.point_row[point], x, y, z, out[point])
 
 
 @njit(cache=True)
-def add_angle_columns(dh: DhArrays, world_from_root: Array, frames: Array, point: int, px: float, py: float, pz: float,
-                      first: int, out: Array) -> None:
-    """Add to `out` (3, first + angles) how the point at (px, py, pz) follows every angle that moves it."""
-    row = dh.point_row[point]
+def point_jacobian(dh: DhArrays, world_from_root: Array, frames: Array, row: int, x: float, y: float, z: float,
+                   out: Array) -> None:
+    """dp = dt + w x (p - o) + sum_k dq_k a_k x (p - b_k): row k turns what rides on it about its parent's z axis a_k,
+    through its parent's origin b_k (Rehg eq. 2.16); o is the palm's origin.
+
+    Adds the Jacobian of p = (x, y, z) m, world, which rides on a `row` of the table, to `out` (3, 6 + angles); columns
+    as `jacobian` says. The Jacobian of a unit vector d fixed to a row is that of the point p + d less that of p.
+    """
+    rx, ry, rz = x - world_from_root[0, 3], y - world_from_root[1, 3], z - world_from_root[2, 3]
+    out[0, 0], out[1, 1], out[2, 2] = out[0, 0] + 1.0, out[1, 1] + 1.0, out[2, 2] + 1.0
+    out[0, 4], out[0, 5] = out[0, 4] + rz, out[0, 5] - ry
+    out[1, 3], out[1, 5] = out[1, 3] - rz, out[1, 5] + rx
+    out[2, 3], out[2, 4] = out[2, 3] + ry, out[2, 4] - rx
     while row >= 0:
-        parent = dh.parent[row]
+        base = world_from_root if dh.parent[row] < 0 else frames[dh.parent[row]]
         if dh.angle[row] >= 0:
-            base = world_from_root if parent < 0 else frames[parent]
-            sign = dh.sign[row]
-            add_turn(out, first + dh.angle[row], sign * base[0, 2], sign * base[1, 2], sign * base[2, 2],
-                     px - base[0, 3], py - base[1, 3], pz - base[2, 3])
-        row = parent
+            vx, vy, vz = _turned(base, x, y, z)
+            column, sign = TWIST + dh.angle[row], dh.sign[row]
+            out[0, column] += sign * vx
+            out[1, column] += sign * vy
+            out[2, column] += sign * vz
+        row = dh.parent[row]
 
 
 @njit(cache=True)
-def direction_jacobian(dh: DhArrays, world_from_root: Array, frames: Array, point: int, direction: Array,
-                       out: Array) -> None:
-    """Fill `out` (3, 6 + angles): how a unit vector (3,), world, follows that is fixed to a point's body. Columns as
-    `jacobian` says."""
-    out[:] = 0.0
-    x, y, z = direction
-    add_turn(out, 3, 1.0, 0.0, 0.0, x, y, z)
-    add_turn(out, 4, 0.0, 1.0, 0.0, x, y, z)
-    add_turn(out, 5, 0.0, 0.0, 1.0, x, y, z)
-    row = dh.point_row[point]
+def chain_row(dh: DhArrays, world_from_root: Array, frames: Array, row: int, x: float, y: float, z: float,
+              gradient: Array, out: Array) -> None:
+    """g^T dp: `point_jacobian` times a `gradient` g (3,), such as a row of a projection's slope.
+
+    Adds to the first 6 + angles numbers of `out`.
+    """
+    rx, ry, rz = x - world_from_root[0, 3], y - world_from_root[1, 3], z - world_from_root[2, 3]
+    gx, gy, gz = gradient[0], gradient[1], gradient[2]
+    out[0], out[1], out[2] = out[0] + gx, out[1] + gy, out[2] + gz
+    out[3], out[4], out[5] = out[3] + ry * gz - rz * gy, out[4] + rz * gx - rx * gz, out[5] + rx * gy - ry * gx
     while row >= 0:
-        parent = dh.parent[row]
+        base = world_from_root if dh.parent[row] < 0 else frames[dh.parent[row]]
         if dh.angle[row] >= 0:
-            base = world_from_root if parent < 0 else frames[parent]
-            sign = dh.sign[row]
-            add_turn(out, TWIST + dh.angle[row], sign * base[0, 2], sign * base[1, 2], sign * base[2, 2], x, y, z)
-        row = parent
+            vx, vy, vz = _turned(base, x, y, z)
+            out[TWIST + dh.angle[row]] += dh.sign[row] * (gx * vx + gy * vy + gz * vz)
+        row = dh.parent[row]
 
 
-@njit(cache=True)
-def add_turn(out: Array, column: int, ax: float, ay: float, az: float, rx: float, ry: float, rz: float) -> None:
-    """Add axis x lever to a column: the velocity of a point at `lever` from an axis of unit angular speed."""
-    out[0, column] += ay * rz - az * ry
-    out[1, column] += az * rx - ax * rz
-    out[2, column] += ax * ry - ay * rx
+@njit(cache=True, inline="always")
+def _turned(base: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Velocity of a point that turns about the z axis of a frame `base` (3, 4) by 1 rad/s."""
+    rx, ry, rz = x - base[0, 3], y - base[1, 3], z - base[2, 3]
+    return (base[1, 2] * rz - base[2, 2] * ry, base[2, 2] * rx - base[0, 2] * rz, base[0, 2] * ry - base[1, 2] * rx)
 
 
 @njit(cache=True)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rhot_app.estimation.residual import UNIT, Kernel, Rows, student
 from rhot_app.estimation.se3 import PoseState, difference, exponential, pose_difference, retract
-from rhot_app.geometry.camera import CameraModel, project_ray
+from rhot_app.geometry.camera import CameraModel, project_point
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -37,9 +37,6 @@ START_SPEED = 1.0, 5.0
 
 CORNER_KERNEL = student(4.0)
 """Corners have heavy tails: fingers cut them. 4 degrees of freedom (Lange, Little and Taylor 1989)."""
-
-NEAREST_M = 0.02
-"""m: nearer to a camera's plane than its housing, nothing is seen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,20 +191,11 @@ def _project(state: Array, points: Array, late_s: Array, pose: Array, intrinsics
             y[i] = state[4 * i] * points[n, 0] + state[4 * i + 1] * points[n, 1] + state[4 * i + 2] * points[n, 2]
         for i in range(3):
             arm[i] = turn[i, 0] * y[0] + turn[i, 1] * y[1] + turn[i, 2] * y[2]
-        for i in range(3):
-            here[i] = pose[i, 3]
-            for k in range(3):
-                here[i] += pose[i, k] * (state[4 * k + 3] + late * state[12 + k] + arm[k])
-        if here[2] < NEAREST_M:
+            here[i] = state[4 * i + 3] + late * state[VELOCITY + i] + arm[i]
+        if not project_point(here[0], here[1], here[2], pose, intrinsics, pixels[n], by_world):
             pixels[n, :] = math.nan
             jacobian[n, :, :] = math.nan
             continue
-        u, v = here[0] / here[2], here[1] / here[2]
-        pixels[n, 0], pixels[n, 1], ux, uy, vx, vy = project_ray(u, v, intrinsics)
-        for k in range(3):
-            du, dv = (pose[0, k] - u * pose[2, k]) / here[2], (pose[1, k] - v * pose[2, k]) / here[2]
-            by_world[0, k] = ux * du + uy * dv
-            by_world[1, k] = vx * du + vy * dv
         for k in range(3):  # the place's change: translation, -[arm]x turn, velocity, -[arm]x left late
             for i in range(3):
                 by_place[i, k] = 1.0 if i == k else 0.0

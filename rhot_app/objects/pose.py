@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from rhot_app.estimation.least_squares import Dense, minimise
 from rhot_app.estimation.residual import Residual, Rows
 from rhot_app.estimation.se3 import difference, exp_so3, retract
-from rhot_app.geometry.camera import undistort_point, undistort_points
+from rhot_app.geometry.camera import undistort_points
 from rhot_app.geometry.transforms import fit_rigid, inverse, rigid
-from rhot_app.geometry.triangulate import Outcome, triangulate
+from rhot_app.geometry.triangulate import Outcome, cast, empty_rays, triangulate
 from rhot_app.objects.motion import (
     SIZE,
     TWIST,
@@ -171,20 +171,17 @@ def _tag_starts(points: ObjectPoints, cameras: CameraArrays, view: ObjectView) -
 
 def _triangulated_starts(points: ObjectPoints, cameras: CameraArrays, views: Sequence[ObjectView]) -> list[Array]:
     """The rigid fit to all points that two cameras see, if they determine one."""
-    count, found = len(cameras.poses), {}
+    count, found, rays = len(cameras.poses), {}, empty_rays(len(cameras.poses))
     for row in sorted({int(row) for view in views for row in view.rows}):
-        rays, used = np.full((count, 2), np.nan), np.zeros(count, bool)
-        covariances, by_pixel = np.tile(np.eye(2), (2, count, 1, 1))
+        pixels, covariances, used = np.full((count, 2), np.nan), np.zeros((count, 2, 2)), np.zeros(count, bool)
         for view in views:
             for place in np.flatnonzero(view.rows == row):
-                u, v = view.pixels[place]
-                x, y, a, b, c, d = undistort_point(u, v, cameras.intrinsics[view.camera])
-                slope = by_pixel[view.camera] = np.array([[a, b], [c, d]])
-                rays[view.camera], used[view.camera] = (x, y), True
-                covariances[view.camera] = slope @ view.covariances[place] @ slope.T
+                pixels[view.camera], covariances[view.camera] = view.pixels[place], view.covariances[place]
+                used[view.camera] = True
+        cast(pixels, covariances, cameras.intrinsics, used, rays)
         position, covariance = np.empty(3), np.empty((3, 3))
-        if triangulate(rays, covariances, cameras.poses, by_pixel, used, position, covariance)[1] == Outcome.OK:
-            found[row] = position.copy()
+        if triangulate(rays, cameras.poses, used, position, covariance)[1] == Outcome.OK:
+            found[row] = position
     source = points.points[list(found)]
     if not spans_plane(1e3 * source):
         return []

@@ -9,8 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.filters import one_euro
-from rhot_app.geometry.camera import point_rays, undistort_point
-from rhot_app.geometry.triangulate import triangulate
+from rhot_app.geometry.camera import point_rays
+from rhot_app.geometry.triangulate import Rays, cast, empty_rays, triangulate
 from rhot_app.state import Knowledge
 from rhot_app.tracking import trust
 from rhot_app.tracking.rig_arrays import locate_by_disparity
@@ -28,9 +28,6 @@ DOUBT_PX = 1.0
 calibration has drifted: such a place is inferred, not measured."""
 
 GATE_SIGMAS = 6.0
-
-EXACT_PX2 = 1e-6
-"""Variance, per axis, of an observation that is said to be exact: to a thousandth of a pixel."""
 
 
 @njit(cache=True)
@@ -52,13 +49,13 @@ def choose_views(flags: NDArray[np.int64], live: Mask, used: Mask, doubtful: Mas
 
 
 @njit(cache=True)
-def _locate(rays: Array, covariances: Array, cameras: Array, by_pixel: Array, used: Mask, shape: Array, position: Array,
-            covariance: Array) -> tuple[float, int]:
-    error, outcome = triangulate(rays, covariances, cameras, by_pixel, used, position, covariance)
+def _locate(rays: Rays, cameras: Array, used: Mask, shape: Array, position: Array, covariance: Array
+            ) -> tuple[float, int]:
+    error, outcome = triangulate(rays, cameras, used, position, covariance)
     if outcome == 0 and shape[0, 0] + shape[1, 1] + shape[2, 2] > 0.0:
-        centred = np.empty_like(rays)
-        point_rays(rays, cameras, shape, position, centred)
-        error, outcome = triangulate(centred, covariances, cameras, by_pixel, used, position, covariance)
+        centred = Rays(np.empty_like(rays.at), rays.covariances, rays.by_pixel)
+        point_rays(rays.at, cameras, shape, position, centred.at)
+        error, outcome = triangulate(centred, cameras, used, position, covariance)
     return error, outcome
 
 
@@ -84,38 +81,24 @@ def locate_all(pixels: Array, covariances: Array, used: Mask, intrinsics: Array,
     cameras or more the one view whose removal leaves the smallest error is given up first, and cleared in `used`.
     """
     count = pixels.shape[0]
-    rays, ray_covariances, by_pixel = np.empty((count, 2)), np.empty((count, 2, 2)), np.empty((count, 2, 2))
+    rays = empty_rays(count)
     views, trial = np.empty(count, np.bool_), np.empty(count, np.bool_)
     for m in range(pixels.shape[1]):
-        for c in range(count):
-            views[c] = used[c, m]
-            x, y, xu, xv, yu, yv = undistort_point(pixels[c, m, 0], pixels[c, m, 1], intrinsics[c])
-            rays[c, 0], rays[c, 1] = x, y
-            by_pixel[c, 0, 0], by_pixel[c, 0, 1], by_pixel[c, 1, 0], by_pixel[c, 1, 1] = xu, xv, yu, yv
-            uu, vv = max(covariances[c, m, 0, 0], EXACT_PX2), max(covariances[c, m, 1, 1], EXACT_PX2)
-            uv = covariances[c, m, 0, 1]
-            ray_covariances[c, 0, 0] = xu * xu * uu + 2.0 * xu * xv * uv + xv * xv * vv
-            ray_covariances[c, 1, 1] = yu * yu * uu + 2.0 * yu * yv * uv + yv * yv * vv
-            ray_covariances[c, 0, 1] = xu * yu * uu + (xu * yv + xv * yu) * uv + xv * yv * vv
-            ray_covariances[c, 1, 0] = ray_covariances[c, 0, 1]
-            if not (math.isfinite(x) and math.isfinite(y)):
-                views[c] = False
-        error, outcome = _locate(rays, ray_covariances, cameras, by_pixel, views, shapes[m], positions[m],
-                                 position_covariances[m])
+        views[:] = used[:, m]
+        cast(pixels[:, m], covariances[:, m], intrinsics, views, rays)
+        error, outcome = _locate(rays, cameras, views, shapes[m], positions[m], position_covariances[m])
         if outcome == 0 and error > _gate(covariances[:, m], views) and np.sum(views) > 2:
             best, worst = error, -1
             for c in range(count):
                 if views[c]:
                     trial[:] = views
                     trial[c] = False
-                    error, outcome = _locate(rays, ray_covariances, cameras, by_pixel, trial, shapes[m], positions[m],
-                                             position_covariances[m])
+                    error, outcome = _locate(rays, cameras, trial, shapes[m], positions[m], position_covariances[m])
                     if outcome == 0 and error < best:
                         best, worst = error, c
             if worst >= 0:
                 views[worst] = False
-            error, outcome = _locate(rays, ray_covariances, cameras, by_pixel, views, shapes[m], positions[m],
-                                     position_covariances[m])
+            error, outcome = _locate(rays, cameras, views, shapes[m], positions[m], position_covariances[m])
         errors[m] = error
         if outcome != 0 or error > _gate(covariances[:, m], views):
             positions[m] = math.nan
@@ -147,7 +130,7 @@ class LocateArrays:
 
 @njit(cache=True)
 def turn_band(world_from_palm: Array, half_axes: Array, shape: Array) -> None:
-    """Fill `shape` (3, 3) m^2 as `silhouette.ellipsoid` does for a band that turns with the palm (4, 4)."""
+    """Fill `shape` (3, 3) m^2 of a band that turns with the palm (4, 4)."""
     for i in range(3):
         for j in range(3):
             shape[i, j] = 0.0

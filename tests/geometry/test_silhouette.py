@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rhot_app.estimation.se3 import exp_so3
-from rhot_app.geometry.camera import ball, ellipsoid, point_rays
-from rhot_app.geometry.triangulate import triangulate
+from rhot_app.geometry.camera import ball, point_rays
+from rhot_app.geometry.triangulate import Rays, triangulate
 
 FOCAL = 530.0
 CAMERAS = np.array([np.column_stack([np.eye(3), [-x, 0.0, 0.0]]) for x in (0.0, 0.075)])
@@ -46,11 +46,11 @@ def test_the_centre_of_a_sphere_is_found_behind_its_outline(centre, radius):
     position, covariance = np.empty(3), np.empty((3, 3))
     used, unit = np.ones(2, bool), np.tile(np.eye(2), (2, 1, 1))
     by_pixel = unit / FOCAL
-    triangulate(seen, unit, CAMERAS, by_pixel, used, position, covariance)
+    triangulate(Rays(seen, unit, by_pixel), CAMERAS, used, position, covariance)
     assert world[2] - position[2] == pytest.approx(radius**2 / world[2], rel=1e-3)
     corrected = np.empty((2, 2))
     point_rays(seen, CAMERAS, ball(radius), position, corrected)
-    triangulate(corrected, unit, CAMERAS, by_pixel, used, position, covariance)
+    triangulate(Rays(corrected, unit, by_pixel), CAMERAS, used, position, covariance)
     assert np.abs(position - world).max() < 1e-6
 
 
@@ -61,10 +61,10 @@ def test_the_centre_of_a_flat_tilted_band_is_found_too():
     naive, position, covariance = np.empty(3), np.empty(3), np.empty((3, 3))
     used, unit = np.ones(2, bool), np.tile(np.eye(2), (2, 1, 1))
     by_pixel = unit / FOCAL
-    triangulate(seen, unit, CAMERAS, by_pixel, used, naive, covariance)
+    triangulate(Rays(seen, unit, by_pixel), CAMERAS, used, naive, covariance)
     corrected = np.empty((2, 2))
-    point_rays(seen, CAMERAS, ellipsoid(rotation, half_axes), naive, corrected)
-    triangulate(corrected, unit, CAMERAS, by_pixel, used, position, covariance)
+    point_rays(seen, CAMERAS, (rotation * half_axes**2) @ rotation.T, naive, corrected)
+    triangulate(Rays(corrected, unit, by_pixel), CAMERAS, used, position, covariance)
     assert np.linalg.norm(naive - world) > 5e-4
     assert np.linalg.norm(position - world) < 1e-6
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation
-from rhot_app.geometry.camera import CameraModel, undistort_point
-from rhot_app.geometry.triangulate import Outcome, triangulate
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.triangulate import Outcome, cast, empty_rays, triangulate
 from rhot_app.project import CameraPose, Intrinsics
 
 LENS = Intrinsics(640, 480, 530.0, 530.0, 319.5, 239.5, (-0.05, 0.0, 0.0, 0.0, 0.0))
@@ -23,14 +23,10 @@ def nominal() -> list[CameraModel]:
 
 
 def solve(cameras, pixels, covariance_px, used=None):
-    rays, covariances, slopes = np.empty((len(cameras), 2)), *np.empty((2, len(cameras), 2, 2))
-    for c, model in enumerate(cameras):
-        x, y, *jacobian = undistort_point(*pixels[c], model.intrinsics)
-        j = np.array(jacobian).reshape(2, 2)
-        rays[c], slopes[c], covariances[c] = (x, y), j, j @ covariance_px[c] @ j.T
+    rays, used = empty_rays(len(cameras)), np.ones(len(cameras), bool) if used is None else used
+    cast(pixels, covariance_px, np.array([model.intrinsics for model in cameras]), used, rays)
     position, covariance = np.empty(3), np.empty((3, 3))
-    rms, outcome = triangulate(rays, covariances, np.array([m.camera_from_world[:3] for m in cameras]),
-                               slopes, np.ones(len(cameras), bool) if used is None else used, position, covariance)
+    rms, outcome = triangulate(rays, np.array([m.camera_from_world[:3] for m in cameras]), used, position, covariance)
     return position, covariance, rms, Outcome(outcome)
 
 
@@ -102,7 +98,7 @@ def test_a_covariance_that_is_none_drops_its_camera():
     covariances[1] = np.nan
     position, _, _, outcome = solve(cameras, pixels_of(cameras, point), covariances)
     assert outcome is Outcome.OK and np.abs(position - point).max() < 1e-9
-    covariances[2] = 0.0
+    covariances[2] = [[1.0, 2.0], [2.0, 1.0]]
     assert solve(cameras, pixels_of(cameras, point), covariances)[3] is Outcome.TOO_FEW
 
 

@@ -5,7 +5,7 @@ import pytest
 from hand_samples import random_pose, rotation_about
 
 from rhot_app.hand.dh import ROOT, DhRow, compile_table, rigid_rows
-from rhot_app.hand.kinematics import direction_jacobian, empty_frames, forward, forward_arrays, jacobian
+from rhot_app.hand.kinematics import chain_row, empty_frames, forward, forward_arrays, jacobian, point_jacobian
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, FINGERS, HandPose
 
@@ -82,15 +82,27 @@ def test_directions_follow_the_pose_as_finite_differences_say(model):
         return frames
 
     for _ in range(3):
-        pose, out = random_pose(model, rng), np.empty((3, 6 + len(ANGLES)))
+        pose = random_pose(model, rng)
         frames = frames_of(pose)
         for point in range(count):
             row = dh.point_row[point]
             if row == ROOT:
                 continue
-            direction_jacobian(dh, pose.world_from_palm, frames, point, frames[row, :, 0].copy(), out)
+            ends = np.zeros((2, 3, 6 + len(ANGLES)))
+            for place, out in zip((frames[row, :, 3] + frames[row, :, 0], frames[row, :, 3]), ends, strict=True):
+                point_jacobian(dh, pose.world_from_palm, frames, row, *place, out)
             numeric = numeric_jacobian(lambda other, row=row: frames_of(other)[row, :, 0], pose)
-            np.testing.assert_allclose(out, numeric, atol=1e-8)
+            np.testing.assert_allclose(ends[0] - ends[1], numeric, atol=1e-8)
+
+
+def test_a_chain_row_is_a_gradient_times_the_jacobian(model):
+    rng, dh = np.random.default_rng(4), model.dh
+    pose, frames, points = random_pose(model, rng), empty_frames(model.dh), np.empty((len(model.dh.point_row), 3))
+    forward_arrays(dh, pose.world_from_palm, pose.angles, frames, points)
+    for point, slopes in enumerate(jacobian(model, pose)):
+        gradient, out = rng.normal(size=3), np.zeros(6 + len(ANGLES))
+        chain_row(dh, pose.world_from_palm, frames, dh.point_row[point], *points[point], gradient, out)
+        np.testing.assert_allclose(out, gradient @ slopes, atol=1e-12)
 
 
 def test_left_hand_is_the_mirror_image(right_hand, left_hand):

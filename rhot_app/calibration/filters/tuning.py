@@ -36,8 +36,8 @@ from rhot_app.calibration.observations import InstantTable
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.errors import CalibrationError
 from rhot_app.filters import one_euro
-from rhot_app.geometry.camera import CameraModel, undistort_point
-from rhot_app.geometry.triangulate import triangulate
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.triangulate import cast, empty_rays, triangulate
 from rhot_app.progress import Progress, silent
 from rhot_app.project import CameraPose, FilterSettings, Intrinsics, OneEuroSettings, Rig
 
@@ -102,18 +102,15 @@ def _run(times: Array, seen: Array, intrinsics: Array, cameras: Array, pixel_par
     count, markers = seen.shape[1], seen.shape[2]
     pixel_state = np.full((2 * count * markers, 3), math.nan)
     position_state = np.full((3 * markers, 3), math.nan)
-    rays, used, covariance = np.empty((count, 2)), np.empty(count, np.bool_), np.empty((3, 3))
-    by_pixel, spread = np.empty((count, 2, 2)), np.empty((count, 2, 2))
+    rays, used, covariance = empty_rays(count), np.empty(count, np.bool_), np.empty((3, 3))
+    unit = np.zeros((count, 2, 2))
+    unit[:, 0, 0] = unit[:, 1, 1] = 1.0
     for t in range(len(times)):
         one_euro.step(times[t], seen[t].reshape(-1), pixel_parameters, pixel_state, gap_s, pixels[t].reshape(-1))
         for m in range(markers):
-            for c in range(count):
-                x, y, xu, xv, yu, yv = undistort_point(pixels[t, c, m, 0], pixels[t, c, m, 1], intrinsics[c])
-                rays[c, 0], rays[c, 1] = x, y
-                by_pixel[c, 0, 0], by_pixel[c, 0, 1], by_pixel[c, 1, 0], by_pixel[c, 1, 1] = xu, xv, yu, yv
-                spread[c] = by_pixel[c] @ by_pixel[c].T
-                used[c] = math.isfinite(x) and math.isfinite(y)
-            triangulate(rays, spread, cameras, by_pixel, used, positions[t, m], covariance)
+            used[:] = True
+            cast(pixels[t, :, m], unit, intrinsics, used, rays)
+            triangulate(rays, cameras, used, positions[t, m], covariance)
         flat = positions[t].reshape(-1)
         one_euro.step(times[t], flat, position_parameters, position_state, gap_s, flat)
 

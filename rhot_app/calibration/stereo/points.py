@@ -17,7 +17,7 @@ from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.adjust import StereoSolution
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.geometry.camera import intrinsics_row, undistort_with_slope
-from rhot_app.geometry.triangulate import triangulate
+from rhot_app.geometry.triangulate import Rays, triangulate
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def locate_with_covariance(pixels: Array, state: BundleState) -> tuple[Array, Ar
     points, covariances = np.full((pixels.shape[1], 3), np.nan), np.full((pixels.shape[1], 3, 3), np.nan)
     every = np.ones(len(cameras), bool)
     for i in range(len(points)):
-        triangulate(rays[i], spread[i], cameras, by_pixel[i], every, points[i], covariances[i])
+        triangulate(Rays(rays[i], spread[i], by_pixel[i]), cameras, every, points[i], covariances[i])
     return points, covariances
 
 

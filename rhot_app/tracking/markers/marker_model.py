@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.errors import RigError
-from rhot_app.geometry.camera import REACH, CameraModel, project_ray
+from rhot_app.geometry.camera import NEAREST_M, CameraModel, camera_coordinates, project_ray_with_slope
 from rhot_app.hand.anatomy import is_shipped
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.landmarks import ANATOMY_SD_M, LASTING_S
@@ -34,9 +34,6 @@ landmark see `hand.landmarks`."""
 
 LASTING_PX = 0.01
 """px: standard deviation of the error of one camera's centroids that lasts (`python benchmarks/marker_errors.py`)."""
-
-NEAREST_M = 0.02
-"""m: nearer to a camera's plane than its housing, nothing is seen."""
 
 _COUPLED_SD_RAD = math.radians(0.02)  # as good as exact
 
@@ -160,12 +157,10 @@ def project_marker(point, world, half_axes, camera, intrinsics, pixel, slope):
     """Where the silhouette of a marker at `point` (3,) has its centre: `pixel` (2,) px and `slope` (2, 3) px/m.
 
     `world` (3, 4): the palm's pose, along whose axes the body lies. False when the camera cannot see it.
-    `geometry.silhouette` has the formula; its slope is that of a point.
+    `geometry.camera` has the formula; its slope is that of a point.
     """
-    local = np.empty(3)
-    for i in range(3):
-        local[i] = (camera[i, 3] + camera[i, 0] * point[0] + camera[i, 1] * point[1] + camera[i, 2] * point[2])
-    if not local[2] > NEAREST_M:
+    x, y, z = camera_coordinates(camera, point[0], point[1], point[2])
+    if not z > NEAREST_M:
         return False
     xz, yz, zz = 0.0, 0.0, 0.0
     if half_axes[0] > 0.0:
@@ -175,18 +170,9 @@ def project_marker(point, world, half_axes, camera, intrinsics, pixel, slope):
                 a += camera[0, k] * world[k, axis]
                 b += camera[1, k] * world[k, axis]
                 c += camera[2, k] * world[k, axis]
-            square = half_axes[axis] * half_axes[axis]
-            xz += square * a * c
-            yz += square * b * c
-            zz += square * c * c
-    depth = local[2] * local[2] - zz
-    x, y = (local[0] * local[2] - xz) / depth, (local[1] * local[2] - yz) / depth
-    if not x * x + y * y <= intrinsics[REACH]:
-        return False
-    pixel[0], pixel[1], ux, uy, vx, vy = project_ray(x, y, intrinsics)
-    for k in range(3):
-        dx = (camera[0, k] - x * camera[2, k]) / local[2]
-        dy = (camera[1, k] - y * camera[2, k]) / local[2]
-        slope[0, k] = ux * dx + uy * dy
-        slope[1, k] = vx * dx + vy * dy
-    return True
+            variance = half_axes[axis] * half_axes[axis]
+            xz += variance * a * c
+            yz += variance * b * c
+            zz += variance * c * c
+    square = z * z - zz
+    return project_ray_with_slope((x * z - xz) / square, (y * z - yz) / square, z, camera, intrinsics, pixel, slope)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_app.estimation.residual import UNIT, Rows, student
 from rhot_app.geometry.camera import is_wide, pixels_per_metre, project_with_slope
-from rhot_app.hand.kinematics import direction_jacobian, forward_arrays, jacobian_arrays
+from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, point_jacobian
 from rhot_app.hand.landmarks import NOISE_M
 from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
 from rhot_app.tracking.markers.marker_model import MarkerModel, project_marker
@@ -204,7 +204,9 @@ def _linearise(state, dh, half_axes, pose, intrinsics, seen, pixels, covariances
         side, along, distance = _view(dh, frames, points, pose, m, bone, line)
         if not project_marker(points[m], world, half_axes[m], pose, intrinsics, pixel, slope):
             continue
-        direction_jacobian(dh, world, frames, m, bone, turning)
+        turning[:] = -jacobian[m]
+        point_jacobian(dh, world, frames, dh.point_row[m], points[m, 0] + bone[0], points[m, 1] + bone[1],
+                       points[m, 2] + bone[2], turning)
         shown = -0.5 * slender[m] / (1.0 + slender[m] * side) * along / side
         expected = log_width[m] + _log_shown(slender[m], side)
         size = (math.log(diameters[m] / pixels_per_metre(slope))

@@ -24,11 +24,10 @@ from rhot_app.calibration.check.camera_calibration import calibration_error
 from rhot_app.estimation.change_point import ChangePoint, find_change
 from rhot_app.estimation.quantiles import chi_squared_tail
 from rhot_app.estimation.se3 import exp_so3, log_so3
-from rhot_app.geometry.camera import CameraModel, point_rays, undistort_point
+from rhot_app.geometry.camera import CameraModel, point_rays
 from rhot_app.geometry.transforms import inverse, rigid
-from rhot_app.geometry.triangulate import Outcome, triangulate
+from rhot_app.geometry.triangulate import Outcome, cast, empty_rays, triangulate
 from rhot_app.project import Rig
-from rhot_app.tracking.locate import EXACT_PX2
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.refinement.pair_observations import TWIST, PairObservations, PairStore, linearise, midpoints
 from rhot_app.tracking.refinement.refined_rig import CameraCorrection, Refinement
@@ -195,25 +194,19 @@ class RigRefiner:
 
     def _keep_marker(self, t_s: float, marker: int, paired: Paired, used: NDArray[np.bool_], speed: Array,
                      bounds_s: Array) -> None:
-        rig, cameras = self._compiled, len(self._stored)
-        rays, (noise, by_pixel) = np.full((cameras, 2), np.nan), np.tile(np.eye(2), (2, cameras, 1, 1))
-        for camera in np.flatnonzero(used):
-            u, v = paired.pixels[camera, marker]
-            x, y, xu, xv, yu, yv = undistort_point(u, v, rig.intrinsics[camera])
-            slope = by_pixel[camera] = np.array([[xu, xv], [yu, yv]])
-            late = bounds_s[camera] / math.sqrt(3.0) * speed[camera]  # evenly distributed within the bound
-            pixels = paired.covariances[camera, marker] + np.outer(late, late) + EXACT_PX2 * np.eye(2)
-            rays[camera], noise[camera] = (x, y), slope @ pixels @ slope.T
+        rig, rays, observed = self._compiled, empty_rays(len(self._stored)), used.copy()
+        late = bounds_s[:, None] / math.sqrt(3.0) * speed  # evenly distributed within the bound
+        spread = paired.covariances[:, marker] + late[:, :, None] * late[:, None, :]
+        cast(paired.pixels[:, marker], spread, rig.intrinsics, observed, rays)
         place, covariance = np.empty(3), np.empty((3, 3))
-        observed = used & np.isfinite(rays[:, 0])
-        _, outcome = triangulate(rays, noise, rig.cameras, by_pixel, observed, place, covariance)
+        _, outcome = triangulate(rays, rig.cameras, observed, place, covariance)
         if outcome != Outcome.OK:
             return
-        centred = np.empty_like(rays)
-        point_rays(rays, rig.cameras, rig.shapes[marker], place, centred)
+        centred = np.empty_like(rays.at)
+        point_rays(rays.at, rig.cameras, rig.shapes[marker], place, centred)
         for i, j in self._pairs:
             if observed[i] and observed[j]:
-                self.store.add(t_s, (i, j), marker, centred[[i, j]], noise[[i, j]], place)
+                self.store.add(t_s, (i, j), marker, centred[[i, j]], rays.covariances[[i, j]], place)
 
     # -- from observations to poses ------------------------------------------------------------------------------------
 
