@@ -149,7 +149,7 @@ def twin(poses: int) -> dict[str, Any]:
 
 def _score(pose: Pose, name: str, store: list[list[Array]]) -> None:
     """Of each marker that both cameras see whole, (2 cameras, 5): mean error (x, y), variance (x, y), and the mean
-    horizontal error against the outline, whose perspective the master knows and mends (`geometry.camera.point_rays`)."""
+    horizontal error against the outline, whose perspective the master corrects (`geometry.camera.point_rays`)."""
     kind = FastDetector if name == "fast" else ReferenceDetector
     seen = [seen_by(kind(MARKERS), frames, truth)[4:] for frames, truth in zip(pose.frames, pose.centre, strict=True)]
     for index, marker in enumerate(MARKERS.markers):

@@ -282,8 +282,8 @@ def project_ray_with_slope(x: float, y: float, depth: float, camera: Array, intr
 
 @njit(cache=True)
 def project_point(x: float, y: float, z: float, camera: Array, intrinsics: Array, pixel: Array, slope: Array) -> bool:
-    """The projection of a world point (x, y, z) m, for all compiled code: fills `pixel` (2,) px and its Jacobian `slope`
-    (2, 3) px/m; False, with nothing filled, where the camera cannot see it.
+    """The projection of a world point (x, y, z) m, for all compiled code: fills `pixel` (2,) px and its Jacobian
+    `slope` (2, 3) px/m; False, with nothing filled, where the camera cannot see it.
 
     `camera` (3, 4) or (4, 4) camera_from_world, m; `intrinsics` (13,). A residual of a point p on a moving body has the
     Jacobian slope @ dp.

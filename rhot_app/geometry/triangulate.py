@@ -209,7 +209,7 @@ def _solve_symmetric3(a: Array, b: Array, x: Array, inverse: Array) -> bool:
 
 @njit(cache=True)
 def _reprojection_rms(position: Array, rays: Rays, cameras: Array, used: Mask) -> float:
-    """Root mean square over the used cameras of the distance between pixel and reprojected point, px; NaN behind one."""
+    """Root mean square over the used cameras of the distance between pixel and reprojection, px; NaN behind one."""
     total, count = 0.0, 0
     for c in range(used.shape[0]):
         if not used[c]:
