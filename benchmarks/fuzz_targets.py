@@ -27,8 +27,6 @@ from rhot_node.network.presence import Presence
 from rhot_node.network.session import Link, LinkKeys, Sessions
 from rhot_node.slice_search import SliceSearch
 from rhot_node.wire.codec import Seal, encode
-from rhot_node.wire.edges import pack_edges
-from rhot_node.wire.foreground_map import pack_map
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
@@ -48,7 +46,7 @@ from rhot_node.wire.messages import (
     Stop,
     TrustState,
 )
-from rhot_node.wire.slices import SLICES_MAX, pack_slices
+from rhot_node.wire.search import SLICES_MAX, pack_edges, pack_map, pack_slices
 
 NOW_NS = 5 * 10**12
 SLACK_NS = 5_000_000

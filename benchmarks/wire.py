@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 from tables import arguments, publish, table
 
+from rhot_app.sources.text_datagrams import Point, parse_text
 from rhot_node.detect.fast import FastDetector
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 from rhot_node.warm_up import warm_up, warm_up_image
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import MarkerObservation, Observations
-from rhot_node.wire.text import format_text, parse_text
 
 MARKERS = load_markers(resource_path("markers", "rhot6.json"))
 SIZE = (640, 480)
@@ -31,6 +31,11 @@ def six() -> Observations:
                for k in range(6)]
     return Observations(1, 7, 1234, 10**12, 10**12 + 9_000_000, 900_000, 4_000_000, 48_000, *SIZE, 1234,
                         MARKERS.checksum, markers)
+
+
+def format_text(points: list[Point]) -> bytes:
+    """The thesis's text datagram of these positions, px."""
+    return ";".join(f"{x:.3f},{y:.3f}" for x, y in points).encode() + b"\n"
 
 
 def median_us(work: Callable[[], object], rounds: int) -> float:

@@ -24,16 +24,7 @@ from rhot_node.network.session import Sessions, Stream
 from rhot_node.slice_search import SliceSearch
 from rhot_node.tag_search import TagSearch
 from rhot_node.threads import Watch, complaints
-from rhot_node.wire.messages import (
-    U32_MAX,
-    Fiducials,
-    ForegroundPart,
-    HandLandmarks,
-    MarkerObservation,
-    NodeState,
-    Observations,
-    SliceEdges,
-)
+from rhot_node.wire.messages import U32_MAX, FrameMessage, MarkerObservation, NodeState, Observations
 
 log = logging.getLogger(__name__)
 
@@ -51,8 +42,7 @@ MakeDetector = Callable[[NodeSettings], Detector]
 class ObservationSender(Protocol):
     """Where observations go; the UDP link or a fake. Three threads call it."""
 
-    def send(self, observations: Observations | Fiducials | HandLandmarks | SliceEdges | ForegroundPart,
-             stream: Stream) -> bool:
+    def send(self, observations: FrameMessage, stream: Stream) -> bool:
         """Send them where the stream goes; False when they could not be sent."""
         ...
 

@@ -14,16 +14,15 @@ from rhot_node.capture.camera import Frame
 from rhot_node.clock import NodeClock
 from rhot_node.network.session import Stream
 from rhot_node.threads import HANG_S, Worker
-from rhot_node.wire.messages import U32_MAX, Fiducials, ForegroundPart, HandLandmarks, SliceEdges
+from rhot_node.wire.messages import U32_MAX, FrameHead, FrameMessage
 
 Work = TypeVar("Work")
-Found = Fiducials | HandLandmarks | SliceEdges | ForegroundPart
 
 
 class SearchSender(Protocol):
     """Where what is found goes; the UDP link or a fake."""
 
-    def send(self, observations: Found, stream: Stream) -> bool:
+    def send(self, observations: FrameMessage, stream: Stream) -> bool:
         """Send it where the stream goes; False when it could not be sent."""
         ...
 
@@ -89,7 +88,7 @@ class FrameSearch(Generic[Work]):
             self._busy = False
         return True
 
-    def head(self, waiting: Waiting[Work], kind: type) -> tuple[int, int, int, int, int, int, int, int, int, int, int]:
+    def head(self, waiting: Waiting[Work], kind: type) -> FrameHead:
         """What a message of this `kind` begins with, node to frame number."""
         frame, session = waiting.frame, waiting.stream.session
         if session != self._session:
@@ -102,7 +101,7 @@ class FrameSearch(Generic[Work]):
         return (self._node_id, session, sequence, frame.t_node_ns, t_send_node_ns, processing_ns, frame.exposure_ns,
                 frame.row_time_ns, width, height, frame.number & U32_MAX)
 
-    def send(self, message: Found, waiting: Waiting[Work]) -> None:
+    def send(self, message: FrameMessage, waiting: Waiting[Work]) -> None:
         """Send what was found in a frame."""
         if waiting.sender.send(message, waiting.stream):
             self.sent += 1

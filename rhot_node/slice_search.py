@@ -20,11 +20,8 @@ from rhot_node.detect.image import YuvImage
 from rhot_node.foreground_store import ForegroundStore, rgb_of
 from rhot_node.frame_search import FrameSearch, SearchSender, Waiting
 from rhot_node.network.session import Stream
-from rhot_node.wire.codec import EDGES_FIT, FOREGROUND_FIT
-from rhot_node.wire.edges import pack_edges
-from rhot_node.wire.foreground_map import pack_map
 from rhot_node.wire.messages import U32_MAX, ForegroundPart, SliceEdges, Slices
-from rhot_node.wire.slices import unpack_slices
+from rhot_node.wire.search import EDGES_FIT, FOREGROUND_FIT, pack_edges, pack_map, unpack_slices
 
 VALID_S = 1.0
 """How long a request is in force: a hand has moved on by then."""

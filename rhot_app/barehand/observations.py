@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True, slots=True, eq=False)
 class SliceRequest:
     """What one camera's node searches from its next frame on. `slices` (N, 5) as `find_edges` takes them, rounded as
-    `wire.slices` rounds them. `map_step`: px between samples of the foreground map; 0: no map. `expected`: data of the
+    `wire.search` rounds them. `map_step`: px between samples of the foreground map; 0: no map. `expected`: data of the
     requester, which comes back with the answer and is not sent."""
 
     camera: int

@@ -25,6 +25,7 @@ from rhot_app.project import Rig, RigNode
 from rhot_app.recording.raw_log import Record, RecordKind, begun_now, encode_log
 from rhot_node.files import read_table, replacing
 from rhot_node.wire.codec import encode
+from rhot_node.wire.fields import IMAGE_SIZE_MAX
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
@@ -37,7 +38,6 @@ from rhot_node.wire.messages import (
     Start,
     StartEntry,
 )
-from rhot_node.wire.plausible import IMAGE_SIZE_MAX
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]

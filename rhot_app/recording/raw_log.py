@@ -28,7 +28,7 @@ from rhot_app.errors import RecordingError, note_loss
 from rhot_app.project import Rig, parse_rig
 from rhot_node.files import JSON_BYTES_MAX, KIB, MIB, decode_json, open_input
 from rhot_node.terminal import add_examples
-from rhot_node.wire.plausible import TIME_MAX_NS
+from rhot_node.wire.fields import TIME_MAX_NS
 
 MAGIC: Final = b"RHOTLOG\0"
 VERSION: Final = 2

@@ -8,11 +8,8 @@ import numpy as np
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest, edges_of
 from rhot_node.errors import WireError
-from rhot_node.wire.codec import SLICES_FIT
-from rhot_node.wire.edges import EdgeTable
-from rhot_node.wire.foreground_map import unpack_map
 from rhot_node.wire.messages import U32_MAX, ForegroundPart, SliceEdges, Slices
-from rhot_node.wire.slices import SLICES_MAX, pack_slices, unpack_slices
+from rhot_node.wire.search import SLICES_FIT, SLICES_MAX, EdgeTable, pack_slices, unpack_map, unpack_slices
 
 REMEMBERED = 64
 """Requests whose answers may still come: a second of 60 Hz."""

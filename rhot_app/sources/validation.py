@@ -8,14 +8,13 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 
-import numpy as np
-
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.objects.observations import fiducial_frame
 from rhot_app.project import Rig, RigNode
 from rhot_app.sources.clock import ClockEstimate, NodeClockModel
 from rhot_app.sources.hand_landmarks import LandmarkMarkers
 from rhot_app.sources.searches import NodeSearches
+from rhot_app.sources.text_datagrams import TextReader
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Candidates
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import Seal, decode, decode_sealed, is_tagged
@@ -23,14 +22,13 @@ from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     Fiducials,
     ForegroundPart,
+    FrameMessage,
     HandLandmarks,
-    MarkerFlag,
     Message,
     Observations,
     SliceEdges,
 )
 from rhot_node.wire.sequence import SequenceVerdict, SequenceWindow
-from rhot_node.wire.text import parse_text
 
 # -- authentication ----------------------------------------------------------------------------------------------------
 
@@ -55,12 +53,9 @@ def refuse_without_key(data: bytes) -> Message:
 OLDEST_FRAME_NS = 1_000_000_000
 """A frame taken longer ago than this is not worth a state, or its time is wrong."""
 
-Verified = (tuple[Observations | Fiducials | HandLandmarks, int, int, int, float] | CameraObservations | EdgeFrame
-            | ForegroundFrame)
+Verified = tuple[FrameMessage, int, int, int, float] | CameraObservations | EdgeFrame | ForegroundFrame
 """A message with its row-0, send and receive times, master ns, and clock bound, s; what is put together from several
 datagrams, and text, need no second half."""
-
-_FrameMessage = Observations | Fiducials | HandLandmarks | SliceEdges | ForegroundPart
 
 _CLOCK_SLACK_NS = 1_000_000  # scheduling between the stamps at both ends
 
@@ -159,6 +154,7 @@ class DatagramValidator:
             return fiducial_frame(message, self._camera, t_row0_ns, t_receive_ns)
         if isinstance(message, HandLandmarks):
             return self._landmarks.observations(message, self._camera, t_row0_ns, t_send_ns, t_receive_ns, bound_s)
+        assert isinstance(message, Observations)
         return self._build(message, t_row0_ns, t_send_ns, t_receive_ns, bound_s)
 
     def _verify_text(self, data: bytes, t_receive_ns: int) -> Verified | str:
@@ -172,7 +168,7 @@ class DatagramValidator:
     def _verify(self, data: bytes, t_receive_ns: int) -> Verified | str | None:
         """A message, what a last part completes, None of another part, or why it is dropped."""
         message = self.open(data)
-        if not isinstance(message, _FrameMessage):
+        if not isinstance(message, FrameMessage):
             return "kind"
         sequence = self._sequences[type(message)]
         reason = self._not_of_the_stream(message, sequence)
@@ -199,7 +195,7 @@ class DatagramValidator:
                                                                   t_receive_ns)
         return message, t_row0_ns, t_send_ns, t_receive_ns, bound_s
 
-    def _not_of_the_stream(self, message: _FrameMessage, sequence: SequenceWindow) -> str | None:
+    def _not_of_the_stream(self, message: FrameMessage, sequence: SequenceWindow) -> str | None:
         """Why this message is not a new one of the stream that we asked for; None when it is."""
         if message.node_id != self._node_id:
             return "foreign_node"
@@ -210,7 +206,7 @@ class DatagramValidator:
             return verdict.name.lower()
         return None
 
-    def _unlike_the_rig(self, message: _FrameMessage) -> str | None:
+    def _unlike_the_rig(self, message: FrameMessage) -> str | None:
         """What of this message is not as the rig says; None when all is."""
         if isinstance(message, Observations) and (message.marker_checksum != self._checksum
                                                   or message.marker_count != self._count):
@@ -244,47 +240,6 @@ class DatagramValidator:
             pixels=pixels[:count], covariances=covariances[:count], diameters=diameters[:count],
             qualities=qualities[:count], flags=flags[:count], further=further,
             t_row0_node_ns=message.t_frame_node_ns)
-
-
-# -- text datagrams (RHOT 6.4) -----------------------------------------------------------------------------------------
-
-VARIANCE_PX2 = 1.0
-"""Assumed variance of a text centroid per axis: the thesis measured 2-5 px peak deviation (RHOT figure 7.7)."""
-
-DIAMETER_PX = 16.0  # a painted fingertip at 0.6 m; the text does not say
-QUALITY = 0.5
-TIME_BOUND_S = 0.005
-"""The delay from exposure to here is not known; half of a 100 Hz frame is what pairing has to expect."""
-
-
-class TextReader:
-    """Reads text datagrams of one camera."""
-
-    def __init__(self, camera: int, count: int, size: tuple[int, int], time_offset_ns: int = 0) -> None:
-        """`count` markers in the rig's order, image `size` (width, height) px; the calibrated `time_offset_ns` is added
-        to the receive time, so a delay that a moving marker showed is taken off here."""
-        self._camera = camera
-        self._count = count
-        self._size = size
-        self._time_offset_ns = time_offset_ns
-
-    def read(self, data: bytes, t_receive_ns: int) -> CameraObservations:
-        """The observations of one datagram. Raises WireError (length, count, text, or marker: outside the image)."""
-        points = parse_text(data, self._count)
-        pixels = np.full((self._count, 2), np.nan)
-        for row, point in enumerate(points):
-            if point is not None:
-                if point[0] > self._size[0] or point[1] > self._size[1]:
-                    raise WireError("marker", f"{point} lies outside the image of {self._size} px")
-                pixels[row] = point
-        lost = np.isnan(pixels[:, 0])
-        return CameraObservations(
-            camera=self._camera, t_row0_master_ns=t_receive_ns + self._time_offset_ns, row_time_ns=0,
-            clock_bound_s=TIME_BOUND_S, t_receive_ns=t_receive_ns, detect_s=float("nan"), network_s=float("nan"),
-            pixels=pixels,
-            covariances=np.where(lost, 0.0, VARIANCE_PX2)[:, None, None] * np.eye(2),
-            diameters=np.where(lost, 0.0, DIAMETER_PX), qualities=np.where(lost, 0.0, QUALITY),
-            flags=np.where(lost, MarkerFlag.LOST, 0).astype(np.uint16))
 
 
 # -- how long a node's datagrams take to arrive ------------------------------------------------------------------------

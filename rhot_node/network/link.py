@@ -22,14 +22,10 @@ from rhot_node.wire.codec import Seal, asks_who_is_there, decode, encode
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
-    Fiducials,
     Find,
-    ForegroundPart,
-    HandLandmarks,
+    FrameMessage,
     Message,
     NodeState,
-    Observations,
-    SliceEdges,
     Slices,
     Start,
     Stop,
@@ -78,8 +74,7 @@ class UdpLink:
         for number in self._sockets:
             self._poll.register(number, select.POLLIN)
 
-    def send(self, observations: Observations | Fiducials | HandLandmarks | SliceEdges | ForegroundPart,
-             stream: Stream) -> bool:
+    def send(self, observations: FrameMessage, stream: Stream) -> bool:
         """Send one frame's observations; False when the network refused them, which costs that frame only. Any thread
         may call it."""
         try:

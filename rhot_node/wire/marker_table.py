@@ -1,9 +1,11 @@
-"""The markers of one datagram as a table over its bytes: checked, and read into arrays, in one compiled call each."""
+"""The payload of observations, and its markers as a table over its bytes: checked, and read into arrays, in one
+compiled call each."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from struct import Struct
 from typing import overload
 
 import numpy as np
@@ -11,11 +13,25 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_node.errors import WireError
-from rhot_node.wire.messages import CANDIDATES_MAX, FLAGS, MarkerFlag, MarkerObservation
+from rhot_node.wire.fields import (
+    COVARIANCE_MAX,
+    FLAG_TRUNCATED,
+    FRAME_ROOM,
+    IMAGE_MARGIN,
+    begin,
+    expect_length,
+    expect_zeros,
+)
+from rhot_node.wire.messages import CANDIDATES_MAX, FLAGS, FrameHead, MarkerFlag, MarkerObservation, Observations
 
-RECORD_SIZE = 32  # bytes of one marker: index u16, flags u16, then x, y, diameter, cov_xx, cov_xy, cov_yy, quality f32
-IMAGE_MARGIN = 64.0  # px; the centre of a marker cut by the border may lie this far outside
-COVARIANCE_MAX = 1e8  # px^2; also keeps the determinant finite in single precision
+VERSION = 2
+"""Of observations. Their version 1, one record for every marker and no further candidates, is still read."""
+
+MARKERS_MAX = 64
+
+_HEAD = Struct("<IB3s")
+_MARKER = Struct("<HHfffffff")
+_FIT = (FRAME_ROOM - _HEAD.size) // _MARKER.size
 
 _LOST = int(MarkerFlag.LOST)
 _KNOWN_FLAGS = len(FLAGS)
@@ -72,11 +88,41 @@ class MarkerTable(Sequence[MarkerObservation]):
         return self._words[:, 0].astype(np.intp)
 
 
+def encode_observations(message: Observations) -> bytes:
+    """The payload with as many candidates as fit, without lost markers. Raises struct.error when a value does not fit
+    its field."""
+    found = [mark for mark in message.markers if not mark.flags.value & _LOST]
+    kept = found[:_FIT]
+    truncated = message.truncated or len(found) > len(kept)
+    parts = [_HEAD.pack(message.marker_checksum, message.marker_count,
+                        bytes((len(kept), FLAG_TRUNCATED if truncated else 0, 0)))]
+    parts.extend([_MARKER.pack(m.index, m.flags.value, m.x, m.y, m.diameter, m.cov_xx, m.cov_xy, m.cov_yy, m.quality)
+                  for m in kept])
+    return b"".join(parts)
+
+
+def decode_observations(payload: memoryview, head: FrameHead, version: int) -> Observations:
+    """Raises WireError: length, count, reserved, flags, and as `marker_table`."""
+    checksum, count, reserved = begin(payload, _HEAD)
+    if count > MARKERS_MAX:
+        raise WireError("count", f"{count} markers, at most {MARKERS_MAX}")
+    candidates, flags = count, 0
+    if version == VERSION:
+        candidates, flags, reserved = reserved[0], reserved[1], reserved[2:]
+    expect_length(payload, _HEAD.size + candidates * _MARKER.size)
+    expect_zeros(reserved)
+    if flags & ~FLAG_TRUNCATED:
+        raise WireError("flags", f"unknown flags of observations {flags:#04x}")
+    read = candidate_table if version == VERSION else marker_table
+    markers = read(bytes(payload[_HEAD.size:]), count, *head[8:10])
+    return Observations(*head, checksum, markers, bool(flags & FLAG_TRUNCATED))
+
+
 def marker_table(records: bytes, count: int, width: int, height: int) -> MarkerTable:
     """Read observations of version 1, one record for every marker, lost or not.
 
-    `records`: `count` times RECORD_SIZE bytes, of an image of `width` x `height` px. Raises WireError (index, flags or
-    marker) when a record is not plausible.
+    `records`: of `count` markers, of an image of `width` x `height` px. Raises WireError (index, flags or marker) when
+    a record is not plausible.
     """
     words, values = _checked(records, count, width, height, False)
     return MarkerTable(words, values, count)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import msgspec
 
@@ -74,13 +75,10 @@ class MarkerObservation(msgspec.Struct, frozen=True, gc=False):
 
 
 @dataclass(frozen=True, slots=True)
-class Observations:
-    """All markers of one frame.
+class FrameMessage:
+    """What all messages about a frame say. `width`, `height`: of the image, px.
 
-    `markers`: the best candidate of every marker, in the order of the set, lost ones included. Further candidates
-    follow, at most CANDIDATES_MAX of a marker in all. `truncated`: some did not fit the datagram.
-
-    `t_frame_node_ns`: mid-exposure of row 0, node clock; a marker at row y is later by y * `row_time_ns`.
+    `t_frame_node_ns`: mid-exposure of row 0, node clock; what lies at row y is later by y * `row_time_ns`.
     `t_send_node_ns`: when the datagram was handed to the socket. `processing_ns`: from frame available to then.
     """
 
@@ -95,6 +93,20 @@ class Observations:
     width: int
     height: int
     frame_number: int
+
+
+FrameHead = tuple[int, int, int, int, int, int, int, int, int, int, int]
+"""The fields of `FrameMessage`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Observations(FrameMessage):
+    """All markers of one frame.
+
+    `markers`: the best candidate of every marker, in the order of the set, lost ones included. Further candidates
+    follow, at most CANDIDATES_MAX of a marker in all. `truncated`: some did not fit the datagram.
+    """
+
     marker_checksum: int
     markers: Sequence[MarkerObservation]
     truncated: bool = False
@@ -156,6 +168,7 @@ class Start:
     the network may deliver a start late or twice.
     """
 
+    node_id: ClassVar[int] = 0
     session: int
     sequence: int
     entries: tuple[StartEntry, ...]
@@ -165,6 +178,7 @@ class Start:
 class Stop:
     """Master to all nodes: stop streaming `session` (0: whatever session)."""
 
+    node_id: ClassVar[int] = 0
     session: int
     sequence: int
 
@@ -173,6 +187,7 @@ class Stop:
 class Find:
     """Anybody to all nodes, or to `node_id` (0: all): who and where are you? Never tagged. `nonce` comes back."""
 
+    session: ClassVar[int] = 0
     node_id: int
     sequence: int
     nonce: int
@@ -185,6 +200,7 @@ class Here:
     `sequence` and `nonce` are the question's. `boot_id` is that of the clock replies.
     """
 
+    session: ClassVar[int] = 0
     node_id: int
     sequence: int
     nonce: int
@@ -221,21 +237,9 @@ class Fiducial:
 
 
 @dataclass(frozen=True, slots=True)
-class Fiducials:
-    """All fiducial tags of one frame. Times and image size are as in `Observations`; a corner at row y is later than
-    `t_frame_node_ns` by y * `row_time_ns`. `truncated`: some did not fit the datagram."""
+class Fiducials(FrameMessage):
+    """All fiducial tags of one frame. `truncated`: some did not fit the datagram."""
 
-    node_id: int
-    session: int
-    sequence: int
-    t_frame_node_ns: int
-    t_send_node_ns: int
-    processing_ns: int
-    exposure_ns: int
-    row_time_ns: int
-    width: int
-    height: int
-    frame_number: int
     fiducials: Sequence[Fiducial]
     truncated: bool = False
 
@@ -256,21 +260,9 @@ class LandmarkedHand:
 
 
 @dataclass(frozen=True, slots=True)
-class HandLandmarks:
-    """The hands of one frame, as the hand networks find them. Times and image size are as in `Observations`; a landmark
-    at row y is later than `t_frame_node_ns` by y * `row_time_ns`."""
+class HandLandmarks(FrameMessage):
+    """The hands of one frame, as the hand networks find them."""
 
-    node_id: int
-    session: int
-    sequence: int
-    t_frame_node_ns: int
-    t_send_node_ns: int
-    processing_ns: int
-    exposure_ns: int
-    row_time_ns: int
-    width: int
-    height: int
-    frame_number: int
     hands: Sequence[LandmarkedHand]
 
 
@@ -281,7 +273,7 @@ class Slices:
 
     Part `part` of `parts`; `slice_count` slices in all. `width`, `height`: of the image that they are meant for, px.
     `map_step`: every so many px of the image a foreground probability is wanted; 0: none. `records`: the slices of
-    this part as `wire.slices` packs them.
+    this part as `wire.search` packs them.
     """
 
     node_id: int
@@ -313,21 +305,9 @@ class SliceEdge(msgspec.Struct, frozen=True, gc=False):
 
 
 @dataclass(frozen=True, slots=True)
-class SliceEdges:
-    """The edges of one frame on the `slice_count` slices of the master's `request`; part `part` of `parts`. Times and
-    image size are as in `Observations`; a slice at row y is later than `t_frame_node_ns` by y * `row_time_ns`."""
+class SliceEdges(FrameMessage):
+    """The edges of one frame on the `slice_count` slices of the master's `request`; part `part` of `parts`."""
 
-    node_id: int
-    session: int
-    sequence: int
-    t_frame_node_ns: int
-    t_send_node_ns: int
-    processing_ns: int
-    exposure_ns: int
-    row_time_ns: int
-    width: int
-    height: int
-    frame_number: int
     request: int
     slice_count: int
     part: int
@@ -336,21 +316,10 @@ class SliceEdges:
 
 
 @dataclass(frozen=True, slots=True)
-class ForegroundPart:
-    """A part of the foreground map of one frame: `data`, a piece of the compressed map (`wire.foreground_map`). Times
-    and image size are as in `Observations`; `request` is that of the `Slices` that asked for it."""
+class ForegroundPart(FrameMessage):
+    """A part of the foreground map of one frame: `data`, a piece of the compressed map (`wire.search`). `request` is
+    that of the `Slices` that asked for it."""
 
-    node_id: int
-    session: int
-    sequence: int
-    t_frame_node_ns: int
-    t_send_node_ns: int
-    processing_ns: int
-    exposure_ns: int
-    row_time_ns: int
-    width: int
-    height: int
-    frame_number: int
     request: int
     step: int
     part: int
@@ -358,5 +327,4 @@ class ForegroundPart:
     data: bytes
 
 
-Message = (Observations | ClockRequest | ClockReply | Start | Stop | Find | Here | Fiducials | SliceEdges
-           | Slices | ForegroundPart | HandLandmarks)
+Message = FrameMessage | ClockRequest | ClockReply | Start | Stop | Find | Here | Slices

@@ -21,7 +21,7 @@ from rhot_app.state import Condition, HandState
 from rhot_app.tracking.trackers import make_tracker
 from rhot_node.detect.edges import find_edges
 from rhot_node.detect.foreground import learn_background, skin_foreground
-from rhot_node.wire.slices import SLICES_MAX
+from rhot_node.wire.search import SLICES_MAX
 
 SIDES = "right", "left"
 ASIDE_M = 0.1

@@ -22,10 +22,9 @@ from rhot_node.foreground_store import ForegroundStore, foreground_path, load_fo
 from rhot_node.network.pictures import PictureBox
 from rhot_node.network.session import Stream
 from rhot_node.slice_search import VALID_S, SliceSearch
-from rhot_node.wire.codec import SLICES_FIT, decode, encode
-from rhot_node.wire.foreground_map import unpack_map
+from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import ForegroundPart, SliceEdges, Slices
-from rhot_node.wire.slices import pack_slices, unpack_slices
+from rhot_node.wire.search import SLICES_FIT, pack_slices, unpack_map, unpack_slices
 
 STREAM = Stream(7, ("10.0.0.1", 5000), 0)
 EDGE_X = 30.5

@@ -14,11 +14,9 @@ from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.replay import LogValidator
 from rhot_app.sources.validation import DatagramValidator
-from rhot_node.wire.codec import SLICES_FIT, decode, encode
-from rhot_node.wire.edges import pack_edges
-from rhot_node.wire.foreground_map import pack_map
+from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import ForegroundPart, SliceEdges, Slices, Start, StartEntry
-from rhot_node.wire.slices import pack_slices, unpack_slices
+from rhot_node.wire.search import SLICES_FIT, pack_edges, pack_map, pack_slices, unpack_slices
 
 RIG = synthetic_rig()
 NODE = RIG.nodes[1].node_id

@@ -21,7 +21,7 @@ from rhot_app.estimation.track import NEVER, SESSION_NS, WRONG_PERIODS
 from rhot_app.tracking.contours.occlusion import Capsules, visible
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.detect.edges import Edges
-from rhot_node.wire.slices import SLICES_MAX, pack_slices, unpack_slices
+from rhot_node.wire.search import SLICES_MAX, pack_slices, unpack_slices
 
 Array = NDArray[np.float64]
 

@@ -33,7 +33,7 @@ from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.contours.occlusion import Capsules
 from rhot_app.tracking.contours.requests import Requests, requested_contour
 from rhot_app.tracking.tracker import CameraObservations, Tracker
-from rhot_node.wire.slices import SLICES_MAX
+from rhot_node.wire.search import SLICES_MAX
 
 Array = NDArray[np.float64]
 Estimate = tuple[Array, Array]

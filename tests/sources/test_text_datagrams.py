@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rhot_app.sources.text_datagrams import Point, parse_text
 from rhot_node.errors import WireError
-from rhot_node.wire.text import format_text, parse_text
 
 
 @pytest.mark.parametrize("data", [
@@ -32,8 +32,9 @@ def test_anything_else_is_refused_by_its_reason(data: bytes, count: int, reason:
     assert caught.value.reason == reason
 
 
-def test_format_writes_what_the_thesis_sends() -> None:
-    assert format_text([(10.0, 20.5), None]) == b"10.000,20.500;-1,-1\n"
+def format_text(points: list[Point | None]) -> bytes:
+    """The text datagram of these positions, as the thesis's nodes send it."""
+    return ";".join("-1,-1" if point is None else f"{point[0]:.3f},{point[1]:.3f}" for point in points).encode() + b"\n"
 
 
 points = st.one_of(st.none(), st.tuples(st.integers(0, 16_384_000), st.integers(0, 16_384_000)))

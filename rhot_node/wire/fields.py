@@ -1,0 +1,119 @@
+"""Fields that several kinds of messages share: the header, the head of what is said of a frame, and what a decoder
+expects of them. WireError says which was not so."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from struct import Struct
+from typing import Any
+
+from rhot_node.errors import WireError
+from rhot_node.wire.messages import FrameHead, FrameMessage
+
+HEADER = Struct("<4sBBHIQI")
+"""Magic, version, type, flags, node, session, sequence."""
+
+TAG_LENGTH = 16  # bytes
+DATAGRAM_MAX = 1472  # bytes of UDP payload in an Ethernet frame (1500 - 20 IPv4 - 8 UDP): nothing is fragmented
+ROOM = DATAGRAM_MAX - HEADER.size - TAG_LENGTH  # bytes of a payload
+FLAG_TRUNCATED = 1  # bit 0 of the flags of observations and fiducials: there were more than fit
+
+TIME_MAX_NS = 1 << 62  # the difference of two times must fit 64 bits
+FRAME_AGE_MAX_NS = 60_000_000_000  # no frame is sent later than this after its exposure
+IMAGE_SIZE_MAX = 16384  # px
+IMAGE_MARGIN = 64.0  # px; the centre of a marker cut by the border may lie this far outside
+COVARIANCE_MAX = 1e8  # px^2; also keeps the determinant finite in single precision
+
+_FRAME = Struct("<qqIIIHHI")
+FRAME_ROOM = ROOM - _FRAME.size  # bytes of a frame's payload behind what all of them begin with
+
+
+def encode_frame(message: FrameMessage) -> bytes:
+    """What the payload of a message about a frame begins with. Raises struct.error when a value does not fit."""
+    return _FRAME.pack(message.t_frame_node_ns, message.t_send_node_ns, message.processing_ns, message.exposure_ns,
+                       message.row_time_ns, message.width, message.height, message.frame_number)
+
+
+def decode_frame(payload: memoryview, node_id: int, session: int, sequence: int) -> tuple[FrameHead, memoryview]:
+    """The fields of `FrameMessage`, and the rest of the payload. Raises WireError: length, header, time, size."""
+    t_frame, t_send, processing, exposure, row_time, width, height, number = begin(payload, _FRAME)
+    expect_node(node_id)
+    expect_session(session)
+    expect_time(t_frame, t_send)
+    if not 0 <= t_send - t_frame <= FRAME_AGE_MAX_NS:
+        raise WireError("time", f"sent {(t_send - t_frame) / 1e9:.3f} s after its exposure")
+    expect_size(width, height)
+    return (node_id, session, sequence, t_frame, t_send, processing, exposure, row_time, width, height,
+            number), payload[_FRAME.size:]
+
+
+def begin(payload: memoryview, layout: Struct) -> tuple[Any, ...]:
+    """The values with which a payload begins. Raises WireError 'length'."""
+    if len(payload) < layout.size:
+        raise WireError("length", f"payload of {len(payload)} bytes, it begins with {layout.size}")
+    return layout.unpack_from(payload)
+
+
+def expect_length(payload: memoryview, expected: int) -> None:
+    """Raises WireError 'length'."""
+    if len(payload) != expected:
+        raise WireError("length", f"payload of {len(payload)} bytes where {expected} belong")
+
+
+def expect_node(node_id: int) -> None:
+    """That of a message of or to one node. Raises WireError 'header'."""
+    if node_id == 0:
+        raise WireError("header", "node id 0 in a message of or to one node")
+
+
+def expect_everybody(node_id: int) -> None:
+    """That of a message to all nodes, which is 0. Raises WireError 'header'."""
+    if node_id != 0:
+        raise WireError("header", f"node id {node_id} in a message to all nodes")
+
+
+def expect_session(session: int) -> None:
+    """That of a message that belongs to a session. Raises WireError 'header'."""
+    if session == 0:
+        raise WireError("header", "session 0 names no session")
+
+
+def expect_no_session(session: int) -> None:
+    """That of a message that belongs to none, which is 0. Raises WireError 'header'."""
+    if session != 0:
+        raise WireError("header", f"session {session} in a message of no session")
+
+
+def expect_zeros(reserved: bytes | memoryview) -> None:
+    """Raises WireError 'reserved'."""
+    if reserved != bytes(len(reserved)):
+        raise WireError("reserved", "reserved bytes are not zero")
+
+
+def expect_time(*times_ns: int) -> None:
+    """Raises WireError 'time'."""
+    for time_ns in times_ns:
+        if not -TIME_MAX_NS < time_ns < TIME_MAX_NS:
+            raise WireError("time", f"{time_ns} ns")
+
+
+def expect_size(width: int, height: int) -> None:
+    """That of an image, px. Raises WireError 'size'."""
+    if not (0 < width <= IMAGE_SIZE_MAX and 0 < height <= IMAGE_SIZE_MAX):
+        raise WireError("size", f"{width} x {height} px")
+
+
+def expect_part(part: int, parts: int) -> None:
+    """One of several datagrams. Raises WireError 'index'."""
+    if not part < parts:
+        raise WireError("index", f"part {part} of {parts}")
+
+
+def expect_point(what: str, place: Sequence[float], covariance: Sequence[float], width: int, height: int) -> None:
+    """A `place` (x, y) px in or near an image, and its covariance xx, xy, yy px^2. Raises WireError 'marker'."""
+    (x, y), (xx, xy, yy) = place, covariance
+    if not (-IMAGE_MARGIN <= x <= width - 1 + IMAGE_MARGIN and -IMAGE_MARGIN <= y <= height - 1 + IMAGE_MARGIN):
+        raise WireError("marker", f"{what} lies outside the image: {(x, y)}")
+    if not (0.0 < xx <= COVARIANCE_MAX and 0.0 < yy <= COVARIANCE_MAX
+            and xy * xy <= xx * yy * (1.0 + 1e-6)):  # room for rounding to single precision
+        raise WireError("marker", f"{what} has an impossible covariance: {(xx, xy, yy)}")
