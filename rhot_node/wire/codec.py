@@ -10,7 +10,7 @@ from typing import Any
 
 from rhot_node.errors import WireError
 from rhot_node.wire import commands, marker_table, points, search
-from rhot_node.wire.fields import HEADER, TAG_LENGTH, begin, decode_frame, encode_frame
+from rhot_node.wire.fields import FRAME, HEADER, TAG_LENGTH, begin, decode_frame, encode_frame
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
@@ -149,7 +149,9 @@ def asks_who_is_there(data: Datagram) -> bool:
 
 def is_tagged(data: Datagram) -> bool:
     """Whether the datagram has a tag and room for it. Raises WireError when it is none of ours."""
-    magic, version, _, flags, _, _, _ = begin(memoryview(data), HEADER)
+    if len(data) < HEADER.size:
+        raise WireError("length", f"{len(data)} bytes, a header has {HEADER.size}")
+    magic, version, _, flags, _, _, _ = HEADER.unpack_from(data)
     if magic != MAGIC:
         raise WireError("magic", repr(magic))
     if version not in (VERSION, marker_table.VERSION):
@@ -162,19 +164,18 @@ def is_tagged(data: Datagram) -> bool:
 
 
 def _decode_body(data: Datagram, payload: memoryview) -> Message:
-    _, version, number, _, *ids = HEADER.unpack_from(data)
-    kind, decode_payload = _BY_TYPE.get(number, (None, None))
-    if kind is None or decode_payload is None:
+    _, version, number, _, node_id, session, sequence = HEADER.unpack_from(data)
+    if number not in _BY_TYPE:
         raise WireError("type", str(number))
+    kind, decode_payload = _BY_TYPE[number]
     if kind is Observations:
-        head, own = decode_frame(payload, *ids)
-        return decode_payload(own, head, version)
+        return marker_table.decode_observations(payload, decode_frame(payload, node_id, session, sequence), version)
     if version != VERSION:
         raise WireError("version", f"{version} of a message of type {number}, this program speaks {VERSION}")
     if not issubclass(kind, FrameMessage):
-        return decode_payload(payload, *ids)
-    head, own = decode_frame(payload, *ids)
-    return decode_payload(own, head)
+        return decode_payload(payload, node_id, session, sequence)
+    head = decode_frame(payload, node_id, session, sequence)
+    return decode_payload(payload[FRAME.size:], head)
 
 
 def _encode(message: Message) -> bytes:

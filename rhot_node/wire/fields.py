@@ -24,27 +24,27 @@ IMAGE_SIZE_MAX = 16384  # px
 IMAGE_MARGIN = 64.0  # px; the centre of a marker cut by the border may lie this far outside
 COVARIANCE_MAX = 1e8  # px^2; also keeps the determinant finite in single precision
 
-_FRAME = Struct("<qqIIIHHI")
-FRAME_ROOM = ROOM - _FRAME.size  # bytes of a frame's payload behind what all of them begin with
+FRAME = Struct("<qqIIIHHI")
+"""What the payload of every message about a frame begins with."""
+
+FRAME_ROOM = ROOM - FRAME.size  # bytes of a frame's payload behind what all of them begin with
 
 
 def encode_frame(message: FrameMessage) -> bytes:
     """What the payload of a message about a frame begins with. Raises struct.error when a value does not fit."""
-    return _FRAME.pack(message.t_frame_node_ns, message.t_send_node_ns, message.processing_ns, message.exposure_ns,
+    return FRAME.pack(message.t_frame_node_ns, message.t_send_node_ns, message.processing_ns, message.exposure_ns,
                        message.row_time_ns, message.width, message.height, message.frame_number)
 
 
-def decode_frame(payload: memoryview, node_id: int, session: int, sequence: int) -> tuple[FrameHead, memoryview]:
-    """The fields of `FrameMessage`, and the rest of the payload. Raises WireError: length, header, time, size."""
-    t_frame, t_send, processing, exposure, row_time, width, height, number = begin(payload, _FRAME)
+def decode_frame(payload: memoryview, node_id: int, session: int, sequence: int) -> FrameHead:
+    """The fields of `FrameMessage`. Raises WireError: length, header, time, size."""
+    t_frame, t_send, processing, exposure, row_time, width, height, number = begin(payload, FRAME)
     expect_node(node_id)
     expect_session(session)
-    expect_time(t_frame, t_send)
-    if not 0 <= t_send - t_frame <= FRAME_AGE_MAX_NS:
-        raise WireError("time", f"sent {(t_send - t_frame) / 1e9:.3f} s after its exposure")
+    if not -TIME_MAX_NS < t_frame <= t_send <= t_frame + FRAME_AGE_MAX_NS < TIME_MAX_NS:
+        raise WireError("time", f"taken at {t_frame} ns, sent at {t_send} ns")
     expect_size(width, height)
-    return (node_id, session, sequence, t_frame, t_send, processing, exposure, row_time, width, height,
-            number), payload[_FRAME.size:]
+    return node_id, session, sequence, t_frame, t_send, processing, exposure, row_time, width, height, number
 
 
 def begin(payload: memoryview, layout: Struct) -> tuple[Any, ...]:

@@ -16,9 +16,9 @@ from rhot_node.errors import WireError
 from rhot_node.wire.fields import (
     COVARIANCE_MAX,
     FLAG_TRUNCATED,
+    FRAME,
     FRAME_ROOM,
     IMAGE_MARGIN,
-    begin,
     expect_length,
     expect_zeros,
 )
@@ -31,6 +31,7 @@ MARKERS_MAX = 64
 
 _HEAD = Struct("<IB3s")
 _MARKER = Struct("<HHfffffff")
+_RECORDS_AT = FRAME.size + _HEAD.size
 _FIT = (FRAME_ROOM - _HEAD.size) // _MARKER.size
 
 _LOST = int(MarkerFlag.LOST)
@@ -102,19 +103,21 @@ def encode_observations(message: Observations) -> bytes:
 
 
 def decode_observations(payload: memoryview, head: FrameHead, version: int) -> Observations:
-    """Raises WireError: length, count, reserved, flags, and as `marker_table`."""
-    checksum, count, reserved = begin(payload, _HEAD)
+    """`payload`: with the frame's head. Raises WireError: length, count, reserved, flags, and as `marker_table`."""
+    if len(payload) < _RECORDS_AT:
+        raise WireError("length", f"payload of {len(payload)} bytes, observations begin with {_RECORDS_AT}")
+    checksum, count, reserved = _HEAD.unpack_from(payload, FRAME.size)
     if count > MARKERS_MAX:
         raise WireError("count", f"{count} markers, at most {MARKERS_MAX}")
     candidates, flags = count, 0
     if version == VERSION:
         candidates, flags, reserved = reserved[0], reserved[1], reserved[2:]
-    expect_length(payload, _HEAD.size + candidates * _MARKER.size)
+    expect_length(payload, _RECORDS_AT + candidates * _MARKER.size)
     expect_zeros(reserved)
     if flags & ~FLAG_TRUNCATED:
         raise WireError("flags", f"unknown flags of observations {flags:#04x}")
     read = candidate_table if version == VERSION else marker_table
-    markers = read(bytes(payload[_HEAD.size:]), count, *head[8:10])
+    markers = read(bytes(payload[_RECORDS_AT:]), count, *head[8:10])
     return Observations(*head, checksum, markers, bool(flags & FLAG_TRUNCATED))
 
 
