@@ -37,7 +37,7 @@ from tables import arguments, publish, table  # noqa: E402
 
 from rhot_app.barehand.contour_residual import Contours  # noqa: E402
 from rhot_app.barehand.contours import SILHOUETTE  # noqa: E402
-from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, SHAPE, surface_of  # noqa: E402
+from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, surface_of  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
 from rhot_app.estimation.filter import gauss_newton_step  # noqa: E402
 from rhot_app.estimation.residual import stack  # noqa: E402
@@ -47,7 +47,7 @@ from rhot_app.geometry.transforms import inverse  # noqa: E402
 from rhot_app.hand.anatomy import HandAnatomy  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.model import build_model  # noqa: E402
-from rhot_app.hand.motion.hand_process import BIAS  # noqa: E402
+from rhot_app.hand.motion.hand_state import STATE  # noqa: E402
 from rhot_app.simulator.scene.motion import load_motion  # noqa: E402
 from rhot_node.detect.edges import find_edges, noise_of  # noqa: E402
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground  # noqa: E402
@@ -145,7 +145,7 @@ def run(case: str, motion: str, seed: int, frames: int) -> dict[str, float]:
                      for e, c in zip(error, state.joint_covariances, strict=True)])
     taken = 1e3 * np.array(times[2:])
     assert tracker is not None
-    shape = tracker.filter.newest.state[BIAS:BIAS + SHAPE]
+    shape = tracker.filter.newest.state[STATE.shape]
     true, file = (np.log([bone for finger in one.fingers.values() for bone in finger.bones_mm])
                   for one in (hand, believed))
     left = true - file - shape[HAND_SIZE] - shape[FINGER_SIZE] - shape[LENGTH:RADIUS]

@@ -36,7 +36,7 @@ from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
 from rhot_app.hand.anatomy import HandAnatomy  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.model import build_model  # noqa: E402
-from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY  # noqa: E402
+from rhot_app.hand.motion.hand_state import pose_of  # noqa: E402
 from rhot_app.hand.skeleton import HandPose  # noqa: E402
 from rhot_app.handfit.adaptation import adapt  # noqa: E402
 from rhot_app.simulator.scene.motion import load_motion  # noqa: E402
@@ -93,11 +93,9 @@ def run(motion: str, seed: int, seconds: float) -> dict[str, float]:
             spent_s = time.process_time() - begun
             adapted = BareHandTracker(msgspec.structs.replace(rig, hand=found.hand), foreground=foreground)
             newest = tracker.filter.newest.state
-            world = np.eye(4)
-            world[:3] = newest[:ANGLES].reshape(3, 4)
             best = BareHandTracker(msgspec.structs.replace(rig, hand=hand), foreground=foreground)
             for one in (adapted, best):
-                one.start(HandPose(world, newest[ANGLES:VELOCITY]), t_ns)
+                one.start(pose_of(newest), t_ns)
         for name, one in (("wrong", state), ("adapted", adapted.step(images, [t_ns] * 2)),
                           ("true", best.step(images, [t_ns] * 2))):
             joints[name] += list(1e3 * np.linalg.norm(one.joint_positions - true, axis=1))

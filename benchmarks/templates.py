@@ -42,6 +42,7 @@ from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.limits import pose_prior  # noqa: E402
 from rhot_app.hand.motion.hand_process import FASTEST, PALM_SPREAD, HandProcess  # noqa: E402
+from rhot_app.hand.motion.hand_state import pose_of  # noqa: E402
 from rhot_app.hand.skeleton import HandPose  # noqa: E402
 from rhot_app.simulator.bare_hand.painter import BareHand, BareHandPainter, light_of  # noqa: E402
 from rhot_app.simulator.bare_hand.skin import skin_colours  # noqa: E402
@@ -184,8 +185,7 @@ def turning(seconds: float, seed: int = 1, outline: bool = False, amplitude_deg:
         begun = time.process_time()
         state = tracker.see(images, round(1e9 * k / rate_hz)).state
         spent += time.process_time() - begun
-        found = np.eye(4)
-        found[:3] = state[:ANGLES].reshape(3, 4)
+        found = pose_of(state).world_from_palm
         joints = [forward(model, HandPose(*pose)).joints
                   for pose in ((found, state[ANGLES:ANGLES + 21]), (world, angles))]
         away.append(1e3 * (joints[0] - joints[1]))

@@ -33,19 +33,11 @@ from bare_scenes import model_and_surface, rig_of  # noqa: E402
 from pictures import look_at, picture  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
 
-from rhot_app.barehand.surface import SHAPE  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
-from rhot_app.hand.motion.hand_process import (  # noqa: E402
-    ANGLES,
-    BIAS,
-    FASTEST,
-    PALM_SPREAD,
-    POSE,
-    VELOCITY,
-    HandProcess,
-)
+from rhot_app.hand.motion.hand_process import FASTEST, PALM_SPREAD, HandProcess  # noqa: E402
+from rhot_app.hand.motion.hand_state import POSE, STATE  # noqa: E402
 from rhot_app.hand.skeleton import ANGLE_SLICES, FLEXIONS, HandPose  # noqa: E402
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground  # noqa: E402
 
@@ -122,10 +114,10 @@ class MouseProcess(HandProcess):
         self._still_joints = [k for k in range(21) if k not in free]
         numbers = np.array([1, 3, 5, *(6 + k for k in self._still_joints)])
         self._still = np.concatenate([POSE * order + numbers for order in range(3)])
-        self._still_angles = ANGLES + np.array(self._still_joints)
-        self._still_motion = VELOCITY - POSE + self._still[len(numbers):]
+        self._still_angles = STATE.angles.start + np.array(self._still_joints)
+        self._still_motion = STATE.velocity.start - POSE + self._still[len(numbers):]
         self._rest = pose
-        self._lock(np.zeros(BIAS + SHAPE), self.stationary)
+        self._lock(np.zeros(STATE.shape.stop), self.stationary)
 
     def _lock(self, state: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         state[HEIGHT] = self._rest.world_from_palm[1, 3]

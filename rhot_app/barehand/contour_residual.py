@@ -19,10 +19,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, contour_on_slices
-from rhot_app.barehand.surface import FOREARM, PALM, SHAPE, Surface
+from rhot_app.barehand.surface import FOREARM, PALM, Surface
 from rhot_app.estimation.residual import UNIT, Rows, compressed
 from rhot_app.hand.limits import LIMIT_SD_RAD
-from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
+from rhot_app.hand.motion.hand_state import POSE, STATE, TANGENT, tangent_size
 from rhot_node.detect.edges import Edges
 
 Array = NDArray[np.float64]
@@ -93,7 +93,7 @@ class ContourFrame:
         offset, rows = np.zeros(count), np.zeros((count, COLUMNS))
         good = np.zeros(count, np.bool_)
         p = self.points
-        contour_on_slices(self.surface, state, state[BIAS:BIAS + SHAPE].copy(), self.pose, self.intrinsics, self.late_s,
+        contour_on_slices(self.surface, state, state[STATE.shape].copy(), self.pose, self.intrinsics, self.late_s,
                           p.capsule, p.kind, p.along, self.pixel, self.normal, offset, rows, good)
         return offset, rows, good
 
@@ -135,22 +135,22 @@ class Contours:
 
     def linearise(self, state: Array) -> Rows:
         """COLUMNS whitened rows of the information of all slices, and one of the remaining cost."""
-        size = len(state) - BIAS + MOTION
+        size = tangent_size(state)
         if not self.frames:
             return Rows(np.empty(0), np.empty((0, size)), UNIT)
         if self._velocity is not None:
             state = state.copy()
-            state[VELOCITY:ACCELERATION] = self._velocity[0]
+            state[STATE.velocity] = self._velocity[0]
         error, own = compressed(*gathered(self.frames, state, self._root), RIDGE)
         jacobian = np.zeros((COLUMNS + 1, size))
-        jacobian[:, :POSE], jacobian[:, MOTION:MOTION + SHAPE] = own[:, :POSE], own[:, POSE:]
+        jacobian[:, :POSE], jacobian[:, TANGENT.shape] = own[:, :POSE], own[:, POSE:]
         return Rows(error, jacobian, UNIT)
 
 
 def velocity_of(estimate: tuple[Array, Array]) -> tuple[Array, Array]:
     """The velocity (POSE,) in a state with its covariance, and its own."""
-    own = slice(POSE, 2 * POSE)
-    return estimate[0][VELOCITY:ACCELERATION].copy(), estimate[1][own, own].copy()
+    own = TANGENT.velocity
+    return estimate[0][STATE.velocity].copy(), estimate[1][own, own].copy()
 
 
 def gathered(frames: Sequence[ContourFrame], state: Array, velocity_root: Array | None = None
@@ -184,10 +184,10 @@ class JointLimits:
 
     def linearise(self, state: Array) -> Rows:
         """One row for each angle beyond its limits."""
-        angles = state[ANGLES:ANGLES + len(self.limits)]
+        angles = state[STATE.angles]
         excess = np.minimum(self.limits[:, 1] - angles, 0.0) + np.maximum(self.limits[:, 0] - angles, 0.0)
         beyond = np.flatnonzero(excess)
-        jacobian = np.zeros((len(beyond), len(state) - BIAS + MOTION))
+        jacobian = np.zeros((len(beyond), tangent_size(state)))
         jacobian[np.arange(len(beyond)), 6 + beyond] = 1.0 / LIMIT_SD_RAD
         return Rows(excess[beyond] / LIMIT_SD_RAD, jacobian, UNIT)
 
@@ -205,7 +205,7 @@ def slices_of(surface: Surface, state: Array, covariance: Array, pose: Array, in
     slices = np.column_stack([points.pixel, points.normal, np.ones(count)])
     frame = ContourFrame(surface, points, pose, intrinsics, slices, np.zeros(count), late, repeated)
     _, rows, _ = frame.predict(state)
-    own = np.r_[0:POSE, MOTION:MOTION + SHAPE]
+    own = np.r_[0:POSE, TANGENT.shape]
     if abs(late_s) > SAME_TIME_S:
         own, rows = np.r_[own, POSE:2 * POSE], np.hstack([rows, late_s * rows[:, :POSE]])
     variance = np.sum((rows @ covariance[np.ix_(own, own)]) * rows, axis=1)

@@ -24,15 +24,15 @@ from rhot_app.barehand.surface import (
     HAND_SIZE,
     LENGTH,
     RADIUS,
-    SHAPE,
     THICKNESS,
     Surface,
     place_capsules,
     ray_to_capsule,
 )
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.se3 import exponential
 from rhot_app.geometry.camera import REACH, project_ray
-from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY
+from rhot_app.hand.motion.hand_state import POSE, SHAPE, STATE
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -156,11 +156,10 @@ def image_normal(slope, n, u, out):
 
 @njit(cache=True)
 def _contours(surface, state, size, pose, intrinsics, width, height, step_m, ints, floats):
-    world, frames = np.eye(4), np.empty((surface.dh.parent.shape[0], 3, 4))
-    world[:3] = state[:ANGLES].reshape(3, 4)
+    world, frames = pose_matrix(state), np.empty((surface.dh.parent.shape[0], 3, 4))
     count = surface.row.shape[0]
     centres, radii = np.empty((count, 2, 3)), np.empty((count, 2))
-    place_capsules(surface, world, state[ANGLES:VELOCITY], size, frames, centres, radii)
+    place_capsules(surface, world, state[STATE.angles], size, frames, centres, radii)
     o, normals, u = np.empty(3), np.empty((2, 3)), np.empty(3)
     pixel, slope, normal, n = np.empty(2), np.empty((2, 3)), np.empty(2), np.empty(3)
     camera_centre(pose, o)
@@ -295,11 +294,10 @@ def contour_on_slices(surface, state, size, pose, intrinsics, late_s, capsule, k
     """Where the contour of a hand in `state` crosses K slices. Fill `offset` (K,), px along each slice's normal from
     its centre `pixel` (K, 2); `rows` (K, COLUMNS), its derivative by pose and shape; and `good` (K,), whether it
     crosses. `late_s` (K,): a slice's time less the state's, s."""
-    world, frames = np.eye(4), np.empty((surface.dh.parent.shape[0], 3, 4))
-    world[:3] = state[:ANGLES].reshape(3, 4)
+    world, frames = pose_matrix(state), np.empty((surface.dh.parent.shape[0], 3, 4))
     count = surface.row.shape[0]
     centres, radii = np.empty((count, 2, 3)), np.empty((count, 2))
-    place_capsules(surface, world, state[ANGLES:VELOCITY], size, frames, centres, radii)
+    place_capsules(surface, world, state[STATE.angles], size, frames, centres, radii)
     o, normals, n, u, at = np.empty(3), np.empty((2, 3)), np.empty(3), np.empty(3), np.empty(2)
     slope, across, g, c = np.empty((2, 3)), np.empty(2), np.empty(3), np.empty(3)
     camera_centre(pose, o)
@@ -354,7 +352,7 @@ def contour_on_slices(surface, state, size, pose, intrinsics, late_s, capsule, k
             rows[s, POSE + RADIUS + surface.bone[surface.row[k]]] = thicker
         if late_s[s] != 0.0:
             for j in range(POSE):
-                offset[s] += late_s[s] * rows[s, j] * state[VELOCITY + j]
+                offset[s] += late_s[s] * rows[s, j] * state[STATE.velocity][j]
 
 
 @njit(cache=True)

@@ -6,11 +6,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, SHAPE, sized_table
+from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, sized_table
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
-from rhot_app.hand.skeleton import HandPose
+from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE, TANGENT
 from rhot_app.state import Knowledge
 
 Array = NDArray[np.float64]
@@ -22,13 +22,6 @@ def knowledge_of(sd: ArrayLike, observed: ArrayLike, measured: float, inferred: 
     guessed = np.where(np.asarray(sd) <= inferred, int(Knowledge.INFERRED), int(Knowledge.GUESSED))
     certain = (np.asarray(sd) <= measured) & np.asarray(observed, np.bool_)
     return np.where(certain, int(Knowledge.MEASURED), guessed).astype(np.uint8)
-
-
-def pose_of(state: Array) -> HandPose:
-    """The pose in a state."""
-    world = np.eye(4)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    return HandPose(world, state[ANGLES:VELOCITY].copy())
 
 
 @njit(cache=True)
@@ -51,14 +44,13 @@ def add_lengths(table, bone, world, frames, points, out):
 def place_joints(state, covariance, dh, bone, points, covariances, motion):
     """Fill `points` (26, 3) m, their `covariances` (26, 3, 3), and `motion` (2, 21): standard deviations of the joints'
     velocities, m/s, and accelerations, m/s^2 (roots of the traces of their covariances)."""
-    frames, world = np.empty((dh.parent.shape[0], 3, 4)), np.eye(4)
-    world[:3] = state[:ANGLES].reshape(3, 4)
+    frames, world = np.empty((dh.parent.shape[0], 3, 4)), pose_matrix(state)
     a, d = np.empty(dh.a.shape[0]), np.empty(dh.a.shape[0])
-    sized_table(dh, bone, state[BIAS:BIAS + SHAPE], a, d)
-    factor = np.exp(state[BIAS + HAND_SIZE])
+    sized_table(dh, bone, state[STATE.shape], a, d)
+    factor = np.exp(state[STATE.shape][HAND_SIZE])
     table = DhArrays(dh.parent, dh.theta, d, a, dh.cos_alpha, dh.sin_alpha, dh.angle, dh.sign, dh.point_row,
                      dh.point_offset * factor)
-    forward_arrays(table, world, state[ANGLES:VELOCITY], frames, points)
+    forward_arrays(table, world, state[STATE.angles], frames, points)
     lengths = RADIUS - LENGTH
     jacobian = np.zeros((points.shape[0], 3, POSE + 2 + lengths))
     jacobian_arrays(table, world, frames, points, jacobian)
@@ -67,7 +59,7 @@ def place_joints(state, covariance, dh, bone, points, covariances, motion):
     own[POSE], own[POSE + 1] = MOTION + HAND_SIZE, MOTION + FINGER_SIZE
     own[POSE + 2:] = MOTION + LENGTH + np.arange(lengths)
     for order in range(3):
-        own[:POSE] = order * POSE + np.arange(POSE)
+        own[TANGENT.pose] = order * POSE + np.arange(POSE)
         count = len(own) if order == 0 else POSE
         block = np.empty((count, count))
         for i in range(count):

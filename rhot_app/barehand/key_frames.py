@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import COLUMNS, ContourFrame, JointLimits, gathered, in_a_fit
 from rhot_app.barehand.contours import STEP_M
-from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENGTH, RADIUS, SHAPE, THICKNESS
+from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENGTH, RADIUS, THICKNESS
 from rhot_app.barehand.tracker import FOREARM_SD, LENGTH_SD, RADIUS_SD, SIZE_SD, BareHandTracker
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, POSE, VELOCITY
+from rhot_app.hand.motion.hand_state import POSE, STATE, TANGENT
 
 Array = NDArray[np.float64]
 
@@ -68,14 +68,14 @@ def normal_equations(frames: Sequence[ContourFrame], state: Array, model: HandMo
     cost /= CORRELATED_SLICES
     information = (information + np.tril(information, -1).T) / CORRELATED_SLICES
     gradient /= CORRELATED_SLICES
-    angles, prior, bend = slice(6, POSE), model.pose_prior, state[BIAS + FOREARM_TURN:BIAS + SHAPE]
-    away = prior.mean - state[ANGLES:VELOCITY]
+    angles, prior, bend = TANGENT.angles, model.pose_prior, state[STATE.shape][FOREARM_TURN:]
+    away = prior.mean - state[STATE.angles]
     information[angles, angles] += prior.information
     gradient[angles] += prior.information @ away
     limits = JointLimits(model.limits).linearise(state)
     beyond = limits.jacobian[:, :POSE]
-    information[:POSE, :POSE] += beyond.T @ beyond
-    gradient[:POSE] += beyond.T @ limits.error
+    information[TANGENT.pose, TANGENT.pose] += beyond.T @ beyond
+    gradient[TANGENT.pose] += beyond.T @ limits.error
     information[range(6), range(6)] += _PALM_INFORMATION
     last = np.arange(COLUMNS - 2, COLUMNS)
     information[last, last] += 1.0 / _BEND_SD**2

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.joints import pose_of
 from rhot_app.barehand.silhouette import LogOddsMaps, log_odds_maps, score
 from rhot_app.barehand.start import STEP, ForegroundMaps, log_odds, settle
-from rhot_app.barehand.surface import SHAPE, Surface
+from rhot_app.barehand.surface import Surface
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, FASTEST, POSE, VELOCITY
+from rhot_app.hand.motion.hand_process import FASTEST
+from rhot_app.hand.motion.hand_state import STATE, TANGENT, pose_of
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import HandPose
 
@@ -85,12 +85,12 @@ class Relocaliser:
         """Log odds of the hand in `state` by the foreground (`silhouette.score`) and the pose prior, up to a
         constant."""
         pose = pose_of(state)
-        return log_odds(self.surface, pose.world_from_palm, pose.angles, self.model, state[BIAS:BIAS + SHAPE], odds)
+        return log_odds(self.surface, pose.world_from_palm, pose.angles, self.model, state[STATE.shape], odds)
 
     def log_odds_per_pixel(self, odds: LogOddsMaps, state: Array) -> float:
         """Log odds by the foreground per pixel of the hand, without the forearm's."""
         pose = pose_of(state)
-        _, parts = score(self.surface, pose.world_from_palm, pose.angles, state[BIAS:BIAS + SHAPE], odds)
+        _, parts = score(self.surface, pose.world_from_palm, pose.angles, state[STATE.shape], odds)
         return float((parts[:, 0] + parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
 
     # -- where ---------------------------------------------------------------------------------------------------------
@@ -103,8 +103,8 @@ class Relocaliser:
         `stationary` covariance (n, n). Only `rng` changes, so it may run in a thread.
         """
         (state, covariance), odds, old = prediction, self.odds_of(maps), pose_of(prediction[0])
-        size, pace = state[BIAS:BIAS + SHAPE].copy(), FASTEST / np.sqrt(3.0) * dt_s
-        spread = covariance[:POSE, :POSE] + pace**2 * stationary[:POSE, :POSE]
+        size, pace = state[STATE.shape].copy(), FASTEST / np.sqrt(3.0) * dt_s
+        spread = covariance[TANGENT.pose, TANGENT.pose] + pace**2 * stationary[TANGENT.pose, TANGENT.pose]
         world, angles = settle(self.surface, old.world_from_palm, old.angles, spread, self.model, size, odds, self.rng,
                                self.plane)
         moved = _with_pose(state, HandPose(world, angles))
@@ -115,5 +115,5 @@ class Relocaliser:
 def _with_pose(state: Array, pose: HandPose) -> Array:
     """The state with another pose."""
     out = state.copy()
-    out[:ANGLES], out[ANGLES:VELOCITY] = pose.world_from_palm[:3].ravel(), pose.angles
+    out[STATE.palm], out[STATE.angles] = pose.world_from_palm[:3].ravel(), pose.angles
     return out

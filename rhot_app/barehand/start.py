@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.silhouette import CORRELATED, LogOddsMaps, log_odds_maps, score, score_steps, search
-from rhot_app.barehand.surface import SHAPE, Surface
+from rhot_app.barehand.surface import Surface
 from rhot_app.estimation.se3 import quaternion_from_rotation, rotation_from_quaternion
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel
+from rhot_app.hand.motion.hand_state import SHAPE
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, FLEXIONS, JOINTS, HandPose
 from rhot_app.project import Rig, StartPose

@@ -19,6 +19,7 @@ from rhot_app.estimation.se3 import exponential
 from rhot_app.hand.dh import ROOT, DhArrays
 from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel
+from rhot_app.hand.motion.hand_state import SHAPE
 from rhot_app.hand.shape import CARPAL_SPREAD, CARPAL_X, FOREARM_LENGTH, PALM_ULNAR_TAPER
 
 Array = NDArray[np.float64]
@@ -27,8 +28,8 @@ Indices = NDArray[np.int64]
 PALM, FOREARM = 5, 6
 """Groups of capsules after the fingers 0..4."""
 
-HAND_SIZE, FINGER_SIZE, THICKNESS, LENGTH, RADIUS, FOREARM_RADIUS, FOREARM_TURN, SHAPE = 0, 1, 2, 3, 18, 33, 34, 36
-"""Indices into a shape, and its length SHAPE. Each is relative to the hand file and to those before it.
+HAND_SIZE, FINGER_SIZE, THICKNESS, LENGTH, RADIUS, FOREARM_RADIUS, FOREARM_TURN = 0, 1, 2, 3, 18, 33, 34
+"""Indices into a shape. Each is relative to the hand file and to those before it.
 
 HAND_SIZE, FINGER_SIZE, THICKNESS: logarithms of the hand's size, of all phalanges' length, and of all radii but the
 forearm's. LENGTH, RADIUS: logarithms of the length and radius of each of the 15 phalanges. FOREARM_RADIUS: its

@@ -24,7 +24,7 @@ from rhot_app.barehand.contour_residual import (
     velocity_of,
 )
 from rhot_app.barehand.contours import STEP_M, contour_points
-from rhot_app.barehand.joints import knowledge_of, place_joints, pose_of
+from rhot_app.barehand.joints import knowledge_of, place_joints
 from rhot_app.barehand.relocalisation import ODDS_DROP, Relocaliser
 from rhot_app.barehand.start import (
     CONTOUR_THRESHOLD,
@@ -37,7 +37,7 @@ from rhot_app.barehand.start import (
     shown_pose,
     taken_pose,
 )
-from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, PALM, SHAPE, THICKNESS, surface_of
+from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, HAND_SIZE, PALM, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import Knot, Partial, update
 from rhot_app.estimation.residual import Residual
@@ -45,17 +45,8 @@ from rhot_app.estimation.track import TrackFilter
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import build_model, with_locked
-from rhot_app.hand.motion.hand_process import (
-    ACCELERATION,
-    BIAS,
-    FASTEST,
-    MOTION,
-    PALM_SPREAD,
-    POSE,
-    SLOWEST,
-    VELOCITY,
-    HandProcess,
-)
+from rhot_app.hand.motion.hand_process import FASTEST, PALM_SPREAD, SLOWEST, HandProcess
+from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE, TANGENT, pose_of
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import FINGER_OF_ANGLE, FINGER_OF_JOINT, FINGERS, HandPose
 from rhot_app.project import Rig
@@ -161,8 +152,8 @@ class BareHandTracker:
         rad. Contours also fit what is no hand, so something
         else must have shown the pose: a person who has taken `start_pose`, or markers."""
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, place_sd[:2])
-        known = np.linalg.inv(covariance[6:POSE, 6:POSE]) + np.eye(POSE - 6) / place_sd[2] ** 2
-        covariance[6:POSE, 6:POSE] = np.linalg.inv(known)
+        known = np.linalg.inv(covariance[TANGENT.angles, TANGENT.angles]) + np.eye(POSE - 6) / place_sd[2] ** 2
+        covariance[TANGENT.angles, TANGENT.angles] = np.linalg.inv(known)
         self.filter.begin(t_ns, state, covariance)
         self.tracking = self._first_update = True
         self._taken_s = [-np.inf] * len(self.cameras)
@@ -194,7 +185,7 @@ class BareHandTracker:
         state = self.filter.newest.state if state is None else state
         known = any(one is not None for one in maps)
         return bool(found > CONTOUR_THRESHOLD * expected > 0.0 and known and mean_log_odds(
-            pose_of(state), state[BIAS:BIAS + SHAPE].copy(), maps, self.cameras, self.surface) > LOG_ODDS_THRESHOLD)
+            pose_of(state), state[STATE.shape].copy(), maps, self.cameras, self.surface) > LOG_ODDS_THRESHOLD)
 
     def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
         """The hand after one image (H, W, 3) RGB of each camera, None without one, at master times `t_ns`. Raises
@@ -239,7 +230,7 @@ class BareHandTracker:
         shape. Returns state (n,) and covariance (n, n)."""
         pose = pose_of(start)
         state, covariance = self.process.start(pose.world_from_palm, pose.angles, START_SD[:2])
-        state[BIAS:], own = start[BIAS:], slice(MOTION, MOTION + SHAPE)
+        state[STATE.lasting], own = start[STATE.lasting], TANGENT.shape
         covariance[own, own] = self.filter.newest.covariance[own, own]
         self.filter.start(t_s, state, covariance)
         return state, covariance
@@ -312,9 +303,9 @@ class BareHandTracker:
         model, then = self.cameras[camera], state
         if abs(late_s) > SAME_TIME_S:
             step = np.zeros(self.process.size)
-            step[:POSE] = late_s * state[VELOCITY:ACCELERATION]
+            step[TANGENT.pose] = late_s * state[STATE.velocity]
             then = self.process.retract(state, step)
-        size, pose, image_size = state[BIAS:BIAS + SHAPE].copy(), self.poses[camera], (model.width, model.height)
+        size, pose, image_size = state[STATE.shape].copy(), self.poses[camera], (model.width, model.height)
         points = contour_points(self.surface, then, size, pose, model.intrinsics, image_size, step_m)
         frame = slices_of(self.surface, state, covariance, pose, model.intrinsics, points, self.row_s[camera], REACH,
                           LONGEST_PX, self._repeated[camera], late_s)
@@ -355,7 +346,7 @@ class BareHandTracker:
         joint_sd = np.sqrt(np.trace(covariances[:21], axis1=1, axis2=2))
         group = np.where(FINGER_OF_JOINT < 0, PALM, FINGER_OF_JOINT)
         joints = knowledge_of(joint_sd, observed[group], MEASURED_M, INFERRED_M)
-        angles = knowledge_of(deviation[6:POSE], observed[FINGER_OF_ANGLE], MEASURED_RAD, INFERRED_RAD)
+        angles = knowledge_of(deviation[TANGENT.angles], observed[FINGER_OF_ANGLE], MEASURED_RAD, INFERRED_RAD)
         if guessed:
             joints[1:], angles[:] = int(Knowledge.GUESSED), int(Knowledge.GUESSED)
         turn_sd, pose = float(np.sqrt(np.trace(covariance[3:6, 3:6]))), pose_of(state)
@@ -369,11 +360,12 @@ class BareHandTracker:
             world_from_palm=pose.world_from_palm,
             palm_knowledge=Knowledge(int(knowledge_of(turn_sd, observed[PALM], MEASURED_RAD, INFERRED_RAD))),
             joint_covariances=covariances[:21], fingertip_covariances=covariances[21:],
-            angle_sd=deviation[6:POSE].copy(), palm_covariance=covariance[:6, :6].copy(),
-            velocity=state[VELOCITY:ACCELERATION].copy(), acceleration=state[ACCELERATION:BIAS].copy(),
-            velocity_sd=deviation[POSE:2 * POSE], acceleration_sd=deviation[2 * POSE:3 * POSE],
-            joint_velocity_sd=motion[0], joint_acceleration_sd=motion[1], hand_scale=float(np.exp(state[BIAS])),
-            hand_scale_sd=float(deviation[MOTION]))
+            angle_sd=deviation[TANGENT.angles].copy(), palm_covariance=covariance[TANGENT.palm, TANGENT.palm].copy(),
+            velocity=state[STATE.velocity].copy(), acceleration=state[STATE.acceleration].copy(),
+            velocity_sd=deviation[TANGENT.velocity], acceleration_sd=deviation[TANGENT.acceleration],
+            joint_velocity_sd=motion[0], joint_acceleration_sd=motion[1],
+            hand_scale=float(np.exp(state[STATE.shape][HAND_SIZE])),
+            hand_scale_sd=float(deviation[TANGENT.shape][HAND_SIZE]))
 
 
 def _relative_sd(hand: HandAnatomy) -> Array | None:

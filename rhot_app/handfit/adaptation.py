@@ -28,14 +28,14 @@ from rhot_app.barehand.key_frames import (
     phalanx_sd,
     with_edge_bias,
 )
-from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENGTH, RADIUS, SHAPE, THICKNESS
+from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENGTH, RADIUS, THICKNESS
 from rhot_app.barehand.tracker import LENGTH_SD, RADIUS_SD
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.estimation.least_squares import minimise
 from rhot_app.estimation.se3 import retract
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.motion.hand_process import BIAS, POSE, VELOCITY
+from rhot_app.hand.motion.hand_state import POSE, STATE, TANGENT
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.handfit.hand_shape import SHAPE_LIMIT, SIZE, Shapes
 
@@ -195,7 +195,7 @@ class _Iterate:
         self.frames_cost = 0.0
         for frames, state in zip(problem.frames, self.states, strict=True):
             there = state.copy()
-            there[BIAS:BIAS + FOREARM_TURN] = step
+            there[STATE.shape][:FOREARM_TURN] = step
             information, pull, cost = normal_equations(frames, there, problem.model)
             self._systems.append((information, pull))
             self.frames_cost += cost
@@ -233,6 +233,6 @@ class _Iterate:
 def _moved(state: Array, step: Array) -> Array:
     """A state after a step of its pose and of the forearm."""
     out = state.copy()
-    out[:VELOCITY] = retract(state[:VELOCITY], step[:POSE])
-    out[BIAS + FOREARM_TURN:BIAS + SHAPE] += step[POSE:]
+    out[STATE.pose] = retract(state[STATE.pose], step[TANGENT.pose])
+    out[STATE.shape][FOREARM_TURN:] += step[POSE:]
     return out

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from rhot_app.barehand.contour_residual import in_a_fit
 from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.start import START_SD
-from rhot_app.barehand.surface import FOREARM_TURN, SHAPE
+from rhot_app.barehand.surface import FOREARM_TURN
 from rhot_app.barehand.tracker import START_PASSES, BareHandTracker
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, MOTION, POSE, VELOCITY
+from rhot_app.hand.motion.hand_state import MOTION, POSE, SHAPE, STATE, state_at
 from rhot_app.handfit.solve import Evidence, Freedom, Solver, free_numbers
 from rhot_app.handfit.state import Contour, FitState, Instant
 from rhot_app.project import Rig
@@ -70,9 +70,9 @@ def _search(hand: HandAnatomy, rig: Rig, state: FitState, k: int, spread: Array,
     each picture, the colours of skin and the noise."""
     instant = state.instants[k]
     tracker = _tracker(rig, hand, instant)
-    bare, covariance = np.zeros(BIAS + SHAPE), np.zeros((MOTION + SHAPE, MOTION + SHAPE))
-    bare[:ANGLES], bare[ANGLES:VELOCITY] = instant.pose.world_from_palm[:3].ravel(), instant.pose.angles
-    bare[BIAS + FOREARM_TURN:] = instant.bend
+    bare = state_at(instant.pose.world_from_palm, instant.pose.angles, SHAPE)
+    covariance = np.zeros((MOTION + SHAPE, MOTION + SHAPE))
+    bare[STATE.shape][FOREARM_TURN:] = instant.bend
     first = state.own(k).start
     ours = np.concatenate([np.arange(first, first + POSE), np.arange(FOREARM_TURN), first + POSE + np.arange(2)])
     theirs = np.concatenate([np.arange(POSE), MOTION + np.arange(SHAPE)])

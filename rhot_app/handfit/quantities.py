@@ -20,7 +20,7 @@ from rhot_app.barehand.surface import (
 )
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_app.hand.motion.hand_process import POSE
+from rhot_app.hand.motion.hand_state import POSE
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, BONES, FINGERS, HandPose
 from rhot_app.handfit.hand_shape import ROOTS, SHAPE_LIMIT
 from rhot_app.handfit.state import BEND_LIMIT, FitState

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import INNER, contour_points
-from rhot_app.barehand.surface import FOREARM_TURN, SHAPE
+from rhot_app.barehand.surface import FOREARM_TURN
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel, neutral_pose
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
+from rhot_app.hand.motion.hand_state import SHAPE, state_at
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, JOINTS, HandPose
 from rhot_app.handfit.contour_search import fit_to_contours
 from rhot_app.handfit.hand_shape import SIZE, Shapes
@@ -152,8 +152,7 @@ class HandFit:
         one, model = self.instant, self.cameras[camera]
         if one is None:
             return []
-        bare, size = np.zeros(BIAS + SHAPE), np.zeros(SHAPE)
-        bare[:ANGLES], bare[ANGLES:VELOCITY] = one.pose.world_from_palm[:3].ravel(), one.pose.angles
+        bare, size = state_at(one.pose.world_from_palm, one.pose.angles, SHAPE), np.zeros(SHAPE)
         size[FOREARM_TURN:] = one.bend
         points = contour_points(self.shapes.surface(self.state.shape), bare, size,
                                 np.ascontiguousarray(model.camera_from_world[:3]), model.intrinsics,

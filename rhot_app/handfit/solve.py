@@ -18,7 +18,7 @@ from rhot_app.barehand.contour_residual import RIDGE, gathered
 from rhot_app.barehand.contours import NEAREST_M, project
 from rhot_app.barehand.joints import add_lengths
 from rhot_app.barehand.start import START_SD
-from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENGTH, RADIUS, SHAPE
+from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENGTH, RADIUS
 from rhot_app.barehand.tracker import FOREARM_SD
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import Dense, minimise
@@ -27,7 +27,7 @@ from rhot_app.estimation.se3 import pose_difference
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import empty_frames, forward_arrays, jacobian_arrays
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, POSE, VELOCITY
+from rhot_app.hand.motion.hand_state import POSE, SHAPE, STATE, TANGENT, state_at
 from rhot_app.hand.skeleton import JOINTS, HandPose
 from rhot_app.handfit.hand_shape import ROOTS, SHAPE_LIMIT, SHAPE_SD, SIZE, Shapes
 from rhot_app.handfit.state import BEND_LIMIT, OWN, Contour, FitState, Instant
@@ -139,7 +139,7 @@ class Solver:
         own, jacobian = state.own(k), np.zeros((OWN, state.size))
         block = np.zeros((OWN, OWN))
         block[range(6), range(6)] = 1.0 / sd
-        block[6:POSE, 6:POSE] = self._root
+        block[TANGENT.angles, TANGENT.angles] = self._root
         block[range(POSE, OWN), range(POSE, OWN)] = 1.0 / np.array(FOREARM_SD[1:])
         jacobian[:, own] = block
         return Rows(error, jacobian, UNIT)
@@ -213,10 +213,9 @@ def joint_places(model: HandModel, bone: NDArray[np.int64], shape: Array, instan
 def _contour_rows(contour: Contour, state: FitState, k: int) -> Rows:
     """The rows of one instant's edges: its pose and forearm, and the shape's numbers but the finger roots."""
     one = state.instants[k]
-    bare = np.zeros(BIAS + SHAPE)
-    bare[:ANGLES], bare[ANGLES:VELOCITY] = one.pose.world_from_palm[:3].ravel(), one.pose.angles
-    bare[BIAS:BIAS + FOREARM_TURN] = (state.shape - contour.shape)[:FOREARM_TURN]
-    bare[BIAS + FOREARM_TURN:] = one.bend
+    bare = state_at(one.pose.world_from_palm, one.pose.angles, SHAPE)
+    bare[STATE.shape][:FOREARM_TURN] = (state.shape - contour.shape)[:FOREARM_TURN]
+    bare[STATE.shape][FOREARM_TURN:] = one.bend
     information, pull, cost = gathered(contour.frames, bare)
     error, rows = compressed(information, pull, cost, RIDGE)
     jacobian, own = np.zeros((len(error), state.size)), state.own(k).start

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.hand.kinematics import move
-from rhot_app.hand.motion.hand_process import POSE
+from rhot_app.hand.motion.hand_state import POSE, TANGENT
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.handfit.hand_shape import SHAPE_LIMIT, SIZE
 
@@ -99,7 +99,7 @@ class FitState:
             if not own.any():
                 instants.append(one)
                 continue
-            move(one.pose.world_from_palm, one.pose.angles, own[:POSE], world, angles)
+            move(one.pose.world_from_palm, one.pose.angles, own[TANGENT.pose], world, angles)
             instants.append(replace(one, pose=HandPose(world, np.clip(angles, limits[:, 0], limits[:, 1])),
                                     bend=np.clip(one.bend + own[POSE:], -BEND_LIMIT, BEND_LIMIT)))
         return FitState(np.clip(self.shape + step[:SIZE], -SHAPE_LIMIT, SHAPE_LIMIT), tuple(instants))

@@ -12,9 +12,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.track import LOST_NS
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
-from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, VELOCITY
+from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.objects.motion import SIZE, TWIST, ObjectProcess, pose_of
 from rhot_app.objects.state import ObjectState
@@ -80,8 +81,7 @@ class _Hand:
             return later
         numbers = np.concatenate([state.world_from_palm[:3].ravel(), state.angles, state.velocity, state.acceleration])
         noise_sd, numbers = self._process.process_noise_sd(numbers, dt_s), self._process.advance(numbers, dt_s)
-        world, angles = np.eye(4), np.clip(numbers[ANGLES:VELOCITY], *self._limits.T)
-        world[:3] = numbers[:ANGLES].reshape(3, 4)
+        world, angles = pose_matrix(numbers), np.clip(numbers[STATE.angles], *self._limits.T)
         table, points = scaled_table(self._table, state.hand_scale), np.empty((len(self._table.point_row), 3))
         before = np.empty_like(points)
         forward_arrays(table, state.world_from_palm, state.angles, empty_frames(table), before)
@@ -97,8 +97,8 @@ class _Hand:
         way = dt_s * state.velocity_sd + 0.5 * dt_s**2 * state.acceleration_sd + noise_sd
         growth = 1.0 + way / np.maximum(pose_sd, 1e-12)
         return replace(
-            later, world_from_palm=world, angles=angles, velocity=numbers[VELOCITY:ACCELERATION],
-            acceleration=numbers[ACCELERATION:], joint_positions=state.joint_positions + points[:21],
+            later, world_from_palm=world, angles=angles, velocity=numbers[STATE.velocity],
+            acceleration=numbers[STATE.acceleration], joint_positions=state.joint_positions + points[:21],
             fingertip_positions=state.fingertip_positions + points[21:26],
             marker_positions=positions, marker_covariances=covariances,
             joint_covariances=_grown(state.joint_covariances, way_m),

@@ -12,13 +12,13 @@ from shipped_markers import RHOT6
 from shipped_rig import LEFT_MODEL, RIGHT_HAND, RIGHT_MODEL
 
 from rhot_app.barehand.start import start_pose_file
-from rhot_app.barehand.surface import SHAPE, Surface, surface_of
+from rhot_app.barehand.surface import Surface, surface_of
 from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation
 from rhot_app.evaluation.searched_nodes import SearchedNodes
 from rhot_app.geometry.camera import LENS, CameraModel, rig_intrinsics
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
+from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import CameraPose, Rig, RigNode, TrackerSettings
 from rhot_app.simulator.scene.motion import load_motion
@@ -56,8 +56,8 @@ def near(pose: HandPose, seed: int = 0) -> HandPose:
 
 def state_of(pose: HandPose) -> np.ndarray:
     """The estimator's state of a hand at rest."""
-    state = np.zeros(BIAS + SHAPE)
-    state[:ANGLES], state[ANGLES:VELOCITY] = pose.world_from_palm[:3].ravel(), pose.angles
+    state = np.zeros(STATE.shape.stop)
+    state[STATE.palm], state[STATE.angles] = pose.world_from_palm[:3].ravel(), pose.angles
     return state
 
 

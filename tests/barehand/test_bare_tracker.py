@@ -11,7 +11,7 @@ from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.residual import Rows
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.motion.hand_process import BIAS, MOTION
+from rhot_app.hand.motion.hand_state import tangent_size
 from rhot_app.state import Condition
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground
 
@@ -55,7 +55,7 @@ def test_one_camera_has_a_larger_depth_deviation_than_two(film) -> None:
 def test_other_residuals_are_used_in_the_same_update(film) -> None:
     class Place:
         def linearise(self, state: np.ndarray) -> Rows:
-            jacobian = np.zeros((1, len(state) - BIAS + MOTION))
+            jacobian = np.zeros((1, tangent_size(state)))
             jacobian[0, 0] = 1.0
             return Rows(np.array([0.5 - state[3]]), jacobian, np.array([1e-12]))
 

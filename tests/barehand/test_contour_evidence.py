@@ -10,10 +10,10 @@ from pictures import two_cameras
 
 from rhot_app.barehand.contours import SILHOUETTE, STEP_M
 from rhot_app.barehand.observations import EdgeFrame, SliceRequest
-from rhot_app.barehand.surface import HAND_SIZE, SHAPE
+from rhot_app.barehand.surface import HAND_SIZE
 from rhot_app.barehand.tracker import SAME_POSE_S, BareHandTracker
 from rhot_app.hand.anthropometry import scaled_hand
-from rhot_app.hand.motion.hand_process import BIAS, MOTION
+from rhot_app.hand.motion.hand_state import MOTION, SHAPE, STATE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.contours.finder import Finder, Maps
@@ -111,14 +111,14 @@ def test_markers_lie_on_a_hand_of_the_states_shape_with_its_jacobian(markers: st
         resource_path("markers", f"{markers}.json")))
     hand, pose, factor = BareHandTracker(rig, known_size=False), poses("grasp", (0.5,))[0], 1.1
     MarkersOfHand(rig, hand)
-    state = np.zeros(BIAS + SHAPE + 3 * len(rig.markers.ids))
-    state[:BIAS + SHAPE] = state_of(pose)
-    state[BIAS + HAND_SIZE] = np.log(factor)
+    state = np.zeros(STATE.shape.stop + 3 * len(rig.markers.ids))
+    state[:STATE.shape.stop] = state_of(pose)
+    state[STATE.shape][HAND_SIZE] = np.log(factor)
     model = compile_markers(rig)
     frame = MarkerFrame(model, observations(pixels_of(rig, pose, factor)))
     residual = SizedMarkerResidual(frame, model, hand.surface.bone, (state, hand.process.stationary), 0)
     assert np.abs(residual.linearise(state).error).max() < 1.0, "mm of paint and of creases beside"
-    state[BIAS:BIAS + SHAPE] += np.random.default_rng(0).normal(0.0, 0.02, SHAPE)
+    state[STATE.shape] += np.random.default_rng(0).normal(0.0, 0.02, SHAPE)
     rows, size = residual.linearise(state), hand.process.size
     for column in range(MOTION, MOTION + SHAPE):
         step = np.zeros(size)
@@ -133,7 +133,7 @@ def pixels_of(rig: Rig, pose: HandPose, factor: float) -> np.ndarray:
     large = msgspec.structs.replace(rig, hand=scaled_hand(rig.hand, factor))
     model = compile_markers(large)
     blank = MarkerFrame(model, observations(np.zeros((len(model.finger), 2))))
-    return blank.expected(np.concatenate([state_of(pose)[:BIAS], np.zeros(3 * len(model.finger))]))
+    return blank.expected(np.concatenate([state_of(pose)[STATE.motion], np.zeros(3 * len(model.finger))]))
 
 
 def observations(pixels: np.ndarray) -> CameraObservations:

@@ -10,9 +10,10 @@ from pictures import picture, two_cameras
 from rhot_app.barehand.contour_residual import ContourFrame, Contours, slices_of
 from rhot_app.barehand.contours import COLUMNS, INNER, SILHOUETTE, contour_points
 from rhot_app.barehand.silhouette import log_odds_maps
-from rhot_app.barehand.surface import FOREARM_TURN, SHAPE, Surface
+from rhot_app.barehand.surface import FOREARM_TURN, Surface
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.motion.hand_process import BIAS, FASTEST, MOTION, PALM_SPREAD, POSE, HandProcess
+from rhot_app.hand.motion.hand_process import FASTEST, PALM_SPREAD, HandProcess
+from rhot_app.hand.motion.hand_state import MOTION, POSE, SHAPE, STATE
 from rhot_node.detect.edges import EDGES_MAX, Edges, find_edges, noise_of
 from rhot_node.detect.foreground import learn_background, skin_foreground
 
@@ -25,7 +26,7 @@ def process_of(side: str = "right") -> HandProcess:
 
 def frame_of(surface: Surface, state: np.ndarray, camera: CameraModel) -> ContourFrame:
     pose, size = camera.camera_from_world[:3].copy(), (camera.width, camera.height)
-    points = contour_points(surface, state, state[BIAS:].copy(), pose, camera.intrinsics, size)
+    points = contour_points(surface, state, state[STATE.lasting].copy(), pose, camera.intrinsics, size)
     return slices_of(surface, state, 1e-6 * np.eye(process_of().size), pose, camera.intrinsics, points, 0.0, 3.0, 20.0)
 
 
@@ -66,8 +67,8 @@ def test_contours_have_the_jacobian_of_finite_differences() -> None:
     _, surface = model_and_surface()
     process, pose = process_of(), poses("grasp", (0.9,))[0]
     camera, state = two_cameras()[1], state_of(pose)
-    state[BIAS:] = np.random.default_rng(0).normal(0.0, 0.05, SHAPE)
-    state[BIAS + FOREARM_TURN:] = 0.4, -0.2
+    state[STATE.lasting] = np.random.default_rng(0).normal(0.0, 0.05, SHAPE)
+    state[STATE.shape][FOREARM_TURN:] = 0.4, -0.2
     frame = frame_of(surface, state, camera)
     start, rows, good = frame.predict(state)
     assert good.all()

@@ -7,7 +7,8 @@ from scipy.spatial.transform import Rotation
 from synthetic_rig import WIDE, make_rig
 
 from rhot_app.hand.kinematics import forward_arrays
-from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY, HandProcess
+from rhot_app.hand.motion.hand_process import HandProcess
+from rhot_app.hand.motion.hand_state import POSE, STATE, tangent_size
 from rhot_app.tracking.markers.marker_model import compile_markers
 
 SPREAD = np.array([0.2, 0.6])
@@ -30,12 +31,12 @@ def make_process(bodies=False, slowest=SLOWEST, fastest=FASTEST):
 
 def natural_state(rng, distance_m=0.6):
     """A hand at rest in a natural pose, turned any way."""
-    prior, state = markers().pose_prior, np.zeros(BIAS + 3 * len(markers().finger))
+    prior, state = markers().pose_prior, np.zeros(STATE.motion.stop + 3 * len(markers().finger))
     world = np.eye(4)
     world[:3, :3] = Rotation.random(random_state=rng).as_matrix()
     world[:3, 3] = rng.normal([0.03, 0.0, distance_m], 0.02)
-    state[:ANGLES] = world[:3].ravel()
-    state[ANGLES:VELOCITY] = rng.multivariate_normal(prior.mean, np.linalg.inv(prior.information))
+    state[STATE.palm] = world[:3].ravel()
+    state[STATE.angles] = rng.multivariate_normal(prior.mean, np.linalg.inv(prior.information))
     return state
 
 
@@ -43,26 +44,22 @@ def moving_state(rng, speed=1.0):
     """A natural pose that moves and turns as a waving hand; paint biases of a millimetre."""
     state = natural_state(rng)
     unit = speed * np.repeat([0.3, 2.0, 2.0], [3, 3, 21])
-    state[VELOCITY:ACCELERATION] = unit * rng.normal(size=POSE)
-    state[ACCELERATION:BIAS] = 10.0 * unit * rng.normal(size=POSE)
-    state[BIAS:] = rng.normal(0.0, 1e-3, len(state) - BIAS)
+    state[STATE.velocity] = unit * rng.normal(size=POSE)
+    state[STATE.acceleration] = 10.0 * unit * rng.normal(size=POSE)
+    state[STATE.lasting] = rng.normal(0.0, 1e-3, len(state) - STATE.motion.stop)
     return state
 
 
 def world_of(state):
     """world_from_palm (4, 4)."""
-    return np.vstack([state[:ANGLES].reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
+    return np.vstack([state[STATE.palm].reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
 
 
 def points_of(dh, state):
     """(P, 3) m, the table's points of the hand in `state`, without biases."""
     frames, points = np.empty((len(dh.parent), 3, 4)), np.empty((len(dh.point_row), 3))
-    forward_arrays(dh, world_of(state), state[ANGLES:VELOCITY], frames, points)
+    forward_arrays(dh, world_of(state), state[STATE.angles], frames, points)
     return points
-
-
-def tangent_size(state):
-    return len(state) - BIAS + MOTION
 
 
 def slopes(process, look, state, step=1e-6):

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from hand_states import tangent_size, world_of
+from hand_states import world_of
 
 from rhot_app.estimation.residual import GAUSSIAN, Kernel, Rows, student
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
-from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY
+from rhot_app.hand.motion.hand_state import POSE, STATE, tangent_size
 
 HEAVY_TAILED = student(4.0)
 
@@ -19,7 +19,7 @@ def points_and_slopes(dh, state):
     """(P, 3) m and (P, 3, 27) of the table's points."""
     frames, points = np.empty((len(dh.parent), 3, 4)), np.empty((len(dh.point_row), 3))
     slopes = np.empty((len(points), 3, POSE))
-    forward_arrays(dh, world_of(state), state[ANGLES:VELOCITY], frames, points)
+    forward_arrays(dh, world_of(state), state[STATE.angles], frames, points)
     jacobian_arrays(dh, world_of(state), frames, points, slopes)
     return points, slopes
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
+from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE, TANGENT
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -49,7 +49,7 @@ def test_a_step_turns_the_palm_about_itself_in_world_axes():
 def settled(process, seed):
     """A hand at rest in the most probable pose that its markers leave, well within its limits."""
     state, nothing = natural_state(np.random.default_rng(seed)), np.zeros((process.size, process.size))
-    state[ANGLES:VELOCITY] = process.mean
+    state[STATE.angles] = process.mean
     for _ in range(20):
         state = process.predict(state, nothing, 1e-9)[0]
     return state
@@ -62,7 +62,7 @@ def test_the_transition_of_a_hand_at_rest_is_the_slope_of_where_its_markers_go(d
     after = process.predict(state, nothing, dt)[0]
     expected = slopes(process, lambda moved: process.difference(process.predict(moved, nothing, dt)[0], after), state)
     got, seen = process.transition(state, dt), places_by_pose(after)
-    for columns in (slice(0, POSE), slice(POSE, 2 * POSE)):
+    for columns in (slice(0, POSE), TANGENT.velocity):
         np.testing.assert_allclose(seen @ got[:POSE, columns], seen @ expected[:POSE, columns],
                                    atol=2e-2 * np.abs(seen @ expected[:POSE, columns]).max())
 
@@ -82,17 +82,17 @@ def open_directions(state):
 def test_a_hand_that_rests_keeps_its_markers_where_they_are():
     process = make_process()
     state = natural_state(np.random.default_rng(4))
-    state[ANGLES:VELOCITY] = np.clip(state[ANGLES:VELOCITY], *markers().limits.T)
+    state[STATE.angles] = np.clip(state[STATE.angles], *markers().limits.T)
     after = process.predict(state, np.zeros((process.size, process.size)), 1e-9)[0]
     moved = points_of(markers().dh, after) - points_of(markers().dh, state)
-    assert np.linalg.norm(process.difference(after, state)[6:POSE]) > 0.05  # what they leave open is drawn anew
+    assert np.linalg.norm(process.difference(after, state)[TANGENT.angles]) > 0.05  # what they leave open is drawn anew
     assert np.linalg.norm(moved, axis=1).max() < 1e-3
 
 
 def test_what_markers_leave_open_is_known_as_well_as_the_natural_pose_tells():
     process = make_process()
     state = settled(process, 5)
-    covariance = process.predict(state, 1e-12 * np.eye(process.size), 1e-9)[1][:POSE, :POSE]
+    covariance = process.predict(state, 1e-12 * np.eye(process.size), 1e-9)[1][TANGENT.pose, TANGENT.pose]
     free = open_directions(state)
     prior = np.linalg.inv(free[6:].T @ markers().pose_prior.information @ free[6:])
     np.testing.assert_allclose(free.T @ covariance @ free, prior, atol=0.05 * np.abs(prior).max())
@@ -103,14 +103,15 @@ def test_a_thumb_at_its_limits_is_bent_the_other_way_when_that_is_more_probable(
     process, nothing = make_process(), np.zeros((make_process().size, make_process().size))
     forwards = np.radians([-25.0, -7.0, -1.0, 34.0, 35.0])
     state = settled(process, 6)
-    state[ANGLES:ANGLES + 5] = forwards
+    state[STATE.angles][:5] = forwards
     tip = points_of(markers().dh, state)[0]
     found = least_squares(lambda angles: 1e3 * (points_of(markers().dh, np.concatenate(
-        [state[:ANGLES], angles, state[ANGLES + 5:]]))[0] - tip), np.radians([-28.0, 20.0, -25.0, -15.0, -20.0])).x
-    state[ANGLES:ANGLES + 5] = found
+        [state[STATE.palm], angles, state[STATE.palm.stop + 5:]]))[0] - tip),
+                          np.radians([-28.0, 20.0, -25.0, -15.0, -20.0])).x
+    state[STATE.angles][:5] = found
     assert found[4] < 0.0
     after = process.predict(state, nothing, 1e-9)[0]
-    assert after[ANGLES + 4] > np.radians(20.0)
+    assert after[STATE.angles][4] > np.radians(20.0)
     assert np.linalg.norm(points_of(markers().dh, after)[0] - tip) < 2e-3
 
 
@@ -156,10 +157,10 @@ def test_without_observations_the_angles_return_to_the_natural_pose(step_s):
     """However long the steps are."""
     process = make_process()
     *_, (state, covariance) = unobserved(process, 10.0, step_s, 1.0)
-    np.testing.assert_allclose(state[ANGLES:VELOCITY], process.mean, atol=2e-2)
-    np.testing.assert_allclose(state[VELOCITY + 6:ACCELERATION], 0.0, atol=1e-2)
+    np.testing.assert_allclose(state[STATE.angles], process.mean, atol=2e-2)
+    np.testing.assert_allclose(state[STATE.velocity][6:], 0.0, atol=1e-2)
     sd = np.sqrt(np.diag(process.stationary[6:27, 6:27]))
-    np.testing.assert_allclose(np.sqrt(np.diag(covariance)[6:POSE]) / sd, 1.0, atol=0.4)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)[TANGENT.angles]) / sd, 1.0, atol=0.4)
 
 
 def test_without_observations_the_palm_may_be_anywhere_and_the_paint_bias_returns_to_its_prior():
@@ -175,9 +176,9 @@ def test_without_observations_the_palm_may_be_anywhere_and_the_paint_bias_return
 def test_the_paint_bias_decays_with_its_correlation_time():
     process = make_process()
     state = natural_state(np.random.default_rng(7))
-    state[BIAS:] = 1e-3
+    state[STATE.lasting] = 1e-3
     later, covariance = process.predict(state, np.zeros((process.size, process.size)), BIAS_S)
-    np.testing.assert_allclose(later[BIAS:], 1e-3 / np.e, rtol=1e-6)
+    np.testing.assert_allclose(later[STATE.lasting], 1e-3 / np.e, rtol=1e-6)
     np.testing.assert_allclose(np.diag(covariance)[MOTION:], 1e-6 * (1.0 - np.exp(-2.0)), rtol=1e-6)
 
 
@@ -186,9 +187,9 @@ def test_a_faster_hand_is_given_a_shorter_correlation_time():
     state = natural_state(np.random.default_rng(8))
     np.testing.assert_allclose(process.rates(state), [2.0, 4.0, 3.0])
     rest[:3] = 1.0
-    state[VELOCITY:ACCELERATION] = rest
+    state[STATE.velocity] = rest
     rates = process.rates(state)
     assert rates[0] > 3.0
     np.testing.assert_allclose(rates[1:], [4.0, 3.0])
-    state[VELOCITY:ACCELERATION] = 100.0
+    state[STATE.velocity] = 100.0
     np.testing.assert_allclose(process.rates(state), 25.0)

@@ -12,7 +12,7 @@ from hand_states import (
     slopes,
 )
 
-from rhot_app.hand.motion.hand_process import BIAS, MOTION, POSE, VELOCITY
+from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
@@ -45,7 +45,7 @@ def frame_of(state, camera=1, *, bodies=False, sizes=(), lost=(), covariance=((0
 def test_centroids_follow_a_hand_at_rest(camera, seed):
     """With acceleration zero and velocity zero, every column is exact: pose, motion until the row's time, and bias."""
     process, state = make_process(), natural_state(np.random.default_rng(seed))
-    state[BIAS:] = 1e-3
+    state[STATE.lasting] = 1e-3
     frame = frame_of(state, camera)
     assert np.ptp(frame.late_s) > 1e-3
     assert len(frame.linearise(state).error) == 2 * COUNT
@@ -98,11 +98,11 @@ def test_where_the_markers_are_expected_is_where_a_still_hand_s_points_are_proje
 def test_a_row_read_later_sees_the_hand_where_it_has_moved_to():
     """Along a constant velocity of the palm."""
     process, state = make_process(), natural_state(np.random.default_rng(8))
-    state[VELOCITY:VELOCITY + 3] = 0.4, -0.2, 0.3
+    state[STATE.velocity][:3] = 0.4, -0.2, 0.3
     frame = frame_of(state)
     frame.late_s = np.full(COUNT, 0.005)
     step = np.zeros(process.size)
-    step[:3] = 0.005 * state[VELOCITY:VELOCITY + 3]
+    step[:3] = 0.005 * state[STATE.velocity][:3]
     moved = process.retract(state, step)
     later = frame.expected(state)
     frame.late_s = np.zeros(COUNT)

@@ -9,7 +9,7 @@ from other_residuals import Contact, ImageLine, Landmark, Pinhole
 from scipy.stats import chi2
 
 from rhot_app.estimation.filter import IteratedFilter, update
-from rhot_app.hand.motion.hand_process import POSE
+from rhot_app.hand.motion.hand_state import POSE, TANGENT
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.tracker import CameraObservations
@@ -77,9 +77,9 @@ def test_the_new_rows_have_the_right_jacobians(kind):
 def prior_of(process, truth, rng):
     """A prior from which the truth may well be drawn: the palm about right, the angles to a share of their spread."""
     _, covariance = process.start(world_of(truth), process.mean, PALM_SD)
-    covariance[6:POSE, 6:POSE] *= ANGLE_SHARE**2
+    covariance[TANGENT.angles, TANGENT.angles] *= ANGLE_SHARE**2
     step = np.zeros(process.size)
-    step[:POSE] = rng.multivariate_normal(np.zeros(POSE), covariance[:POSE, :POSE])
+    step[TANGENT.pose] = rng.multivariate_normal(np.zeros(POSE), covariance[TANGENT.pose, TANGENT.pose])
     return process.retract(truth, step), covariance
 
 
@@ -116,8 +116,8 @@ def test_the_errors_are_consistent_with_the_stated_covariance(kind):
     process, done = trials(kind)
     squares = []
     for truth, _, knot in done:
-        error = process.difference(truth, knot.state)[:POSE]
-        squares.append(error @ np.linalg.solve(knot.covariance[:POSE, :POSE], error))
+        error = process.difference(truth, knot.state)[TANGENT.pose]
+        squares.append(error @ np.linalg.solve(knot.covariance[TANGENT.pose, TANGENT.pose], error))
     assert 0.85 < np.mean(squares) / POSE < 1.35
     assert np.mean(np.array(squares) < chi2.ppf(0.99, POSE)) > 0.85
 

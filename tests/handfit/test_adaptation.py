@@ -20,10 +20,11 @@ from rhot_app.barehand.surface import surface_of
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.calibration.verdict import Grade
 from rhot_app.engine.rig_watch import JUDGE_NS, HandWatch
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy, load_hand, save_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
-from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
+from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.handfit.adaptation import Adapted, adapt
 from rhot_app.rig_history import accept_hand, require_hand_place, versions
@@ -93,9 +94,8 @@ def test_a_wrong_hand_file_is_mended_by_ten_poses() -> None:
     found = adapted()
     joints = []
     for state, pose in zip(found.states, poses, strict=True):
-        world = np.eye(4)
-        world[:3] = state[:ANGLES].reshape(3, 4)
-        joints.append(forward(build_model(found.hand), HandPose(world, state[ANGLES:VELOCITY])).joints
+        world = pose_matrix(state)
+        joints.append(forward(build_model(found.hand), HandPose(world, state[STATE.angles])).joints
                       - forward(RIGHT_MODEL, pose).joints)
     assert np.mean(np.linalg.norm(joints, axis=2)) < 1.0e-3
     assert rms(errors(found.hand, "radii_mm")) < 0.03 < rms(errors(believed, "radii_mm"))

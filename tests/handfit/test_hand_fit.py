@@ -9,11 +9,12 @@ from bare_scenes import rig_of
 from fit_scenes import another_hand, begun, drawn, seen
 from shipped_rig import RIGHT_HAND, RIGHT_MODEL
 
-from rhot_app.barehand.surface import FOREARM_TURN, LENGTH, RADIUS, SHAPE, capsules_of, surface_of
+from rhot_app.barehand.surface import FOREARM_TURN, LENGTH, RADIUS, capsules_of, surface_of
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import load_hand, save_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
+from rhot_app.hand.motion.hand_state import SHAPE
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.handfit.hand_shape import ROOTS, SHAPE_LIMIT, SHAPE_SD, SIZE, Shapes, anatomy_of
 from rhot_app.handfit.session import HandFit, warm_up

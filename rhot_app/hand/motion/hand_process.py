@@ -18,21 +18,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.gauss_markov import integrated, integrated_noise, matern52, matern52_noise
+from rhot_app.estimation.layout import pose_matrix, set_pose
 from rhot_app.estimation.se3 import PoseState, retract
 from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE, state_at
 from rhot_app.hand.motion.null_space import most_probable_pose
 
 Array = NDArray[np.float64]
-
-POSE = 27
-"""Palm translation (3, m) and rotation (3, rad), both along the world's axes, and 21 angles (rad)."""
-
-MOTION = 3 * POSE
-"""Pose, velocity and acceleration."""
-
-WORLD, ANGLES, VELOCITY, ACCELERATION, BIAS = 0, 12, 33, 60, 87
-"""Where a state's numbers begin: world_from_palm (3, 4), angles (21,), velocity (27,), acceleration (27,), and the
-paint biases (M, 3) m along the world's axes."""
 
 PALM_SPREAD = np.array([0.055, 0.25])
 """m and rad: how far a palm moves and turns within one correlation time, twice as fast as the recorded ones
@@ -69,21 +61,22 @@ class HandProcess(PoseState):
         self.stationary = np.zeros((self.size, self.size))
         for order, scale in enumerate((1.0, fastest**2 / 3.0, fastest**4 / 3.0)):  # value, velocity, acceleration
             first = POSE * order
-            self.stationary[range(first, first + 6), range(first, first + 6)] = scale * np.repeat(spread, 3) ** 2
-            self.stationary[first + 6:first + POSE, first + 6:first + POSE] = scale * covariance
+            palm, angles = range(first, first + 6), slice(first + 6, first + POSE)
+            self.stationary[palm, palm] = scale * np.repeat(spread, 3) ** 2
+            self.stationary[angles, angles] = scale * covariance
         self.set_bias(bias)
 
     def set_bias(self, bias: Array) -> None:
         """Change the covariances (M, 3, 3) m^2 of the paint biases."""
         self._bias = bias
         for m in range(len(bias)):
-            self.stationary[MOTION + 3 * m:MOTION + 3 * m + 3, MOTION + 3 * m:MOTION + 3 * m + 3] = bias[m]
+            own = slice(MOTION + 3 * m, MOTION + 3 * m + 3)
+            self.stationary[own, own] = bias[m]
 
     def start(self, world: Array, angles: Array, place_sd: tuple[float, float]) -> tuple[Array, Array]:
         """State and covariance of a hand at `world` (4, 4) with `angles` (21,), everything else as the stationary
         process has it. `place_sd`: standard deviations of translation, m, and rotation, rad."""
-        state = np.zeros(BIAS + len(self.stationary) - MOTION)
-        state[:ANGLES], state[ANGLES:VELOCITY] = world[:3].ravel(), angles
+        state = state_at(world, angles, len(self.stationary) - MOTION)
         covariance = self.stationary.copy()
         covariance[range(6), range(6)] = np.repeat(place_sd, 3) ** 2
         return state, covariance
@@ -154,18 +147,19 @@ class HandProcess(PoseState):
 @njit(cache=True)
 def _rates(state, information, spread, slowest, fastest, out):
     """Rates at which the estimated velocity and acceleration are as large as they are on average."""
+    v, a = state[STATE.velocity], state[STATE.acceleration]
     for group in range(2):
         speed = acceleration = 0.0
-        for i in range(3):
-            speed += state[VELOCITY + 3 * group + i] ** 2
-            acceleration += state[ACCELERATION + 3 * group + i] ** 2
+        for i in range(3 * group, 3 * group + 3):
+            speed += v[i] ** 2
+            acceleration += a[i] ** 2
         total = speed / spread[group] ** 2 + math.sqrt(acceleration / 3.0) / spread[group]
         out[group] = min(math.sqrt(slowest[group] ** 2 + total), fastest[group])
     speed = acceleration = 0.0
     for i in range(21):
         for j in range(21):
-            speed += state[VELOCITY + 6 + i] * information[i, j] * state[VELOCITY + 6 + j]
-            acceleration += state[ACCELERATION + 6 + i] * information[i, j] * state[ACCELERATION + 6 + j]
+            speed += v[6 + i] * information[i, j] * v[6 + j]
+            acceleration += a[6 + i] * information[i, j] * a[6 + j]
     total = 3.0 * speed / 21.0 + math.sqrt(max(acceleration, 0.0) / 21.0)
     out[2] = min(math.sqrt(slowest[2] ** 2 + total), fastest[2])
 
@@ -217,20 +211,21 @@ def _propagate(state, mean, rate, dt, blocks, turn):
     integrated(rate[0], dt, blocks[0])
     integrated(rate[1], dt, blocks[1])
     matern52(rate[2], dt, blocks[2])
-    step = np.empty(POSE)
+    step, angles, velocities, accelerations = (
+        np.empty(POSE), state[STATE.angles], state[STATE.velocity], state[STATE.acceleration])
     for i in range(POSE):
         a = blocks[_GROUPS[i]]
-        velocity, acceleration = state[VELOCITY + i], state[ACCELERATION + i]
-        away = state[ANGLES + i - 6] - mean[i - 6] if i >= 6 else 0.0
+        velocity, acceleration = velocities[i], accelerations[i]
+        away = angles[i - 6] - mean[i - 6] if i >= 6 else 0.0
         step[i] = a[0, 1] * velocity + a[0, 2] * acceleration + (a[0, 0] - 1.0) * away
-        state[VELOCITY + i] = a[1, 0] * away + a[1, 1] * velocity + a[1, 2] * acceleration
-        state[ACCELERATION + i] = a[2, 0] * away + a[2, 1] * velocity + a[2, 2] * acceleration
-    moved = retract(state[:VELOCITY], step)
-    world, after = state[:ANGLES].reshape(3, 4), moved[:ANGLES].reshape(3, 4)
+        velocities[i] = a[1, 0] * away + a[1, 1] * velocity + a[1, 2] * acceleration
+        accelerations[i] = a[2, 0] * away + a[2, 1] * velocity + a[2, 2] * acceleration
+    moved = retract(state[STATE.pose], step)
+    world, after = pose_matrix(state), pose_matrix(moved)
     for i in range(3):
         for j in range(3):
             turn[i, j] = after[i, 0] * world[j, 0] + after[i, 1] * world[j, 1] + after[i, 2] * world[j, 2]
-    state[:VELOCITY] = moved
+    state[STATE.pose] = moved
 
 
 @njit(cache=True)
@@ -261,8 +256,8 @@ def _transpose(matrix):
 @njit(cache=True)
 def _decay_bias(state, covariance, decay, bias):
     size = covariance.shape[0]
+    state[STATE.lasting] *= decay
     for i in range(MOTION, size):
-        state[BIAS - MOTION + i] *= decay[i - MOTION]
         for j in range(size):
             covariance[i, j] *= decay[i - MOTION]
             covariance[j, i] *= decay[i - MOTION]
@@ -276,12 +271,12 @@ def _decay_bias(state, covariance, decay, bias):
 def _reset_null_space(state, dh, limits, mean, information):
     """Move `state` to the pose that is most probable by the markers' places and the pose prior. Returns
     `most_probable_pose`'s projection and null-space covariance."""
-    world, angles = np.eye(4), state[ANGLES:VELOCITY].copy()
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    world, angles, projection, null_covariance = most_probable_pose(dh, limits, mean, information, world, angles)
-    state[:ANGLES], state[ANGLES:VELOCITY] = world[:3].copy().reshape(12), angles
-    state[VELOCITY:ACCELERATION] = np.dot(projection, state[VELOCITY:ACCELERATION])
-    state[ACCELERATION:BIAS] = np.dot(projection, state[ACCELERATION:BIAS])
+    world, angles, projection, null_covariance = most_probable_pose(dh, limits, mean, information, pose_matrix(state),
+                                                                    state[STATE.angles].copy())
+    set_pose(state, world)
+    state[STATE.angles] = angles
+    state[STATE.velocity] = np.dot(projection, state[STATE.velocity])
+    state[STATE.acceleration] = np.dot(projection, state[STATE.acceleration])
     return projection, null_covariance
 
 

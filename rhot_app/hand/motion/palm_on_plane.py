@@ -8,9 +8,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.residual import Rows
 from rhot_app.estimation.se3 import exp_so3
-from rhot_app.hand.motion.hand_process import BIAS, MOTION, WORLD
+from rhot_app.hand.motion.hand_state import tangent_size
 from rhot_app.project import PalmPlane
 
 Array = NDArray[np.float64]
@@ -37,10 +38,10 @@ class PalmOnPlane:
 
     def linearise(self, state: Array) -> Rows:
         """See `Residual`."""
-        world = state[WORLD:WORLD + 12].reshape(3, 4)
+        world = pose_matrix(state)[:3]
         back = world[:, 2]
         error = np.array([self.distance_m - self.normal @ world[:, 3], *(-self._within @ back)])
-        jacobian = np.zeros((3, len(state) - BIAS + MOTION))
+        jacobian = np.zeros((3, tangent_size(state)))
         jacobian[0, :3] = self.normal
         jacobian[1:, 3:6] = np.cross(back, self._within)
         return Rows(error, jacobian, np.square([HEIGHT_SD_M, TILT_SD_RAD, TILT_SD_RAD]))

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from rhot_app.barehand.observations import ForegroundFrame
 from rhot_app.barehand.relocalisation import LOCAL_SEARCH_S, ODDS_DROP, RELOCALISATION_LOG_ODDS, SAME_POSE_M
 from rhot_app.barehand.tracker import BareHandTracker
-from rhot_app.hand.motion.hand_process import FASTEST, POSE
+from rhot_app.hand.motion.hand_process import FASTEST
+from rhot_app.hand.motion.hand_state import POSE, TANGENT
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.tracking.contours.evidence import joints_of
 from rhot_app.tracking.contours.requests import CameraFrames
@@ -148,5 +149,5 @@ def _inflated(covariance: Array, change: Array) -> Array:
     out = covariance.copy()
     for order, scale in enumerate((1.0, FASTEST**2 / 3.0, FASTEST**4 / 3.0)):
         place = range(POSE * order, POSE * (order + 1))
-        out[place, place] += scale * np.square(change[:POSE])
+        out[place, place] += scale * np.square(change[TANGENT.pose])
     return out

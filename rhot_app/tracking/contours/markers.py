@@ -12,14 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.joints import add_lengths
-from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, SHAPE, sized_table
+from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, sized_table
 from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.residual import Rows
 from rhot_app.estimation.track import TrackFilter
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.landmarks import LASTING_S
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, BIAS_S, FASTEST, MOTION, PALM_SPREAD, VELOCITY, HandProcess
+from rhot_app.hand.motion.hand_process import BIAS_S, FASTEST, PALM_SPREAD, HandProcess
+from rhot_app.hand.motion.hand_state import MOTION, SHAPE, STATE, TANGENT
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.association import MarkerAssociation
@@ -72,7 +74,7 @@ class MarkersOfHand:
         """Start with a track: lasting errors are unknown, with their stationary covariance."""
         knot = self._hand.filter.newest
         self._set_lasting_errors(knot.state)
-        own = slice(MOTION + SHAPE, None)
+        own = TANGENT.biases
         knot.covariance[own, own] = self._process.stationary[own, own]
         self.reset()
 
@@ -127,7 +129,7 @@ class SizedMarkerResidual:
 
 def sized(markers: MarkerModel, bone: Indices, state: Array) -> MarkerModel:
     """The marker model of a hand with the lengths in `state`."""
-    dh, shape = markers.dh, np.ascontiguousarray(state[BIAS:BIAS + SHAPE])
+    dh, shape = markers.dh, np.ascontiguousarray(state[STATE.shape])
     a, d = np.empty(len(dh.a)), np.empty(len(dh.d))
     sized_table(dh, bone, shape, a, d)
     return replace(markers, dh=dh._replace(a=a, d=d, point_offset=np.exp(shape[HAND_SIZE]) * dh.point_offset))
@@ -135,9 +137,8 @@ def sized(markers: MarkerModel, bone: Indices, state: Array) -> MarkerModel:
 
 def lengths_jacobian(dh: DhArrays, bone: Indices, state: Array) -> Array:
     """(3 P, 17): Jacobian of the P points of a sized table by the LENGTHS of a shape."""
-    world, frames, points = np.eye(4), empty_frames(dh), np.empty((len(dh.point_row), 3))
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    forward_arrays(dh, world, state[ANGLES:VELOCITY], frames, points)
+    world, frames, points = pose_matrix(state), empty_frames(dh), np.empty((len(dh.point_row), 3))
+    forward_arrays(dh, world, state[STATE.angles], frames, points)
     out = np.zeros((len(points), 3, len(LENGTHS)))
     add_lengths(dh, bone, world, frames, points, out)
     return out.reshape(-1, len(LENGTHS))
@@ -155,4 +156,4 @@ def without_shape_covariance(covariance: Array, lengths: Array) -> Array:
 
 def without_shape(state: Array) -> Array:
     """The state of `marker_residual`."""
-    return np.concatenate([state[:BIAS], state[BIAS + SHAPE:]])
+    return np.concatenate([state[STATE.motion], state[STATE.biases]])

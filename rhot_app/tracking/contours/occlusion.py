@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import INNER, JUMP_M, OUTSIDE_M
-from rhot_app.barehand.joints import pose_of
 from rhot_app.barehand.silhouette import FOREARM_M, FOREARM_SPREAD, rasterise
-from rhot_app.barehand.surface import FOREARM, SHAPE, capsules_of, ray_to_capsule
+from rhot_app.barehand.surface import FOREARM, capsules_of, ray_to_capsule
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.motion.hand_process import BIAS
+from rhot_app.hand.motion.hand_state import STATE, pose_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -57,7 +56,7 @@ def occluded_pixels(camera: CameraModel, other: Capsules, shape: tuple[int, int]
 
 def _own_capsules(hand: BareHandTracker, state: Array) -> Capsules:
     pose = pose_of(state)
-    return capsules_of(hand.surface, pose.world_from_palm, pose.angles, state[BIAS:BIAS + SHAPE].copy())
+    return capsules_of(hand.surface, pose.world_from_palm, pose.angles, state[STATE.shape].copy())
 
 
 def _rays(camera: CameraModel, pixels: Array) -> Array:

@@ -18,12 +18,12 @@ from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFram
 from rhot_app.barehand.relocalisation import RELOCALISATION_LOG_ODDS
 from rhot_app.barehand.silhouette import CORRELATED, score
 from rhot_app.barehand.start import LATERAL_M, START_SD, STEP
-from rhot_app.barehand.surface import SHAPE
 from rhot_app.barehand.tracker import BareHandTracker
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.track import NEVER, SESSION_NS, comes_late
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
-from rhot_app.hand.motion.hand_process import ANGLES, BIAS, VELOCITY
+from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import Rig
 from rhot_app.state import HandState, SeenContour
@@ -237,8 +237,7 @@ def _palm_distance_m(ours: Array, theirs: Array) -> float:
 
 def _own_log_odds(hand: BareHandTracker, state: Array, maps: Maps) -> float:
     """Log odds of the pixels of a hand in `state`, without the ring about it."""
-    world = np.eye(4)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    _, parts = score(hand.surface, world, state[ANGLES:VELOCITY], state[BIAS:BIAS + SHAPE].copy(),
+    world = pose_matrix(state)
+    _, parts = score(hand.surface, world, state[STATE.angles], state[STATE.shape].copy(),
                      hand.relocaliser.odds_of(maps.probabilities))
     return float(parts[:, 0].sum())

@@ -14,13 +14,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.filter import update
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.residual import Residual, stack
 from rhot_app.geometry.camera import pixels_per_metre, project_with_slope, undistort_points
 from rhot_app.geometry.transforms import fit_rigid, rigid
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.landmarks import NOISE_M
 from rhot_app.hand.model import neutral_pose
-from rhot_app.hand.motion.hand_process import ANGLES, POSE, VELOCITY, HandProcess
+from rhot_app.hand.motion.hand_process import HandProcess
+from rhot_app.hand.motion.hand_state import STATE, TANGENT
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
 from rhot_app.hand.solvers.finger_ik import solve_fingers
@@ -222,18 +224,17 @@ def _best_of(places: Sequence[Array], frame: MarkerFrame, process: HandProcess,
             state = update(process, 0.0, prior, residuals).state
         except np.linalg.LinAlgError:  # turned so, the hand cannot be where the markers are
             continue
-        away = process.difference(state, prior[0])[:POSE]
+        away = process.difference(state, prior[0])[TANGENT.pose]
         cost = stack([one.linearise(state) for one in residuals], process.size, weigh=True)[3]
-        cost += float(away @ np.linalg.solve(prior[1][:POSE, :POSE], away))
+        cost += float(away @ np.linalg.solve(prior[1][TANGENT.pose, TANGENT.pose], away))
         if best is None or cost < best[0]:
             best = cost, state
     if best is None:
         return None
-    state, world = best[1], np.eye(4)
-    world[:3] = state[:ANGLES].reshape(3, 4)
+    state, world = best[1], pose_matrix(best[1])
     _, slopes = project_with_slope(world[None, :3, 3], m.poses[frame.camera], m.intrinsics[frame.camera])
     off_px = np.linalg.norm(frame.pixels - frame.expected(state), axis=1)[frame.seen]
-    return (HandPose(world, state[ANGLES:VELOCITY].copy())
+    return (HandPose(world, state[STATE.angles].copy())
             if np.all(off_px < UNFIT_M * pixels_per_metre(slopes[0])) else None)
 
 

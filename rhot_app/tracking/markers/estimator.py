@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.track import LOST_NS, SESSION_NS, Life, TrackFilter
 from rhot_app.hand.landmarks import LASTING_S
-from rhot_app.hand.motion.hand_process import ANGLES, VELOCITY
+from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
@@ -141,7 +142,7 @@ class Estimator(Tracker):
         self._update(frame)
         if self._size is not None and (located := self._starter.locate()) is not None:
             state = self._filter.newest.state
-            self._size.look(located, np.vstack([state[:ANGLES].reshape(3, 4), np.eye(4)[3]]), state[ANGLES:VELOCITY])
+            self._size.look(located, pose_matrix(state), state[STATE.angles])
         newest_ns, period_ns = self._filter.newest_ns, 1e9 * self._observations.shortest_period_s
         if self._life.lost(newest_ns, period_ns) or self._life.wrong(newest_ns, period_ns):
             self._give_up()

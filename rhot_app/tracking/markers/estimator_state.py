@@ -9,10 +9,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.geometry.camera import project_with_slope
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
 from rhot_app.hand.landmarks import DISAGREEMENT_M
-from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, POSE, VELOCITY
+from rhot_app.hand.motion.hand_state import POSE, STATE, TANGENT
 from rhot_app.hand.skeleton import FINGER_OF_ANGLE, FINGER_OF_JOINT, TIP_ROLES, WRIST_ROLE
 from rhot_app.state import (
     INFERRED_M,
@@ -159,7 +160,7 @@ class EstimatorStates:
         alone has found the hand, so it is as far as a hand of the file's size is."""
         solved, rig, observations, m = time.perf_counter(), self._rig, self._observations, self._markers
         state = state.copy()
-        state[ANGLES:VELOCITY] = np.minimum(np.maximum(state[ANGLES:VELOCITY], m.limits[:, 0]), m.limits[:, 1])
+        state[STATE.angles] = np.minimum(np.maximum(state[STATE.angles], m.limits[:, 0]), m.limits[:, 1])
         count = len(rig.marker_ids)
         points, covariances = np.empty((_FIRST_MARKER + count, 3)), np.empty((_FIRST_MARKER + count, 3, 3))
         age = np.abs(t_ns - observations.times)
@@ -174,8 +175,7 @@ class EstimatorStates:
         _place(state, covariance, self._dh, m.half_axes, m.poses, m.intrinsics, observations.observed, late_s, points,
                covariances, motion_sd, aligned)
         if rig.band_half_axes is not None:
-            world = np.eye(4)
-            world[:3] = state[:ANGLES].reshape(3, 4)
+            world = pose_matrix(state)
             locate.turn_band(world, rig.band_half_axes, self._shapes[rig.wrist])
         locate_all(aligned, observations.covariances, fresh & (np.count_nonzero(fresh, axis=0) > 1), rig.intrinsics,
                    rig.cameras, self._shapes, raw, raw_covariances, errors)
@@ -190,8 +190,7 @@ class EstimatorStates:
                     and np.mean(np.count_nonzero(fresh, axis=0) > 1) > 0.5
                     and np.mean(markers < _GUESSED) > 0.5
                     and not self._contradicted(points[_FIRST_MARKER:], aligned, fresh))
-        world, deviation = np.eye(4), np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        world[:3] = state[:ANGLES].reshape(3, 4)
+        world, deviation = pose_matrix(state), np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return HandState(
             sequence=sequence, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
             condition=Condition.TRACKING if in_sight else Condition.PARTIAL,
@@ -200,13 +199,13 @@ class EstimatorStates:
             camera_names=rig.camera_names, camera_pixels=observations.pixels.copy(),
             camera_flags=observations.flags.copy(),
             joint_positions=points[:_FIRST_TIP], joint_knowledge=joints,
-            fingertip_positions=points[_FIRST_TIP:_FIRST_MARKER], angles=state[ANGLES:VELOCITY].copy(),
+            fingertip_positions=points[_FIRST_TIP:_FIRST_MARKER], angles=state[STATE.angles].copy(),
             angle_knowledge=angles, world_from_palm=world, palm_knowledge=Knowledge(palm), epipolar_error_px=errors,
             joint_covariances=covariances[:_FIRST_TIP], angle_sd=angle_sd,
             fingertip_covariances=covariances[_FIRST_TIP:_FIRST_MARKER],
-            palm_covariance=covariance[:6, :6].copy(), velocity=state[VELOCITY:ACCELERATION].copy(),
-            acceleration=state[ACCELERATION:BIAS].copy(), velocity_sd=deviation[POSE:2 * POSE],
-            acceleration_sd=deviation[2 * POSE:3 * POSE], joint_velocity_sd=motion_sd[0],
+            palm_covariance=covariance[TANGENT.palm, TANGENT.palm].copy(), velocity=state[STATE.velocity].copy(),
+            acceleration=state[STATE.acceleration].copy(), velocity_sd=deviation[TANGENT.velocity],
+            acceleration_sd=deviation[TANGENT.acceleration], joint_velocity_sd=motion_sd[0],
             joint_acceleration_sd=motion_sd[1], hand_scale=self._scale,
             hand_scale_sd=self._scale_sd,
             latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
@@ -218,7 +217,7 @@ class EstimatorStates:
         centre = self._rig.cameras[camera, :, :3].T @ -self._rig.cameras[camera, :, 3]
         away = points - centre
         covariances += variance * away[:, :, None] * away[:, None, :]
-        palm = state[:ANGLES].reshape(3, 4)[:, 3] - centre
+        palm = state[STATE.palm].reshape(3, 4)[:, 3] - centre
         covariance[:3, :3] += variance * np.outer(palm, palm)
 
     def _contradicted(self, points: Array, aligned: Array, fresh: Mask) -> bool:
@@ -306,9 +305,8 @@ def _place(state, covariance, dh, half_axes, poses, intrinsics, observed, late_s
     (C, M) after the state's instant, carried there by the hand's motion alone."""
     count = points.shape[0]
     frames, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3, POSE))
-    world = np.eye(4)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    forward_arrays(dh, world, state[ANGLES:VELOCITY], frames, points)
+    world = pose_matrix(state)
+    forward_arrays(dh, world, state[STATE.angles], frames, points)
     jacobian_arrays(dh, world, frames, points, jacobian)
     columns, product = np.empty(POSE, np.int64), np.empty((POSE, 3))
     for p in range(count):
@@ -336,14 +334,15 @@ def _place(state, covariance, dh, half_axes, poses, intrinsics, observed, late_s
                         variance += jacobian[p, i, columns[a]] * together * jacobian[p, i, columns[b]]
             motion_sd[order, p] = math.sqrt(max(variance, 0.0))
     place, then, seen, slope = np.empty(3), np.empty(3), np.empty(2), np.empty((2, 3))
+    velocity, acceleration, biases = state[STATE.velocity], state[STATE.acceleration], state[STATE.lasting]
     for camera in range(poses.shape[0]):
         for m in range(half_axes.shape[0]):
             late = late_s[camera, m]
             for i in range(3):
-                place[i] = then[i] = points[_FIRST_MARKER + m, i] + state[BIAS + 3 * m + i]
+                place[i] = then[i] = points[_FIRST_MARKER + m, i] + biases[3 * m + i]
                 for j in range(POSE):
                     then[i] += (late * jacobian[_FIRST_MARKER + m, i, j]
-                                * (state[VELOCITY + j] + 0.5 * late * state[ACCELERATION + j]))
+                                * (velocity[j] + 0.5 * late * acceleration[j]))
             if (project_marker(then, world, half_axes[m], poses[camera], intrinsics[camera], seen, slope)
                     and project_marker(place, world, half_axes[m], poses[camera], intrinsics[camera],
                                        aligned[camera, m], slope)):

@@ -10,11 +10,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.residual import UNIT, Rows, student
 from rhot_app.geometry.camera import is_wide, pixels_per_metre, project_with_slope
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, point_jacobian
 from rhot_app.hand.landmarks import NOISE_M
-from rhot_app.hand.motion.hand_process import ACCELERATION, ANGLES, BIAS, MOTION, POSE, VELOCITY
+from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE, tangent_size
 from rhot_app.tracking.markers.marker_model import MarkerModel, project_marker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
@@ -62,7 +63,7 @@ class MarkerFrame:
     def linearise(self, state: Array) -> Rows:
         """Two rows, px, for each marker that is seen, then one for each apparent size, by standard deviations."""
         count = len(self.seen)
-        error, jacobian = np.empty(3 * count), np.zeros((3 * count, len(state) - BIAS + MOTION))
+        error, jacobian = np.empty(3 * count), np.zeros((3 * count, tangent_size(state)))
         first = np.empty(2 * count, np.int64)
         m = self.markers
         rows, observations = _linearise(
@@ -138,9 +139,8 @@ def _add_noise(state, dh, half_axes, pose, intrinsics, noise_m, covariances):
 @njit(cache=True)
 def _place(state, dh, frames, points, jacobian):
     """Fill frames (R, 3, 4), points (M, 3) and jacobian (M, 3, 27) of a state; returns world (4, 4)."""
-    world = np.eye(4)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    forward_arrays(dh, world, state[ANGLES:VELOCITY], frames, points)
+    world = pose_matrix(state)
+    forward_arrays(dh, world, state[STATE.angles], frames, points)
     jacobian_arrays(dh, world, frames, points, jacobian)
     return world
 
@@ -148,10 +148,11 @@ def _place(state, dh, frames, points, jacobian):
 @njit(cache=True)
 def _moved(state, m, late, points, jacobian, place):
     """Fill `place` (3,): marker m's seen centre `late` s after the state's instant."""
+    velocity, acceleration, biases = state[STATE.velocity], state[STATE.acceleration], state[STATE.lasting]
     for i in range(3):
-        place[i] = points[m, i] + state[BIAS + 3 * m + i]
+        place[i] = points[m, i] + biases[3 * m + i]
     for j in range(POSE):
-        way = late * (state[VELOCITY + j] + 0.5 * late * state[ACCELERATION + j])
+        way = late * (velocity[j] + 0.5 * late * acceleration[j])
         for i in range(3):
             place[i] += jacobian[m, i, j] * way
 
@@ -271,10 +272,10 @@ def _log_shown(slender, side):
 @njit(cache=True)
 def _still(state, slope, jacobian, m, row_s):
     """Area of a marker at rest over that of the moving one, which the rolling shutter stretches."""
-    down = 0.0
+    down, velocity = 0.0, state[STATE.velocity]
     for j in range(POSE):
         for i in range(3):
-            down += slope[1, i] * jacobian[m, i, j] * state[VELOCITY + j]
+            down += slope[1, i] * jacobian[m, i, j] * velocity[j]
     return 1.0 - min(max(down * row_s, -_STRETCH_MAX), _STRETCH_MAX)
 
 
@@ -339,9 +340,8 @@ def triangulation_covariance(state, dh, half_axes, poses, intrinsics, pixel_sd, 
     """Fill `out` (M, 3, 3) m^2: of a marker's triangulated centre by the cameras' `pixel_sd` px and by the paint."""
     count = out.shape[0]
     frames, points = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3))
-    world = np.eye(4)
-    world[:3] = state[:ANGLES].reshape(3, 4)
-    forward_arrays(dh, world, state[ANGLES:VELOCITY], frames, points)
+    world = pose_matrix(state)
+    forward_arrays(dh, world, state[STATE.angles], frames, points)
     pixel, slope, information = np.empty(2), np.empty((2, 3)), np.empty((3, 3))
     for m in range(count):
         information[:] = 0.0
