@@ -13,8 +13,8 @@ from rhot_app.geometry.camera import point_rays
 from rhot_app.geometry.triangulate import Rays, cast, empty_rays, triangulate
 from rhot_app.state import Knowledge
 from rhot_app.tracking import trust
+from rhot_app.tracking.pairing import DOUBTFUL
 from rhot_app.tracking.rig_arrays import locate_by_disparity
-from rhot_app.tracking.tracks import DOUBTFUL
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

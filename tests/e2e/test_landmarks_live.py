@@ -24,7 +24,7 @@ ERROR_MM = 15.0  # median joint from where the landmarks of another detector tri
 
 @needs_recording
 @pytest.mark.skipif(installed_folder() is None, reason="the hand networks are not installed: rhot landmarks install")
-@pytest.mark.study("rhot_node/landmark_search.py", "rhot_node/landmarks", "rhot_app/tracking/tracks.py")
+@pytest.mark.study("rhot_node/landmark_search.py", "rhot_node/landmarks", "rhot_app/tracking/pairing.py")
 @pytest.mark.timeout(TEST_S)
 def test_a_bare_hand_in_two_films_is_tracked_live(bench: Bench) -> None:
     seen = recording()  # its second camera is the left one

@@ -1,5 +1,7 @@
 """When a state is due and for which instant, with frames that come late, twice, in another order, or not at all."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from synthetic_rig import EPOCH_NS, LOST, frame
@@ -75,8 +77,32 @@ def test_late_reordered_and_doubled_frames_never_turn_time_back(seed):
     times = [s.t_ns for s in states]
     assert (np.diff(times) > 0).all()
     assert len(states) > 50
-    held = pairing._tracks.times[0, 0, :pairing._tracks.counts[0, 0]]
-    assert (np.diff(held) > 0).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_in_whatever_order_frames_come_they_make_the_same_curve(seed):
+    def position(k):
+        return POINTS + np.array([[900.0, -300.0], [40.0, 7.0]]) * np.sin(20.0 * 0.025 * k)
+
+    def at_the_end(order):
+        frames = [shot(0, 0.025 * k, pixels=position(k), arrival=2.0) for k in order]
+        return feed(Pairing(2, 2), [*frames, shot(1, 0.49, arrival=2.0)])[-1]
+
+    shuffled = [*np.random.default_rng(seed).permutation(20), 20]
+    found, expected = at_the_end([*shuffled, *shuffled[::-1]]), at_the_end(range(21))
+    assert found.t_ns == expected.t_ns == EPOCH_NS + 490_000_000 and (expected.flags == 0).all()
+    np.testing.assert_array_equal(found.pixels, expected.pixels)
+
+
+@pytest.mark.parametrize("poison", [np.nan, np.inf, -np.inf, 1e30])
+def test_what_is_lost_or_not_a_number_is_no_sample(poison):
+    covariances = np.tile(0.01 * np.eye(2), (6, 1, 1))
+    covariances[2, 0, 0] = poison if poison != 1e30 else -1.0
+    covariances[3, 0, 1] = covariances[3, 1, 0] = 2.0
+    pixels = [[1.0, poison], [poison, 1.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0]]
+    one = frame(0, 0.0, np.array(pixels), np.array([0, 0, 0, 0, LOST, 0]), 0.03, 0)
+    state = feed(Pairing(1, 6), [replace(one, covariances=covariances)])[0]
+    assert state.flags[0].tolist() == [-1, -1, -1, -1, -1, 0]
 
 
 def test_a_late_frame_still_helps_to_interpolate():

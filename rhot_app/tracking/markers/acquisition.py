@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -28,7 +27,6 @@ from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
 from rhot_app.hand.solvers.finger_ik import solve_fingers
 from rhot_app.hand.solvers.palm_before_camera import palms_before_camera
 from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
-from rhot_app.tracking import pairing
 from rhot_app.tracking.locate import choose_views, locate_all
 from rhot_app.tracking.markers.marker_model import MarkerModel
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
@@ -59,7 +57,6 @@ TRIED_SD = 0.03, 0.5
 """m and rad about each of them: as of a palm that was found by two cameras (`estimator.START_SD`)."""
 
 _TARGET_SD_M = 1e-3
-_WAITING = pairing.FRAMES  # frames of each camera; those before would tell nothing more of an instant
 
 
 class Located(NamedTuple):
@@ -73,24 +70,22 @@ class Located(NamedTuple):
 
 
 class Starter:
-    """Collects frames until one instant shows enough of the hand; they are paired when that is asked for."""
+    """Collects frames until one instant shows enough of the hand."""
 
     def __init__(self, rig: RigArrays, markers: MarkerModel) -> None:
         self._rig, self._markers = rig, markers
         self._pairing = Pairing(len(rig.cameras), len(rig.marker_ids))
-        self._waiting: deque[CameraObservations] = deque(maxlen=_WAITING * len(rig.cameras))
         self._tips = [markers.marker_of(role) for role in TIP_ROLES]
         self._wrist = markers.marker_of(WRIST_ROLE)
         self._on_palm = np.flatnonzero(markers.finger < 0)
 
     def reset(self) -> None:
         """Forget the frames."""
-        self._waiting.clear()
         self._pairing.reset()
 
     def ingest(self, observations: CameraObservations) -> None:
         """Take one frame in."""
-        self._waiting.append(self._with_landmark_noise(observations))
+        self._pairing.ingest(self._with_landmark_noise(observations))
 
     def _with_landmark_noise(self, observations: CameraObservations) -> CameraObservations:
         """The frame with the noise of landmarks, of a hand as far as its image is large: what a detector states is less
@@ -105,9 +100,6 @@ class Starter:
 
     def locate(self) -> Located | None:
         """Where the markers were at the newest instant; None: none is due."""
-        for observations in self._waiting:
-            self._pairing.ingest(observations)
-        self._waiting.clear()
         paired = self._pairing.due()
         return None if paired is None else self._locate(paired)
 

@@ -119,7 +119,9 @@ class Estimator(Tracker):
         too_late = self._life.alive and self._filter.forgot(frame.t_ns)
         if too_late or not self._observations.enter(frame):
             return False
-        self._starter.ingest(self._association.select(observations))
+        chosen = self._association.select(observations)
+        if not self._life.alive or self._by_one or self._size is not None:
+            self._starter.ingest(chosen)
         if not self._life.alive or self._by_one:
             located = self._starter.locate()
             scale = 1.0 if self._size is None else self._size.scale

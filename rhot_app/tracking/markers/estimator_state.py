@@ -30,9 +30,9 @@ from rhot_app.tracking.association import GATE
 from rhot_app.tracking.locate import locate_all
 from rhot_app.tracking.markers.marker_model import MarkerModel, project_marker, scaled_table
 from rhot_app.tracking.markers.marker_residual import SIZE_S, SIZE_SD, MarkerFrame
+from rhot_app.tracking.pairing import DOUBTFUL, SAME_FRAME_NS
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.tracks import DOUBTFUL
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -46,7 +46,6 @@ SIZE_FLOOR = 0.005
 (`python benchmarks/marker_errors.py`)."""
 
 _SIZE_MEMORY = 200  # frames over which a fingertip's size is averaged
-_SAME_FRAME_NS = 1_000_000
 _RECENT = 12
 _PERIODS, _LEARN = 1.5, 0.1
 _FRESH_NS = 60_000_000  # before a camera's second frame
@@ -97,7 +96,7 @@ class RecentObservations:
         """Take a frame in; False when it came before. Markers and landmarks of one image come apart."""
         observations = frame.observations
         camera, begin = observations.camera, observations.t_row0_master_ns
-        if any(other.camera == camera and abs(other.observations.t_row0_master_ns - begin) < _SAME_FRAME_NS
+        if any(other.camera == camera and abs(other.observations.t_row0_master_ns - begin) < SAME_FRAME_NS
                and ((other.seen & frame.seen).any() or not frame.seen.any()) for other in self._frames):
             return False
         self._frames = [*self._frames[1 - _RECENT:], frame]

@@ -28,12 +28,11 @@ from rhot_app.geometry.camera import CameraModel, point_rays
 from rhot_app.geometry.transforms import inverse, rigid
 from rhot_app.geometry.triangulate import Outcome, cast, empty_rays, triangulate
 from rhot_app.project import Rig
-from rhot_app.tracking.pairing import Paired, Pairing
+from rhot_app.tracking.pairing import DOUBTFUL, Paired, Pairing
 from rhot_app.tracking.refinement.pair_observations import TWIST, PairObservations, PairStore, linearise, midpoints
 from rhot_app.tracking.refinement.refined_rig import CameraCorrection, Refinement
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.tracks import DOUBTFUL
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
