@@ -20,7 +20,7 @@ from rhot_app.hand.dh import ROOT, DhArrays
 from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.hand_state import SHAPE
-from rhot_app.hand.shape import CARPAL_SPREAD, CARPAL_X, FOREARM_LENGTH, PALM_ULNAR_TAPER
+from rhot_app.hand.shape import FLESH
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -90,8 +90,8 @@ def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, 
         parts.append((ROOT, mirror * start, mirror * end, first, second, group, group == PALM, group == PALM))
 
     for k in range(4):
-        radius = thick * (1.0 - (1.0 - PALM_ULNAR_TAPER) * k / 3.0)
-        carpal = np.array([CARPAL_X, CARPAL_SPREAD * knuckles[k, 1], -0.002])
+        radius = thick * (1.0 - (1.0 - FLESH.ulnar_taper) * k / 3.0)
+        carpal = np.array([FLESH.carpal_x_m, FLESH.carpal_spread * knuckles[k, 1], FLESH.carpal_z_m])
         # The knuckle is thinner than the palm, whose flesh lies on the palmar side.
         sunk = np.array([0.0, 0.0, float(model.radii[k + 1, 0]) - radius])
         roots.append(knuckles[k] + 0.5 * sunk)
@@ -101,14 +101,15 @@ def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, 
     # The hypothenar: a capsule along 0.7 of the last one, a little thinner at its end. Chosen by that video.
     ulnar = np.array([0.0, -HYPOTHENAR * 2.0 * thick, 0.0])
     add(carpal + ulnar, carpal + 0.7 * (roots[3] - carpal) + ulnar, radius, 0.9 * radius)
-    heel = np.array([CARPAL_X, 0.4 * thumb[1], -0.006])
+    heel = np.array([FLESH.carpal_x_m, FLESH.thenar_spread * thumb[1], FLESH.thenar_z_m])
     add(heel, thumb, thick, float(model.radii[0, 0]))
-    add(thumb, 0.5 * (np.array([CARPAL_X, CARPAL_SPREAD * knuckles[0, 1], -0.002]) + knuckles[0]), 0.8 * thick, thick)
+    add(thumb, 0.5 * (parts[0][1] * mirror + knuckles[0]), FLESH.web_thickness * thick, thick)
     wide, flat = 0.5e-3 * anatomy.wrist_breadth_mm, 0.5e-3 * anatomy.wrist_thickness_mm
     side = max(wide - flat, 0.0)
     for y in (side, -side):
-        add(np.array([0.004, 0.9 * y, 0.0]), np.array([-FOREARM_LENGTH, 1.2 * y, 0.0]), 1.05 * flat, 1.05 * flat,
-            FOREARM)
+        near, far = FLESH.forearm_breadths
+        add(np.array([0.004, near * y, 0.0]), np.array([-FLESH.forearm_length_m, far * y, 0.0]), 1.05 * flat,
+            1.05 * flat, FOREARM)
     return parts
 
 

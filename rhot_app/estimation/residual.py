@@ -19,14 +19,14 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-_GAUSSIAN, _HUBER, _STUDENT = range(3)
+_GAUSSIAN, _STUDENT = range(2)
 
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """Robust weight of an observation of `d` rows with squared Mahalanobis distance `m`; see `huber` and `student`.
+    """Robust weight of an observation of `d` rows with squared Mahalanobis distance `m`; see `student`.
 
-    `kind`: 0 weighs every observation by 1, 1 is Huber's and 2 Student's.
+    `kind`: 0 weighs every observation by 1, 1 is Student's.
     """
 
     kind: int = _GAUSSIAN
@@ -42,11 +42,6 @@ class Kernel:
 
 
 GAUSSIAN = Kernel()
-
-
-def huber(k: float = 1.345) -> Kernel:
-    """Weight k / sqrt(m) beyond k standard deviations (Huber 1964); 1.345 is 95 % efficient on Gaussian noise."""
-    return Kernel(_HUBER, k)
 
 
 def student(nu: float = 4.0) -> Kernel:
@@ -159,8 +154,6 @@ def stack(rows: Sequence[Rows], size: int, weigh: bool) -> tuple[Array, Array, A
 
 @njit(cache=True)
 def _weight(kind: int, parameter: float, squared: float, rows: float) -> float:
-    if kind == _HUBER:
-        return min(1.0, parameter / math.sqrt(max(squared, 1e-300)))
     if kind == _STUDENT:
         return min(1.0, (parameter + rows) / (parameter + squared))
     return 1.0
@@ -168,8 +161,6 @@ def _weight(kind: int, parameter: float, squared: float, rows: float) -> float:
 
 @njit(cache=True)
 def _cost(kind: int, parameter: float, squared: float, rows: float) -> float:
-    if kind == _HUBER and squared > parameter * parameter:
-        return 2.0 * parameter * math.sqrt(squared) - parameter * parameter
     if kind == _STUDENT:
         return (parameter + rows) * math.log(1.0 + squared / parameter)
     return squared

@@ -1,33 +1,15 @@
 """Hands from one number: bone lengths of adults as parts of hand length, from a published table.
 
-Medial, distal and thumb bones: Buchholz, Armstrong and Goldstein 1992; the fingers' proximal bones from their ratios
-in An et al. 1979. Hand length is measured from the wrist to the tip of the stretched middle finger. Bones measured one
+Hand length is measured from the wrist to the tip of the stretched middle finger. Bones measured one
 by one (`rhot calibrate bones`) are better: in hands of one length they scatter by 3 to 8 % each.
 """
 
 from __future__ import annotations
 
-from typing import Final
-
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
 from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy
-
-Array = NDArray[np.float64]
-
-BONE_PER_HAND_LENGTH: Final[dict[str, tuple[float, float, float]]] = {
-    "thumb": (0.251, 0.196, 0.158),
-    "index": (0.2649, 0.143, 0.097),
-    "middle": (0.2773, 0.170, 0.108),
-    "ring": (0.2591, 0.165, 0.107),
-    "little": (0.2059, 0.117, 0.093),
-}
-"""The three bones of each finger from its root to its tip, as in `skeleton.BONES`, per hand length."""
-
-SHORTEST_M, LONGEST_M = 0.10, 0.26
-"""Hand lengths between a toddler's and the longest ever measured of a man's."""
+from rhot_app.hand.tables import TABLES
 
 
 def hand_length(anatomy: HandAnatomy) -> float:
@@ -38,8 +20,9 @@ def hand_length(anatomy: HandAnatomy) -> float:
 
 def require_human_length(hand_length_m: float) -> None:
     """Raises ValueError when no human hand is so long."""
-    if not SHORTEST_M <= hand_length_m <= LONGEST_M:
-        raise ValueError(f"a hand is {1e3 * SHORTEST_M:.0f} to {1e3 * LONGEST_M:.0f} mm long, from the wrist to the "
+    shortest_m, longest_m = TABLES.human_lengths_m
+    if not shortest_m <= hand_length_m <= longest_m:
+        raise ValueError(f"a hand is {1e3 * shortest_m:.0f} to {1e3 * longest_m:.0f} mm long, from the wrist to the "
                          "tip of the middle finger")
 
 
@@ -64,7 +47,7 @@ def scaled_by_hand_length(anatomy: HandAnatomy, hand_length_m: float) -> HandAna
     """
     require_human_length(hand_length_m)
     factor = hand_length_m / hand_length(anatomy)
-    bones = {name: [1e3 * hand_length_m * part for part in parts] for name, parts in BONE_PER_HAND_LENGTH.items()}
+    bones = {name: [1e3 * hand_length_m * part for part in parts] for name, parts in TABLES.bones.items()}
     palm = (1e3 * hand_length_m - sum(bones["middle"])) / anatomy.fingers["middle"].base_mm[0]
     fingers = {name: _resized(finger, factor, palm, bones[name]) for name, finger in anatomy.fingers.items()}
     return _with_palm(anatomy, fingers, factor)

@@ -5,21 +5,12 @@ joint's centre of the kinematic hand changes slowly, in all cameras alike. Besid
 by itself, with the tails of centroids. A detector errs in proportion to the hand's size in the image, so both are
 lengths at the hand, per axis.
 
-`python benchmarks/landmarks.py` measures them on a recorded hand. `landmark_set` makes the markers of a detector.
+`python benchmarks/landmarks.py` measures them on a recorded hand.
 """
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
-
-import msgspec
-
-from rhot_app.errors import RigError
-from rhot_app.hand.skeleton import JOINTS
-from rhot_node.files import resource_path
-from rhot_node.keypoints.card import load_card
-from rhot_node.markers import MarkerSet, load_markers
 
 ANATOMY_SD_M = 3e-3
 """m: standard deviation of a landmark's place about its joint: 2.4 mm on a recorded hand that fits it best."""
@@ -40,23 +31,3 @@ DISAGREEMENT_M = 1.7 * MEDIAN_M
 """m: median distance of a hand's landmarks from its joints from which its rig or its bones are wrong: 8.5 mm. Chosen
 between those of a recorded hand, frame by frame: at most 4.7 mm with its own bones and 6.2 with the shipped ones, and
 10.4 or more at 0.58 of the true scale (`python benchmarks/wrong_rigs.py`)."""
-
-
-# -- the master's part of a model card (docs/landmarks.md) -------------------------------------------------------------
-
-def landmark_set(card: Path) -> MarkerSet:
-    """The landmarks of a card's network as a marker set, in the order of its points.
-
-    Raises KeypointError for what is no card, and RigError when its `anatomy` does not name a joint for each point.
-    """
-    read = load_card(card)
-    joints = read.anatomy.get("joints")
-    if not isinstance(joints, list) or len(joints) != read.points.count:
-        raise RigError(f"{card}: anatomy.joints must name the joint of each of the {read.points.count} points.")
-    for joint in joints:
-        if joint not in JOINTS or joints.count(joint) > 1:
-            what = "twice" if joint in JOINTS else "which is no joint"
-            raise RigError(f"{card}: anatomy.joints names {joint!r}, {what}; joints are {', '.join(JOINTS)}.")
-    shipped = load_markers(resource_path("markers", "landmarks21.json"))
-    return msgspec.structs.replace(shipped, name=read.name,
-                                   markers=tuple(shipped.markers[JOINTS.index(joint)] for joint in joints))

@@ -7,20 +7,16 @@ people can break all of them; the standard deviations say how readily.
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.anatomy import DIP_PER_PIP
-from rhot_app.hand.skeleton import ANGLES, FINGERS
+from rhot_app.hand.skeleton import ANGLES
+from rhot_app.hand.tables import TABLES
 
 Array = NDArray[np.float64]
-
-MCP_PER_PIP = 0.7
-"""Flexion of the MCP joint per flexion of the PIP joint when a hand closes around something (Santello 1998)."""
 
 LIMIT_SD_RAD = math.radians(0.5)
 """rad: how far joints go beyond their passive limits."""
@@ -52,31 +48,12 @@ def prior_of(rows: Array, values: Array) -> PosePrior:
 
 def pose_prior() -> PosePrior:
     """The angles of a relaxed hand, and how they go together."""
-    rows, values = [], []
-
-    def expect(value_deg: float, sd_deg: float, **factors: float) -> None:
-        """The sum of factor x angle is Gaussian, in degrees."""
-        row = np.zeros(len(ANGLES))
+    rows, values = np.zeros((len(TABLES.pose_prior), len(ANGLES))), np.empty(len(TABLES.pose_prior))
+    for row, (mean_deg, sd_deg, factors) in enumerate(TABLES.pose_prior):
         for name, factor in factors.items():
-            row[ANGLES.index(name)] = factor
-        rows.append(row / math.radians(sd_deg))
-        values.append(value_deg / sd_deg)
-
-    expect(5.0, 18.0, thumb_cmc_abduction=1.0)
-    expect(5.0, 15.0, thumb_cmc_flexion=1.0)
-    expect(0.0, 6.0, thumb_mcp_abduction=1.0)
-    expect(15.0, 20.0, thumb_mcp_flexion=1.0)
-    expect(0.0, 12.0, thumb_ip_flexion=1.0, thumb_mcp_flexion=-1.0)
-    for name in FINGERS[1:]:
-        mcp, pip, dip = (f"{name}_{joint}_flexion" for joint in ("mcp", "pip", "dip"))
-        expect(0.0, 12.0 if name == "little" else 8.0, **{f"{name}_mcp_abduction": 1.0})
-        expect(0.0, 5.0, **{dip: 1.0, pip: -DIP_PER_PIP})
-        expect(0.0, 20.0, **{mcp: 1.0, pip: -MCP_PER_PIP})
-        expect(30.0, 40.0, **{pip: 1.0})
-    for name, neighbour in pairwise(FINGERS[1:]):
-        # Neighbours share tendons: one finger bends the next (RHOT 2.1.1, inter-finger constraints).
-        expect(0.0, 20.0, **{f"{name}_mcp_flexion": 1.0, f"{neighbour}_mcp_flexion": -1.0})
-    return prior_of(np.array(rows), np.array(values))
+            rows[row, ANGLES.index(name)] = factor / math.radians(sd_deg)
+        values[row] = mean_deg / sd_deg
+    return prior_of(rows, values)
 
 
 @njit(cache=True)

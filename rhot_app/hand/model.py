@@ -14,6 +14,7 @@ from rhot_app.hand.anatomy import THESIS_COUPLINGS, Coupling, FingerAnatomy, Han
 from rhot_app.hand.dh import ROOT, DhArrays, DhRow, compile_table, rigid_rows
 from rhot_app.hand.limits import PosePrior, pose_prior
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, FINGERS, HandPose
+from rhot_app.hand.tables import TABLES
 
 Array = NDArray[np.float64]
 Point = tuple[int, tuple[float, float, float]]
@@ -84,10 +85,7 @@ def with_locked(model: HandModel, locked_deg: Mapping[str, float | tuple[float, 
 
 def neutral_pose(world_from_palm: Array | None = None) -> HandPose:
     """A relaxed hand: fingers slightly bent, thumb beside them; at the world's origin unless told where."""
-    angles = np.radians([5.0, 5.0, 0.0, 12.0, 12.0,
-                         *(2.0, 20.0, 28.0, 18.7), *(0.0, 22.0, 30.0, 20.0),
-                         *(0.0, 24.0, 32.0, 21.3), *(-3.0, 26.0, 34.0, 22.7)])
-    return HandPose(np.eye(4) if world_from_palm is None else world_from_palm, angles)
+    return HandPose(np.eye(4) if world_from_palm is None else world_from_palm, np.radians(TABLES.neutral_deg))
 
 
 def euler_zyx(z: float, y: float, x: float) -> Array:
@@ -157,12 +155,6 @@ def _thumb_rows(first: int, angle: int, finger: FingerAnatomy, turn: float) -> t
 
 VariantName = Literal["full", "coupled"]
 LimitsName = Literal["anatomical", "thesis"]
-
-_THESIS_LIMITS_DEG: Final = {"mcp_abduction": (-15.0, 15.0), "mcp_flexion": (0.0, 90.0), "pip_flexion": (0.0, 110.0),
-                             "dip_flexion": (0.0, 90.0)}
-
-INTER_FINGER_LAG: Final = math.radians(65.0)
-"""How far the middle and the ring finger's MCP joints may stay behind a neighbour's (see `inter_finger`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,21 +226,21 @@ def limit_set(model: HandModel, name: LimitsName) -> Array:
     limits = model.limits.copy()
     if name == "thesis":
         for finger in FINGERS[1:]:
-            for joint, range_deg in _THESIS_LIMITS_DEG.items():
+            for joint, range_deg in TABLES.thesis_limits_deg.items():
                 limits[ANGLES.index(f"{finger}_{joint}")] = np.radians(range_deg)
     return limits
 
 
-def inter_finger(lag: float = INTER_FINGER_LAG) -> tuple[Array, Array]:
+def inter_finger() -> tuple[Array, Array]:
     """Rows (4, 21) and bounds (4,) rad of the inter-finger constraint: rows @ angles <= bounds.
 
     Bending one finger's MCP joint forces its neighbour's to bend as well (RHOT 2.1.1). That holds for the middle and
     the ring finger; index and little finger have extensors of their own and may stay straight, as in pointing. The
-    thesis gives no number: `lag` is ours, the least in steps of 5 degrees that cuts none of the shipped motions.
+    thesis gives no number.
     """
     rows = np.zeros((4, len(ANGLES)))
     pairs = (("index", "middle"), ("ring", "middle"), ("middle", "ring"), ("little", "ring"))
     for row, (bent, forced) in zip(rows, pairs, strict=True):
         row[ANGLES.index(f"{bent}_mcp_flexion")] = 1.0
         row[ANGLES.index(f"{forced}_mcp_flexion")] = -1.0
-    return rows, np.full(len(rows), lag)
+    return rows, np.full(len(rows), math.radians(TABLES.inter_finger_lag_deg))

@@ -21,7 +21,8 @@ from rhot_app.hand.dh import ROOT
 from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, BONES, FINGERS, JOINTS, TIP_ROLES, WRIST_ROLE
-from rhot_node.markers import FLAT_PATCHES, Marker, MarkerSet, Patch
+from rhot_app.hand.tables import TABLES
+from rhot_node.markers import FLAT_PATCHES, Marker, MarkerSet
 
 # -- painted part of a fingertip ---------------------------------------------------------------------------------------
 # The last segment is a capsule (`rhot_app.hand.shape`). A point of its surface has three coordinates in the frame of
@@ -29,19 +30,6 @@ from rhot_node.markers import FLAT_PATCHES, Marker, MarkerSet, Patch
 # the thumb's side of a right hand) and `up`, out of the back of the finger.
 
 Array = NDArray[np.float64]
-
-NAIL_LENGTH_MM, NAIL_EDGE_MM = 11.0, 3.0
-"""Length of a painted fingernail where the marker set gives none, and its distance from the end of the tip, mm. The
-nail follows the curve of the tip to where it is no longer visible from straight above."""
-
-NAIL_BREADTH = 0.65
-"""A nail's breadth as a share of its fingertip's: 11 mm of an index finger's 17."""
-
-NAIL_CORNERS, DOT_CORNERS = 4.0, 2.0
-"""Exponents p of the outline |x / a|^p + |y / b|^p = 1: a rectangle with round corners, an ellipse."""
-
-DOT_MM, RING_MM = 8.0, 10.0
-"""A dot's diameter and a ring's length where the marker set gives none, mm."""
 
 _GRID = 40  # points per axis of the integration over a patch: its middle is exact to some micrometres
 
@@ -74,17 +62,15 @@ def patch_of(marker: Marker, model: HandModel, finger: int) -> PaintedPatch | No
     """The painted part of a finger's last segment; None when all of it is painted."""
     if marker.patch == "segment":
         return None
-    half = 0.5e-3 * (marker.length_mm or _LENGTHS_MM[marker.patch])
+    paint = TABLES.paint
+    half = 0.5e-3 * (marker.length_mm or paint.lengths_mm[marker.patch])
     if marker.patch == "nail":
-        return PaintedPatch(-1e-3 * NAIL_EDGE_MM - half, half, NAIL_BREADTH * float(model.radii[finger, 2]),
-                            NAIL_CORNERS, 1.0)
+        return PaintedPatch(-1e-3 * paint.nail_edge_mm - half, half,
+                            paint.nail_breadth * float(model.radii[finger, 2]), paint.nail_corners, 1.0)
     middle, _ = segment_axis(model, finger)
     if marker.patch == "pulp":
-        return PaintedPatch(middle, half, half, DOT_CORNERS, -1.0)
-    return PaintedPatch(middle, half, 0.0, DOT_CORNERS, 0.0)
-
-
-_LENGTHS_MM: dict[Patch, float] = {"nail": NAIL_LENGTH_MM, "pulp": DOT_MM, "ring": RING_MM}
+        return PaintedPatch(middle, half, half, paint.dot_corners, -1.0)
+    return PaintedPatch(middle, half, 0.0, paint.dot_corners, 0.0)
 
 
 def paint_middle(marker: Marker, model: HandModel, finger: int) -> tuple[float, float]:
@@ -127,14 +113,11 @@ def gap_middle(marker: Marker, mirror: float) -> float:
 
 KNUCKLE_ROLES = tuple(f"palm_{finger}" for finger in FINGERS)
 INNER_ROLES = tuple(f"{finger}_{bone}" for finger, bones in zip(FINGERS, BONES, strict=True) for bone in bones[:2])
-BACK_ROLES = ("hand_1", "hand_2", "hand_3")
+BACK_ROLES = tuple(TABLES.back)
 LANDMARK_ROLES = tuple(f"landmark_{joint}" for joint in JOINTS)
 ROLES = (*TIP_ROLES, WRIST_ROLE, *KNUCKLE_ROLES, *INNER_ROLES, *BACK_ROLES, *LANDMARK_ROLES)
 
-_BACK = {"hand_1": (1, 0.7, 0.8), "hand_2": (4, 0.75, 0.8), "hand_3": (2, 0.3, 0.0)}
-"""On the back of the hand: which finger's knuckle, and which parts of the way there, along and across the palm."""
-
-_POSES, _LENGTH_SD = 2000, 0.054
+_POSES = 2000  # random ones: of which two places get farthest apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +147,8 @@ def place_of(marker: Marker, model: HandModel) -> Place:
     if role in KNUCKLE_ROLES:
         return Place(ROOT, mirrored * model.base[KNUCKLE_ROLES.index(role)], -1)
     if role in BACK_ROLES:
-        finger, along, across = _BACK[role]
+        knuckle, along, across = TABLES.back[role]
+        finger = FINGERS.index(knuckle)
         skin = 0.5e-3 * model.anatomy.palm_thickness_mm
         return Place(ROOT, mirrored * (along * model.base[finger, 0], across * model.base[finger, 1], skin), -1)
     if role in LANDMARK_ROLES:
@@ -186,8 +170,7 @@ def place_of(marker: Marker, model: HandModel) -> Place:
 def farthest_apart(model: HandModel, places: Sequence[Place]) -> Array:
     """(P, P) m: how far two places on the hand get from each other in any pose, of a person's hand at most.
 
-    Over random poses within the joints' limits. Hands' lengths have a standard deviation of 5 % (ANSUR II: 193 mm, 10
-    mm, men); three of them are allowed for.
+    Over random poses within the joints' limits, and three standard deviations of hands' lengths.
     """
     rng, dh = np.random.default_rng(0), model.dh
     rows, offsets = [place.row for place in places], np.array([place.point for place in places])
@@ -198,7 +181,7 @@ def farthest_apart(model: HandModel, places: Sequence[Place]) -> Array:
         forward_arrays(dh, np.eye(4), rng.uniform(model.limits[:, 0], model.limits[:, 1]), frames[:-1], points)
         pose[:] = np.einsum("pij,pj->pi", frames[rows, :, :3], offsets) + frames[rows, :, 3]
     apart = np.linalg.norm(found[:, :, None] - found[:, None], axis=3)
-    return np.asarray((1.0 + 3.0 * _LENGTH_SD) * apart.max(axis=0))
+    return np.asarray((1.0 + 3.0 * TABLES.length_sd) * apart.max(axis=0))
 
 
 def with_markers(model: HandModel, markers: MarkerSet) -> HandModel:

@@ -10,21 +10,11 @@ from numpy.typing import NDArray
 from rhot_app.hand.kinematics import HandPoints
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import FINGERS, HandPose
+from rhot_app.hand.tables import TABLES
 
 Array = NDArray[np.float64]
 
-NECK = 0.7
-"""Radius of the joint's core, of the segment's: it closes the gap between medial and distal segment when bent."""
-
-FOREARM_LENGTH = 0.09
-"""How much of the forearm is shown, m."""
-
-CARPAL_X = 0.014
-CARPAL_SPREAD = 0.5
-"""Where the palm's capsules start: this far from the wrist (m), at this part of the knuckles' sideways distance."""
-
-PALM_ULNAR_TAPER = 0.82
-"""The palm's thickness at the little finger, of that at the index finger."""
+FLESH = TABLES.flesh
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +57,9 @@ def _finger(model: HandModel, finger: int, points: HandPoints) -> list[tuple[str
     return [
         (f"{name}_{words[0]}", base, second, first_radius),
         # Ends before the last joint, so that skin does not hide one side of the painted distal segment.
-        (f"{name}_{words[1]}", second, last - (1.0 - NECK) * second_radius * medial - 0.004 * medial, second_radius),
-        (f"{name}_neck", second, last, NECK * tip_radius),
+        (f"{name}_{words[1]}", second, last - ((1.0 - FLESH.neck) * second_radius + FLESH.joint_gap_m) * medial,
+         second_radius),
+        (f"{name}_neck", second, last, FLESH.neck * tip_radius),
         (f"{name}_distal", centre - half * distal, centre + half * distal, tip_radius),
     ]
 
@@ -80,19 +71,22 @@ def _palm(model: HandModel) -> list[tuple[str, Array, Array, float]]:
     knuckles = model.base[1:]
     parts = []
     for k, name in enumerate(FINGERS[1:]):
-        radius = thick * (1.0 - (1.0 - PALM_ULNAR_TAPER) * k / 3.0)
-        carpal = np.array([CARPAL_X, CARPAL_SPREAD * knuckles[k, 1], -0.002])
+        radius = thick * (1.0 - (1.0 - FLESH.ulnar_taper) * k / (len(knuckles) - 1))
+        carpal = np.array([FLESH.carpal_x_m, FLESH.carpal_spread * knuckles[k, 1], FLESH.carpal_z_m])
         # The knuckle's own finger is thinner than the palm: keep the palm's round end behind the joint.
-        end = carpal + (knuckles[k] - carpal) * (1.0 - 0.4 * radius / float(np.linalg.norm(knuckles[k] - carpal)))
+        way = knuckles[k] - carpal
+        end = carpal + way * (1.0 - FLESH.knuckle_gap * radius / float(np.linalg.norm(way)))
         parts.append((f"palm_{name}", carpal, end, radius))
     thumb = model.base[0]
-    parts.append(("palm_thenar", np.array([CARPAL_X, 0.4 * thumb[1], -0.006]), thumb, 1.05 * thick))
-    parts.append(("palm_web", thumb, 0.5 * (parts[0][1] + knuckles[0]), 0.8 * thick))
+    heel = np.array([FLESH.carpal_x_m, FLESH.thenar_spread * thumb[1], FLESH.thenar_z_m])
+    parts.append(("palm_thenar", heel, thumb, FLESH.thenar_thickness * thick))
+    parts.append(("palm_web", thumb, 0.5 * (parts[0][1] + knuckles[0]), FLESH.web_thickness * thick))
     wide, flat = 0.5e-3 * anatomy.wrist_breadth_mm, 0.5e-3 * anatomy.wrist_thickness_mm
     side = max(wide - flat, 0.0)
     for name, y in (("radial", side), ("ulnar", -side)):
-        parts.append((f"forearm_{name}", np.array([0.0, 0.9 * y, 0.0]), np.array([-FOREARM_LENGTH, 1.2 * y, 0.0]),
-                      0.85 * flat))
+        near, far = FLESH.forearm_breadths
+        parts.append((f"forearm_{name}", np.array([0.0, near * y, 0.0]),
+                      np.array([-FLESH.forearm_length_m, far * y, 0.0]), FLESH.forearm_thickness * flat))
     parts.append(("wrist_band", np.array([0.0, -side, 0.0]), np.array([0.0, side, 0.0]), flat))
     return parts
 

@@ -22,7 +22,7 @@ JOINTS: tuple[str, ...] = (
     *THUMB_JOINTS,
     *(f"{finger}_{joint}" for finger in FINGERS[1:] for joint in ("mcp", "pip", "dip", "tip")),
 )
-"""21 joint centres; finger f (0..4) owns rows 1 + 4 f .. 4 + 4 f: base, second, third, tip."""
+"""21 joint centres: the wrist, then base, second, third and tip of each finger."""
 
 THUMB_ANGLES = ("thumb_cmc_abduction", "thumb_cmc_flexion", "thumb_mcp_abduction", "thumb_mcp_flexion",
                 "thumb_ip_flexion")
@@ -33,21 +33,28 @@ ANGLES: tuple[str, ...] = (
 )
 """21 joint angles, rad: 5 of the thumb, then 4 of each finger."""
 
-ANGLE_SLICES: tuple[slice, ...] = (slice(0, 5), *(slice(5 + 4 * k, 9 + 4 * k) for k in range(4)))
-"""Slice of `ANGLES` that belongs to each finger, in the order of `FINGERS`."""
 
-FLEXIONS: tuple[tuple[int, int, int], ...] = ((1, 3, 4), *((6 + 4 * k, 7 + 4 * k, 8 + 4 * k) for k in range(4)))
-"""Indices into `ANGLES` of the flexions at the beginning of each finger's three bones, in the order of `FINGERS`."""
+def _fingers(names: tuple[str, ...]) -> NDArray[np.int64]:
+    return np.array([FINGERS.index(name.partition("_")[0]) if "_" in name else -1 for name in names])
 
-JOINT_SLICES: tuple[slice, ...] = tuple(slice(1 + 4 * k, 5 + 4 * k) for k in range(5))
-"""Slice of `JOINTS` that belongs to each finger, in the order of `FINGERS`."""
 
-FINGER_OF_JOINT = np.repeat((-1, 0, 1, 2, 3, 4), (1, 4, 4, 4, 4, 4))
-FINGER_OF_ANGLE = np.repeat((0, 1, 2, 3, 4), (5, 4, 4, 4, 4))
+FINGER_OF_JOINT, FINGER_OF_ANGLE = _fingers(JOINTS), _fingers(ANGLES)
 """Finger of each of `JOINTS`, -1 for the wrist, and of `ANGLES`."""
 
+FINGER_JOINTS, FINGER_ANGLES = (np.searchsorted(owners, [(finger, finger + 1) for finger in range(len(FINGERS))])
+                                for owners in (FINGER_OF_JOINT, FINGER_OF_ANGLE))
+"""(5, 2) where each finger's `JOINTS` and `ANGLES` begin and end, for compiled code."""
+
+JOINT_SLICES, ANGLE_SLICES = (tuple(slice(*map(int, ends)) for ends in each) for each in (FINGER_JOINTS, FINGER_ANGLES))
+"""The same as slices."""
+
+FLEXIONS: tuple[tuple[int, ...], ...] = tuple(
+    tuple(index for index, name in enumerate(ANGLES) if name.startswith(finger) and name.endswith("flexion"))
+    for finger in FINGERS)
+"""Indices into `ANGLES` of the flexions at the beginning of each finger's three bones, in the order of `FINGERS`."""
+
 BONES: tuple[tuple[str, str, str], ...] = (("metacarpal", "proximal", "distal"),
-                                           *(("proximal", "medial", "distal"),) * 4)
+                                           *(("proximal", "medial", "distal"),) * len(FINGERS[1:]))
 """Names of each finger's three bones from its root to its tip, in the order of `FINGERS`."""
 
 TIP_ROLES: tuple[str, ...] = tuple(f"{finger}_tip" for finger in FINGERS)

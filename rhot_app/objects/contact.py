@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.estimation.quantiles import normal_isf
-from rhot_app.estimation.residual import Kernel, student
 from rhot_app.hand.dh import DhArrays, riding_points
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import HandModel
@@ -29,10 +28,6 @@ it is largest. It is that of one sample."""
 BEGIN_SD, END_SD = 0.0, 2.0 * normal_isf(SWITCHING)
 """Standard deviations of the distance: contact begins when the pad is within the surface with a probability of one
 half, and ends beyond a distance that noise exceeds by SWITCHING from midway."""
-
-
-CONTACT_KERNEL: Kernel = student(4.0)
-"""A contact may be none: heavy tails, as of the markers."""
 
 _SPHERES = 3  # of a pad: the ends of its axis and its middle
 

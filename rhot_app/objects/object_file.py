@@ -216,13 +216,6 @@ def load_object(path: Path) -> ObjectModel:
     return read_document(path, ObjectModel, format_name=FORMAT, version=VERSION, error=ObjectError)
 
 
-def load_objects(paths: Sequence[Path]) -> tuple[ObjectModel, ...]:
-    """Read several objects; raises ObjectError like `load_object`, and when two of them cannot be told apart."""
-    found = tuple(load_object(path) for path in paths)
-    require_distinct(found, [str(path) for path in paths])
-    return found
-
-
 def save_object(path: Path, model: ObjectModel) -> None:
     """Write an object file atomically; raises OSError, the old file then stays as it was."""
     write_document(path, model)

@@ -19,7 +19,7 @@ from rhot_app.estimation.se3 import fill_quaternion
 from rhot_app.hand.dh import ROOT
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.shape import CARPAL_SPREAD, CARPAL_X
+from rhot_app.hand.shape import FLESH
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS, THUMB_JOINTS, HandPose
 
 Array = NDArray[np.float64]
@@ -41,8 +41,6 @@ OUR_JOINTS: tuple[str | None, ...] = (
 
 _METACARPAL_PART: Final = (0.776, 0.742, 0.704, 0.680)
 """Metacarpal II to V per distance from knuckle to wrist: Buryanov and Kotiuk 2010 in the shipped hands."""
-
-_CARPAL_Z: Final = -0.002
 
 
 class OpenXrMap(NamedTuple):
@@ -136,7 +134,7 @@ def _metacarpal(model: HandModel, finger: int, mirror: Array) -> _Place:
 def _metacarpal_base(model: HandModel, finger: int) -> Array:
     """(3,) m in a right hand's palm frame."""
     knuckle = model.base[finger]
-    towards = np.array([CARPAL_X, CARPAL_SPREAD * knuckle[1], _CARPAL_Z]) - knuckle
+    towards = np.array([FLESH.carpal_x_m, FLESH.carpal_spread * knuckle[1], FLESH.carpal_z_m]) - knuckle
     length = _METACARPAL_PART[finger - 1] * float(np.linalg.norm(knuckle))
     return np.asarray(knuckle + length * towards / np.linalg.norm(towards))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rhot_app.estimation.least_squares import Dense, fit_linear, minimise
-from rhot_app.estimation.residual import UNIT, Kernel, Rows, huber, student
+from rhot_app.estimation.residual import UNIT, Kernel, Rows, student
 
 
 def valley(state: np.ndarray) -> list[Rows]:
@@ -46,7 +46,7 @@ def circle(noise: float, kernel: Kernel, wild: int = 0) -> tuple[np.ndarray, Den
     return points, Dense(np.array([1.0, 0.0, 1.0]), rows, np.add, 3)
 
 
-@pytest.mark.parametrize("kernel", [huber(), student(4.0)])
+@pytest.mark.parametrize("kernel", [student(2.0), student(4.0)])
 def test_outliers_hardly_move_a_robust_minimum(kernel: Kernel) -> None:
     clean, _ = minimise(circle(0.01, kernel)[1], 100, 1e-10)
     dirty, _ = minimise(circle(0.01, kernel, wild=20)[1], 100, 1e-10)

@@ -9,10 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shipped_rig import LEFT_HAND
 
-from rhot_app.hand.anthropometry import BONE_PER_HAND_LENGTH, hand_length, scaled_by_hand_length, scaled_hand
+from rhot_app.hand.anthropometry import hand_length, scaled_by_hand_length, scaled_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import BONES, FINGERS, JOINTS, HandPose
+from rhot_app.hand.tables import TABLES
 
 TABLE = Path(__file__).parents[2] / "../shared/data/anthropometry/hand_segments.json"
 
@@ -22,7 +23,7 @@ def test_parts_are_the_published_table():
         pytest.skip(f"{TABLE} is not here")
     published = json.loads(TABLE.read_text())["buchholz_1992_fraction_of_hand_length"]
     for finger, bones in zip(FINGERS, BONES, strict=True):
-        np.testing.assert_allclose(BONE_PER_HAND_LENGTH[finger], [published[finger][bone] for bone in bones], atol=5e-5)
+        np.testing.assert_allclose(TABLES.bones[finger], [published[finger][bone] for bone in bones], atol=5e-5)
 
 
 @settings(deadline=None, max_examples=50)
@@ -32,7 +33,7 @@ def test_a_hand_of_a_length_has_it_and_the_tables_bones(length):
     joints = forward(build_model(hand), HandPose(np.eye(4), np.zeros(21))).joints
     assert np.linalg.norm(joints[JOINTS.index("middle_tip")]) == pytest.approx(length, abs=1e-6)
     assert hand_length(hand) == pytest.approx(length, abs=1e-6)
-    for finger, parts in BONE_PER_HAND_LENGTH.items():
+    for finger, parts in TABLES.bones.items():
         np.testing.assert_allclose(hand.fingers[finger].bones_mm, 1e3 * length * np.array(parts), atol=1e-5)
         assert hand.fingers[finger].limits_deg == LEFT_HAND.fingers[finger].limits_deg
         share = LEFT_HAND.fingers[finger].marker_mm / LEFT_HAND.fingers[finger].bones_mm[2]

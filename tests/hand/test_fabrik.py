@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhot_app.hand.solvers.fabrik import solve_chain
-from rhot_app.hand.solvers.finger_chain import Status
 
 
 def published(joints, target, tolerance, iterations):
@@ -34,6 +33,13 @@ def published(joints, target, tolerance, iterations):
     return np.array(p)
 
 
+def solved(joints, target, tolerance=1e-4, iterations=100):
+    """The chain solved, the iterations done, and the distance of its end from the target."""
+    out, goal = np.array(joints, dtype=float), np.array(target, dtype=float)
+    done, _ = solve_chain(out, goal, tolerance, iterations)
+    return out, done, np.linalg.norm(out[-1] - goal)
+
+
 @pytest.mark.parametrize("iterations", [1, 2, 3, 4, 5])
 @pytest.mark.parametrize("scale", [1.0, 0.05, 50.0])  # metres, a finger in metres, a finger in millimetres
 def test_joints_match_the_published_algorithm(iterations, scale):
@@ -43,10 +49,10 @@ def test_joints_match_the_published_algorithm(iterations, scale):
         reach = np.linalg.norm(np.diff(joints, axis=0), axis=1).sum()
         heading = rng.normal(size=3)
         target = joints[0] + heading / np.linalg.norm(heading) * rng.uniform(0, 1.2) * reach
-        solution = solve_chain(joints, target, tolerance=0.0, max_iterations=iterations)
-        np.testing.assert_allclose(solution.joints, published(joints, target, 0.0, iterations), atol=1e-9 * scale)
+        found, done, residual = solved(joints, target, 0.0, iterations)
+        np.testing.assert_allclose(found, published(joints, target, 0.0, iterations), atol=1e-9 * scale)
         if np.linalg.norm(target - joints[0]) <= reach:
-            assert solution.iterations == iterations or solution.residual == 0.0
+            assert done == iterations or residual == 0.0
 
 
 def test_free_chains_converge():
@@ -58,37 +64,30 @@ def test_free_chains_converge():
         heading = rng.normal(size=3)
         distance = inner + rng.uniform(0.05, 0.95) * (lengths.sum() - inner)
         target = joints[0] + heading / np.linalg.norm(heading) * distance
-        solution = solve_chain(joints, target, tolerance=1e-5, max_iterations=500)
-        assert solution.reached and solution.residual <= 1e-5
-        np.testing.assert_allclose(np.linalg.norm(np.diff(solution.joints, axis=0), axis=1), lengths, rtol=1e-9)
-        np.testing.assert_array_equal(solution.joints[0], joints[0])
+        found, _, residual = solved(joints, target, 1e-5, 500)
+        assert residual <= 1e-5
+        np.testing.assert_allclose(np.linalg.norm(np.diff(found, axis=0), axis=1), lengths, rtol=1e-9)
+        np.testing.assert_array_equal(found[0], joints[0])
 
 
 def test_chain_within_tolerance_is_returned_unchanged():
     joints = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.0]])
-    solution = solve_chain(joints, [1, 1, 5e-5])
-    np.testing.assert_array_equal(solution.joints, joints)
-    assert solution.iterations == 0 and solution.reached
+    found, done, _ = solved(joints, [1, 1, 5e-5])
+    np.testing.assert_array_equal(found, joints)
+    assert done == 0
 
 
 def test_unreachable_target_stretches_the_chain_towards_it():
     joints = np.array([[1, 0, 0], [2, 0, 0], [2, 2, 0.0]])
-    solution = solve_chain(joints, [1, 0, 10])
-    np.testing.assert_allclose(solution.joints, [[1, 0, 0], [1, 0, 1], [1, 0, 3]], atol=1e-12)
-    assert not solution.reached and solution.residual == pytest.approx(7)
-    assert solution.status is Status.UNREACHABLE
+    found, _, residual = solved(joints, [1, 0, 10])
+    np.testing.assert_allclose(found, [[1, 0, 0], [1, 0, 1], [1, 0, 3]], atol=1e-12)
+    assert residual == pytest.approx(7)
 
 
-def test_straight_chain_says_that_it_cannot_bend():
+def test_a_straight_chain_cannot_bend():
     straight = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0.0]])
-    assert solve_chain(straight, [1, 0, 0]).status is Status.STALLED
-    assert solve_chain(straight, [1, 1e-3, 0], max_iterations=500).status is Status.REACHED
-
-
-def test_target_too_near_is_unreachable_and_few_iterations_are_said_to_be_few():
-    joints = np.array([[0, 0, 0], [3, 0, 0], [3, 1, 0.0]])
-    assert solve_chain(joints, [1, 0, 0]).status is Status.UNREACHABLE
-    assert solve_chain(joints, [2.2, 0, 0], max_iterations=1).status is Status.EXHAUSTED
+    assert solved(straight, [1, 0, 0])[2] > 0.5
+    assert solved(straight, [1, 1e-3, 0], iterations=500)[2] <= 1e-4
 
 
 coordinate = st.sampled_from([0.0, 0.0, 1.0, -1.0, 1e-300, 1e-12, 0.5, 1e6])
@@ -99,22 +98,7 @@ coordinate = st.sampled_from([0.0, 0.0, 1.0, -1.0, 1e-300, 1e-12, 0.5, 1e6])
        target=st.tuples(coordinate, coordinate, coordinate), iterations=st.integers(1, 6))
 def test_degenerate_chains_stay_finite_and_keep_their_lengths(joints, target, iterations):
     joints = np.array(joints)
-    solution = solve_chain(joints, target, max_iterations=iterations)
-    assert np.isfinite(solution.joints).all()
-    np.testing.assert_allclose(np.linalg.norm(np.diff(solution.joints, axis=0), axis=1),
+    found, _, _ = solved(joints, target, iterations=iterations)
+    assert np.isfinite(found).all()
+    np.testing.assert_allclose(np.linalg.norm(np.diff(found, axis=0), axis=1),
                                np.linalg.norm(np.diff(joints, axis=0), axis=1), rtol=1e-6, atol=1e-9)
-
-
-@pytest.mark.parametrize(("joints", "target", "options", "words"), [
-    (np.zeros((1, 3)), np.zeros(3), {}, "at least one bone"),
-    (np.zeros((3, 2)), np.zeros(3), {}, "shape"),
-    (np.zeros((3, 3)), np.zeros(2), {}, "target must have shape"),
-    (np.full((3, 3), np.nan), np.zeros(3), {}, "finite"),
-    (np.zeros((3, 3)), [0, 0, np.inf], {}, "finite"),
-    (np.zeros((3, 3)), np.zeros(3), {"tolerance": -1.0}, "tolerance"),
-    (np.zeros((3, 3)), np.zeros(3), {"tolerance": float("nan")}, "tolerance"),
-    (np.zeros((3, 3)), np.zeros(3), {"max_iterations": 0}, "max_iterations"),
-])
-def test_bad_input_is_refused_in_words(joints, target, options, words):
-    with pytest.raises(ValueError, match=words):
-        solve_chain(joints, target, **options)

@@ -17,7 +17,7 @@ FILES = [APP / "estimation" / f"{name}.py" for name in ("filter", "residual")] +
 
 LAYOUT = frozenset(("POSE", "MOTION", "WORLD", "ANGLES", "VELOCITY", "ACCELERATION", "BIAS", "_FIRST_TIP",
                     "_FIRST_MARKER", "_FIRST_ANGLE", "_GROUPS", "_NEVER", "_FINGERTIPS", "_FINGER_OF_JOINT",
-                    "_FINGER_OF_ANGLE", "_GAUSSIAN", "_HUBER", "_STUDENT"))
+                    "_FINGER_OF_ANGLE", "_GAUSSIAN", "_STUDENT"))
 """Where numbers stand in an array, and codes: nothing to choose."""
 
 

@@ -22,8 +22,8 @@ from rhot_app.objects.object_file import (
     Tag,
     cube,
     load_object,
-    load_objects,
     plate,
+    require_distinct,
     save_object,
 )
 
@@ -102,18 +102,22 @@ def test_what_cannot_be_is_refused_with_file_and_reason(tmp_path: Path, fields: 
     assert str(caught.value).startswith(str(path)) and says in str(caught.value)
 
 
+def distinct(*paths: Path) -> None:
+    require_distinct([load_object(path) for path in paths], [str(path) for path in paths])
+
+
 def test_two_objects_that_look_alike_are_refused(tmp_path: Path) -> None:
     first = written(tmp_path, name="a", fiducials=[TAG])
     for name, fields, says in (("b", {"fiducials": [{**TAG, "size_mm": 30.0}]}, "tag 3 of DICT_4X4_50"),
                                ("c", {"fiducials": [{**TAG, "family": "DICT_4X4_250"}]}, "tag 3 of DICT_4X4_250")):
         with pytest.raises(ObjectError, match=says):
-            load_objects([first, written(tmp_path, **fields, name=name)])
+            distinct(first, written(tmp_path, **fields, name=name))
     painted = [written(tmp_path, name=name, markers=MARKERS) for name in ("d", "e")]
     with pytest.raises(ObjectError, match="marker 'red'"):
-        load_objects(painted)
-    assert len(load_objects([first, painted[0]])) == 2
+        distinct(*painted)
+    distinct(first, painted[0])
     with pytest.raises(ObjectError, match="called"):
-        load_objects([first, first])
+        distinct(first, first)
     with pytest.raises(ObjectError, match="no such file"):
         load_object(tmp_path / "nowhere.json")
 

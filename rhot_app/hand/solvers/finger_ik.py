@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.linear import solve_in_box
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
-from rhot_app.hand.solvers.finger_chain import MISSING, Status, chain_points, distance, fabrik_within, miss, status_of
+from rhot_app.hand.skeleton import FINGER_ANGLES, HandPose
+from rhot_app.hand.solvers.finger_chain import MISSING, chain_points, distance, fabrik_within, miss, status_of
 
 Array = NDArray[np.float64]
 
@@ -40,20 +40,6 @@ CONTINUITY = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class FingerSolution:
-    """`angles` (4,) or for the thumb (5,) rad; `joints` (4, 3) m world, base to tip; `end_effector` (3,) m world: the
-    marker's centre; `residual`: its distance from the target, m; `iterations`: FABRIK's; `status`: how it ended."""
-
-    angles: Array
-    joints: Array
-    end_effector: Array
-    residual: float
-    iterations: int
-    reached: bool
-    status: Status
-
-
-@dataclass(frozen=True, slots=True)
 class FingersSolution:
     """All five fingers: `angles` (21,) rad, `residuals` (5,) m (NaN without a target), `iterations` (5,), `reached`
     (5,) bool, `statuses` (5,) of Status."""
@@ -65,34 +51,11 @@ class FingersSolution:
     statuses: NDArray[np.uint8]
 
 
-def solve_finger(model: HandModel, finger: int, world_from_palm: Array, start_angles: Array, target: Array,
-                 tolerance: float = TOLERANCE, max_iterations: int = FABRIK_ITERATIONS) -> FingerSolution:
-    """Bring the marker of one finger (index into skeleton.FINGERS) to `target` (3,) m, world.
-
-    `start_angles` (4,) or (5,) are the last known ones: nearby targets then give nearby angles. A target out of
-    reach stretches the finger towards it as far as the limits allow; `reached` is then False.
-    """
-    local = np.empty(3)
-    to_finger(world_from_palm, model.mirror, model.base[finger], model.base_rotation[finger], target, local)
-    angles, bend = np.array(start_angles, dtype=np.float64), float(model.chain_bend[finger])
-    rows = ANGLE_SLICES[finger]
-    mean, information = model.pose_prior.mean[rows], model.pose_prior.information[rows, rows]
-    residual, iterations, status = solve_bent(angles, model.chain[finger], bend, model.limits[rows], local, mean,
-                                              information, tolerance, max_iterations, 0.0)
-    points, end, unused = np.empty((4, 3)), np.empty((4, 3)), np.empty((3, len(angles)))
-    chain_points(angles, model.bones[finger], points, unused)
-    bent = angles.copy()
-    bent[-1] += bend
-    chain_points(bent, model.chain[finger], end, unused)
-    points = np.vstack([points, end[3:]])
-    palm = (model.base[finger] + points @ model.base_rotation[finger].T) * [1.0, model.mirror, 1.0]
-    world = palm @ world_from_palm[:3, :3].T + world_from_palm[:3, 3]
-    return FingerSolution(angles, world[:4], world[4], residual, iterations, residual <= tolerance, Status(status))
-
-
 def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: float = TOLERANCE,
                   max_iterations: int = FABRIK_ITERATIONS, target_sd: float = 0.0) -> FingersSolution:
-    """`solve_finger` for every finger with a target: `targets` (5, 3) m world, NaN rows keep the pose's angles.
+    """Bring the marker of every finger with a target there: `targets` (5, 3) m world; NaN rows keep the pose's angles.
+
+    Nearby targets give nearby angles. A target out of reach stretches the finger towards it as far as the limits allow.
 
     `target_sd` is the standard deviation of the targets, m. Zero meets them exactly. A nearly stretched or fully
     curled finger turns a millimetre of noise into tens of degrees; with its `target_sd` known it keeps to the pose
@@ -135,8 +98,7 @@ def solve_fingers_arrays(angles: Array, world_from_palm: Array, mirror: float, b
         if math.isnan(targets[finger, 0] + targets[finger, 1] + targets[finger, 2]):
             continue
         to_finger(world_from_palm, mirror, base[finger], base_rotation[finger], targets[finger], local)
-        low = 0 if finger == 0 else 1 + 4 * finger
-        high = 5 + 4 * finger
+        low, high = FINGER_ANGLES[finger]
         residuals[finger], iterations[finger], statuses[finger] = solve_bent(
             angles[low:high], lengths[finger], bends[finger], limits[low:high], local, mean[low:high],
             information[low:high, low:high], tolerance, max_iterations, target_sd)

@@ -10,9 +10,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.hand.skeleton import FINGER_ANGLES
 from rhot_app.hand.solvers import inverse, newton
 from rhot_app.hand.solvers.closed_form import solve_coupled
-from rhot_app.hand.solvers.fabrik import plane_angles, solve_chain_arrays, thumb_angles
+from rhot_app.hand.solvers.fabrik import plane_angles, solve_chain, thumb_angles
 from rhot_app.hand.solvers.finger_chain import (
     EXHAUSTED,
     MISSING,
@@ -106,8 +107,7 @@ def solve_arrays(method: int, angles: Array, lengths: Array, limits: Array, targ
                  handed_over: NDArray[np.bool_], joints: Array) -> None:
     """`solve` on arrays: `angles` (21,) in place, and every field of `Solution` filled."""
     for finger in range(5):
-        low = 0 if finger == 0 else 1 + 4 * finger
-        high = 5 + 4 * finger
+        low, high = FINGER_ANGLES[finger]
         own, bones, box, target = angles[low:high], lengths[finger], limits[low:high], targets[finger]
         residuals[finger], iterations[finger], statuses[finger] = np.nan, 0, MISSING
         handed_over[finger] = False
@@ -143,7 +143,7 @@ def solve_free(angles: Array, lengths: Array, target: Array, tolerance: float, m
     may lie anywhere and put the end elsewhere.
     """
     chain_points(angles, lengths, joints, np.empty((3, angles.shape[0])))
-    iterations, moving = solve_chain_arrays(joints, target, tolerance, max_iterations)
+    iterations, moving = solve_chain(joints, target, tolerance, max_iterations)
     bones = np.empty((3, 3))
     for k in range(3):
         for i in range(3):

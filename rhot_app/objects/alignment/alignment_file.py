@@ -77,15 +77,6 @@ class Alignment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=1e-15) or (np.diag(matrix) < 0.0).any():
             raise ValueError("covariance is not symmetric, or a variance is negative")
 
-    def rig_from_body(self, foreign_from_tracker: Array) -> Array:
-        """(4, 4) pose of the body in the rig from a pose (4, 4) that the other tracker reported; of points only the
-        position holds."""
-        return np.asarray(self.rig_from_foreign.matrix @ foreign_from_tracker @ self.tracker_from_body.matrix)
-
-    def rig_time_s(self, foreign_s: float) -> float:
-        """The rig's time of an instant of the other tracker's clock, s."""
-        return foreign_s + self.time_offset_s
-
 
 def to_alignment(report: AlignmentReport) -> Alignment:
     """What is kept of a calibration."""
