@@ -29,7 +29,7 @@ from rhot_app.project import TrackerSettings
 from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Knowledge
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 MOTIONS = ("grasp", "fast", "wave", "spread", "rest")
 SECONDS = 3.125  # of each scene: 125 frames a camera

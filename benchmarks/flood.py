@@ -24,8 +24,8 @@ from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.receiver import NodeReceiver, open_data_socket
 from rhot_app.sources.validation import DatagramValidator
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import MarkerObservation, Observations
 

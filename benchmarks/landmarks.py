@@ -45,7 +45,7 @@ from rhot_app.recording.landmark_log import LandmarkTable, read_landmark_table, 
 from rhot_app.simulator.nodes.landmark_detector import EPOCH_NS, detected_landmarks, landmark_rig, moving_hand  # noqa: E402
 from rhot_app.state import HandState  # noqa: E402
 from rhot_app.tracking.markers import acquisition, marker_residual  # noqa: E402
-from rhot_app.tracking.trackers import make_tracker  # noqa: E402
+from rhot_app.tracking.scene import make_tracker  # noqa: E402
 from rhot_node.files import resource_path  # noqa: E402
 from rhot_node.markers import load_markers  # noqa: E402
 

@@ -53,8 +53,8 @@ from rhot_app.simulator.scene.motion import load_motion  # noqa: E402
 from rhot_app.state import HandState  # noqa: E402
 from rhot_app.tracking.contours.tracker import ContourEstimator  # noqa: E402
 from rhot_app.tracking.markers.estimator import Estimator  # noqa: E402
+from rhot_app.tracking.scene import make_tracker  # noqa: E402
 from rhot_app.tracking.tracker import CameraObservations, Tracker  # noqa: E402
-from rhot_app.tracking.trackers import make_tracker  # noqa: E402
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground  # noqa: E402
 from rhot_node.files import resource_path  # noqa: E402
 from rhot_node.markers import MarkerSet, load_markers  # noqa: E402

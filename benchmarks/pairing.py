@@ -37,8 +37,8 @@ from rhot_app.simulator.film.truth import load_truth
 from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_defaults
 from rhot_app.sources.local_nodes import NodePorts
 from rhot_app.state import Knowledge
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import make_tracker
 from rhot_node.capture.yuv import FRAMES_NAME, read_header
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_i420

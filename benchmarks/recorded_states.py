@@ -27,7 +27,7 @@ from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 SAME_M = 1e-6
 TRACKERS = "own", "classic", "estimator", "smoothed"

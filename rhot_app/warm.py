@@ -40,7 +40,7 @@ from rhot_app.project import IkMethod, Rig, TrackerSettings, load_rig
 from rhot_app.simulator.film.shot import make_renderer, make_shot
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BareHandShow, BoardShow, HandShow
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 from rhot_node.clock import NodeClock
 from rhot_node.compiled import ALL, VARIABLE, WINDOW, is_complete, mark_complete
 from rhot_node.detect.fast import FastDetector
@@ -127,11 +127,10 @@ def warm_bare_hand(rig: Rig) -> None:
     """Compile the trackers of a bare hand, and its fit to pictures."""
     # not above: nothing of these files is compiled, so they decide no cache
     from rhot_app.handfit.session import warm_up
-    from rhot_app.tracking.contours.two_hands import TwoBareHands
 
     warm_up(rig, contours=True)
     settings = TrackerSettings(kind="estimator", observe="contours")
-    TwoBareHands(msgspec.structs.replace(rig, tracker=settings, other_hand=rig.hand)).warm_up()
+    make_tracker(msgspec.structs.replace(rig, tracker=settings, other_hand=rig.hand)).warm_up()
 
 
 def warm_outputs(rig: Rig) -> None:

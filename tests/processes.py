@@ -163,7 +163,7 @@ def preload(package: str) -> None:
     else:
         from rhot_app.engine.pipeline import warm_up
         from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
-        from rhot_app.tracking.trackers import make_tracker
+        from rhot_app.tracking.scene import make_tracker
         rig = synthetic_rig()
         warm_up(make_tracker(rig), rig)
 

@@ -22,8 +22,8 @@ from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.pairing import Paired, Pairing
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import make_tracker
 
 
 def read_observations(path: Path, rig: Rig | None = None) -> tuple[Rig, ObservationTable]:

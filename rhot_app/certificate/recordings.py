@@ -26,8 +26,8 @@ from rhot_app.state import LATENCY_STAGES
 from rhot_app.tracking.locate import choose_views, locate_all
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import RigArrays, compile_rig, locate_by_disparity
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import read_document, write_document
 
 Array = NDArray[np.float64]

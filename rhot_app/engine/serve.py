@@ -36,7 +36,7 @@ from rhot_app.engine.status import (
 from rhot_app.errors import EngineError
 from rhot_app.project import OutputSettings, Rig
 from rhot_app.sources.receiver import share_interpreter
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 from rhot_node.compiled import announce_compilation
 from rhot_node.files import JSON_BYTES_MAX
 from rhot_node.keys import KeyPair

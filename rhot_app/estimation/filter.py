@@ -49,13 +49,14 @@ ALL = Partial(np.empty(0, np.int64))
 @dataclass(slots=True)
 class Knot:
     """One instant, s: the estimate after its `residuals`, and the `weights` (G,) that the kernels gave to their
-    observations in the last step."""
+    observations in the last step. `label`: the caller's own."""
 
     t_s: float
     state: Array
     covariance: Array
     residuals: list[Residual] = field(default_factory=list)
     weights: Array = field(default_factory=lambda: np.empty(0))
+    label: Any = None
 
 
 class IteratedFilter:
@@ -103,8 +104,14 @@ class IteratedFilter:
             before, knot = self.knots[later - 1], self.knots[later]
             prior = self.process.predict(before.state, before.covariance, knot.t_s - before.t_s)
             self.knots[later] = update(self.process, knot.t_s, prior, knot.residuals, None, self.partial)
-        del self.knots[:-self._most]
+            self.knots[later].label = knot.label
+        while len(self.knots) > self._most:
+            self.release(self.knots.pop(0))
         return added
+
+    def release(self, knot: Knot, inflated: Array | None = None) -> None:
+        """Let go of a knot that no late observation changes any more. `inflated` (n, n): the covariance with which it
+        leads on, if that is another one."""
 
 
 def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: Sequence[Residual],

@@ -6,12 +6,13 @@ and objects, and for markers, landmarks, contours and tags.
 
 from __future__ import annotations
 
-from typing import Final
+from dataclasses import replace
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.estimation.filter import IteratedFilter
+from rhot_app.estimation.filter import IteratedFilter, Knot
 from rhot_app.estimation.residual import Process
 
 Array = NDArray[np.float64]
@@ -38,6 +39,15 @@ SESSION_NS: Final = 1_000_000_000
 def comes_late(t_ns: int, newest_ns: int) -> bool:
     """Whether a frame comes after a newer one of its camera, in the same session."""
     return 0 <= newest_ns - t_ns < SESSION_NS
+
+
+class FinalKnot(NamedTuple):
+    """A knot of master time `t_ns` that no late observation changes. `inflated` (n, n): the covariance with which the
+    track led on from it, if it was inflated."""
+
+    t_ns: int
+    knot: Knot
+    inflated: Array | None
 
 
 class Life:
@@ -82,11 +92,34 @@ class TrackFilter(IteratedFilter):
     def __init__(self, process: Process, begun_ns: int = 0) -> None:
         super().__init__(process)
         self.begun_ns = begun_ns
+        self.history: list[FinalKnot | None] | None = None
+        """What has become final, for a smoother, which takes it away: knots, and None where a track ended. None: it is
+        not kept."""
 
     def begin(self, t_ns: int, state: Array, covariance: Array) -> None:
         """Begin a track with a prior of master time `t_ns`."""
+        self.end()
         self.begun_ns = t_ns
         self.start(0.0, state, covariance)
+
+    def restart(self, knot: Knot, covariance: Array) -> None:
+        """Go on from a knot with a larger covariance, so that no late frame undoes it."""
+        for one in self.knots:
+            self.release(one, covariance if one is self.knots[-1] else None)
+        self.start(knot.t_s, knot.state, covariance)
+
+    def end(self) -> None:
+        """The track has ended: all its knots are final."""
+        if self.history is not None:
+            for one in self.knots:
+                self.release(one)
+            self.history.append(None)
+            self.knots = [replace(one, label=None) for one in self.knots[-1:]]
+
+    def release(self, knot: Knot, inflated: Array | None = None) -> None:
+        """Keep a final knot in the history."""
+        if self.history is not None:
+            self.history.append(FinalKnot(self.time_ns(knot.t_s), knot, inflated))
 
     def seconds(self, t_ns: int) -> float:
         """Master time `t_ns` as the filter counts it."""

@@ -17,7 +17,7 @@ from rhot_app.evaluation.searched_nodes import FIRST_NS, SearchedNodes
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig, TrackerSettings
 from rhot_app.state import HandState
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 
 Picture = NDArray[np.uint8]

@@ -29,8 +29,8 @@ from rhot_app.project import Rig
 from rhot_app.recording.raw_log import Record, RecordKind
 from rhot_app.simulator.film.truth import Truth
 from rhot_app.sources.replay import LogValidator
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import Tracker
-from rhot_app.tracking.trackers import make_tracker
 
 Array = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
 from rhot_app.tracking.extrapolation import Extrapolator
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import Tracker
-from rhot_app.tracking.trackers import make_tracker
 
 Array = NDArray[np.float64]
 

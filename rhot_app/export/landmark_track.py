@@ -42,8 +42,8 @@ from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
 from rhot_app.tracking.rig_arrays import rigs_of_hands
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
 from rhot_node.landmark_search import landmarked
 from rhot_node.landmarks.networks import open_hand_networks

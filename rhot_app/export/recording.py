@@ -20,9 +20,9 @@ from rhot_app.recording.raw_log import LogReader, Record, wall_clock_offset_ns
 from rhot_app.sources.films import film_period_ns
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.smoothing import NOT_SMOOTHED
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations
-from rhot_app.tracking.trackers import make_tracker
 
 RATE_AFTER_S = 5.0
 """The cameras' rate is that of this much of a log: some hundred frames have a good median."""

@@ -153,7 +153,7 @@ def _replay(args: argparse.Namespace, outputs: _Outputs) -> None:
     from rhot_app.project import load_rig
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogValidator
-    from rhot_app.tracking.trackers import make_tracker
+    from rhot_app.tracking.scene import make_tracker
     from rhot_node.compiled import announce_compilation
 
     with contextlib.closing(LogReader(args.log)) as reader:

@@ -38,7 +38,7 @@ from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_de
 from rhot_app.sources.local_nodes import NodePorts
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition, HandState, Knowledge
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 from rhot_node.detect.foreground import learn_background, skin_foreground
 from rhot_node.files import write_document
 

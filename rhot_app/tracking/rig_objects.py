@@ -8,15 +8,13 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.observations import ImageFrame, SliceRequest
-from rhot_app.diagnostics import Diagnostics, diagnostics_of
+from rhot_app.diagnostics import Diagnostics
 from rhot_app.estimation.filter import AHEAD_S, FilteredState, smooth
-from rhot_app.estimation.track import LOST_NS, PREDICTED_NS, comes_late
+from rhot_app.estimation.track import LOST_NS, PREDICTED_NS
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.objects.contact import ContactMonitor, FingertipPads, fingertip_pads
@@ -27,18 +25,12 @@ from rhot_app.objects.state import ObjectState, Validity, unknown_object
 from rhot_app.objects.stream import PoseMeasurement
 from rhot_app.objects.track import ObjectTracker
 from rhot_app.project import Rig
-from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
+from rhot_app.state import HandState
 from rhot_app.tracking.markers.marker_model import scaled_table
-from rhot_app.tracking.tracker import CameraObservations, Tracker
-from rhot_node.wire.messages import MarkerFlag
+from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
-
-_PER_OBSERVATION = ("pixels", "covariances", "diameters", "qualities", "flags")
-_UNKNOWN: dict[str, Any] = {
-    "marker_positions": np.nan, "marker_raw_positions": np.nan, "marker_covariances": np.nan,
-    "marker_knowledge": int(Knowledge.UNKNOWN), "epipolar_error_px": np.nan}
 
 
 class RigObjects:
@@ -81,6 +73,9 @@ class RigObjects:
         """The objects at master time `t_ns`, without contacts."""
         return self._tracker.states(t_ns)
 
+    def finish(self) -> None:
+        """No frame comes any more."""
+
     def with_objects(self, state: HandState, objects: list[ObjectState]) -> HandState:
         """The state with the objects and each hand's contacts."""
         other = state.other
@@ -120,124 +115,6 @@ class _HandContacts:
 
 def _scaled(pads: FingertipPads, scale: float) -> FingertipPads:
     return pads if scale == 1.0 else FingertipPads(scaled_table(pads.dh, scale), scale * pads.radii)
-
-
-class WithObjects(Tracker):
-    """Implements `Tracker` for a rig with objects: the states of a hand's tracker, with the objects."""
-
-    def __init__(self, rig: Rig, hand: Tracker, own: Indices) -> None:
-        """`hand`: of the markers `own`, numbers in the rig. Raises RigError as `RigObjects`."""
-        self.diagnostics = diagnostics_of(hand)
-        self._objects, self._hand, self.key_frames = RigObjects(rig, self.diagnostics), hand, hand.key_frames
-        self._markers = MarkersBeside(rig, own)
-        self._latest: CameraObservations | None = None
-        self._names, self._own = tuple(node.name for node in rig.nodes), tuple(rig.markers.ids[row] for row in own)
-        self._count = 0
-
-    def reset(self) -> None:
-        """Forget everything but the count of states."""
-        self._latest = None
-        self._objects.reset()
-        self._hand.reset()
-        self._markers.reset()
-
-    def ingest(self, observations: CameraObservations) -> None:
-        """Take one frame's markers in."""
-        self._latest = observations
-        self._objects.ingest_markers(observations)
-        self._hand.ingest(self._markers.of_hand(observations))
-
-    def ingest_objects(self, frame: ObjectFrame) -> None:
-        """Take one frame's tags, or a pose of another tracker, in."""
-        self._objects.ingest_objects(frame)
-
-    def ingest_image(self, frame: ImageFrame) -> None:
-        """Take one frame's edges or foreground in, where the hand's tracker searches images."""
-        self._hand.ingest_image(frame)
-
-    def seen(self) -> list[SeenContour]:
-        """What the hand's tracker has seen of a bare hand."""
-        return self._hand.seen()
-
-    def requests(self) -> list[SliceRequest]:
-        """What the nodes shall search for the hand."""
-        return self._hand.requests()
-
-    def warm_up(self) -> None:
-        """See `Tracker`."""
-        self._hand.warm_up()
-
-    def wait(self) -> None:
-        """Until the hand that is being looked for is found or not."""
-        self._hand.wait()
-
-    def newest_frames(self) -> tuple[CameraObservations | None, ...]:
-        """Each camera's newest frame, of all markers, None before its first."""
-        return self._hand.newest_frames() if self._markers.all_of_hand else tuple(self._markers.newest)
-
-    def solve(self) -> HandState | None:
-        """The hand's state that is due, with the objects at its instant. Objects are there without the hand over which
-        its tracker fails."""
-        state, latest = None, self._latest
-        with self.diagnostics.part("the hand", self._hand.reset) as part:
-            state = self._hand.solve()
-        if part.failed and latest is not None:
-            state = replace(no_hand(latest.t_row0_master_ns, Condition.LOST, self._names, markers=self._own),
-                            t_receive_ns=latest.t_receive_ns)
-        if state is None:
-            return None
-        self._count += 1
-        other = None if state.other is None else replace(state.other, sequence=self._count - 1)
-        state, objects = replace(state, sequence=self._count - 1, other=other), self._objects.states(state.t_master_ns)
-        return self._objects.with_objects(self._markers.completed(state, objects), objects)
-
-
-class MarkersBeside:
-    """The markers of a rig's objects beside those of its hands: taken away before the hand's tracker, which has no
-    place for them, and put back into its states."""
-
-    def __init__(self, rig: Rig, own: Indices) -> None:
-        self._ids, self._own = rig.markers.ids, own
-        self.all_of_hand = len(own) == len(self._ids)
-        self._places = [(number, self._ids.index(marker.marker), 1e-3 * np.array(marker.position_mm))
-                        for number, model in enumerate(rig.models) for marker in model.markers]
-        self.newest: list[CameraObservations | None] = [None] * len(rig.nodes)
-
-    def reset(self) -> None:
-        """Forget the frames."""
-        self.newest = [None] * len(self.newest)
-
-    def of_hand(self, frame: CameraObservations) -> CameraObservations:
-        """The frame with the hand's markers only."""
-        if self.all_of_hand:
-            return frame
-        last = self.newest[frame.camera]
-        if last is None or not comes_late(frame.t_row0_master_ns, last.t_row0_master_ns):
-            self.newest[frame.camera] = frame
-        further = None if frame.further is None else frame.further.of(self._own)
-        return replace(frame, further=further, **{name: getattr(frame, name)[self._own] for name in _PER_OBSERVATION})
-
-    def completed(self, state: HandState, objects: list[ObjectState]) -> HandState:
-        """The state with all markers of the rig: those of objects lie where the object's pose puts them."""
-        if self.all_of_hand:
-            return state
-        count, columns = len(self._ids), dict[str, Any]()
-        for name, unknown in _UNKNOWN.items():
-            values = getattr(state, name)
-            columns[name] = np.full((count, *values.shape[1:]), unknown, values.dtype)
-            columns[name][self._own] = values
-        pixels = np.full((len(state.camera_names), count, 2), np.nan)
-        flags = np.full(pixels.shape[:2], int(MarkerFlag.LOST), state.camera_flags.dtype)
-        for camera, frame in enumerate(self.newest):
-            if frame is not None:
-                pixels[camera], flags[camera] = frame.pixels, frame.flags
-        pixels[:, self._own], flags[:, self._own] = state.camera_pixels, state.camera_flags
-        for number, marker, place in self._places:
-            pose = objects[number].world_from_object
-            if objects[number].tracked:
-                columns["marker_positions"][marker] = pose[:3, :3] @ place + pose[:3, 3]
-                columns["marker_knowledge"][marker] = Knowledge.INFERRED
-        return replace(state, marker_ids=self._ids, camera_pixels=pixels, camera_flags=flags, **columns)
 
 
 # -- smoothed objects of a recording -----------------------------------------------------------------------------------

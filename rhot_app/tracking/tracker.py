@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -68,6 +68,14 @@ class CameraObservations:
     further: Candidates | None = None  # other candidates than those above
     t_row0_node_ns: int = 0
 
+    def of(self, markers: NDArray[np.intp]) -> CameraObservations:
+        """The frame with `markers` only, ascending indices."""
+        if len(markers) == len(self.pixels):
+            return self
+        return replace(self, pixels=self.pixels[markers], covariances=self.covariances[markers],
+                       diameters=self.diameters[markers], qualities=self.qualities[markers], flags=self.flags[markers],
+                       further=None if self.further is None else self.further.of(markers))
+
 
 class Tracker:
     """Fed with every frame as it arrives, asked for a state when one may be due. One thread only.
@@ -92,6 +100,10 @@ class Tracker:
     def solve(self) -> HandState | None:
         """The state at the newest instant that is due and not yet published, or None."""
         return None
+
+    def stands(self, state: HandState) -> bool:
+        """Whether its last state still holds: it has not lost the hand since."""
+        return True
 
     def states(self) -> Iterator[HandState]:
         """All states that are due."""

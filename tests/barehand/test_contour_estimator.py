@@ -25,8 +25,8 @@ from rhot_app.hand.skeleton import FLEXIONS, JOINTS, HandPose
 from rhot_app.project import Rig, TrackerSettings, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.contours.finder import Finder
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraFrame
-from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 

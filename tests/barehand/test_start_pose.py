@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import cast
 
 import msgspec
 import numpy as np
@@ -16,7 +18,8 @@ from rhot_app.errors import RigError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import forward
 from rhot_app.project import CameraCalibration, PalmPlane, Rig, TrackerSettings, load_rig, save_rig
-from rhot_app.tracking.contours.two_hands import TwoBareHands
+from rhot_app.tracking.contours.tracker import ContourEstimator
+from rhot_app.tracking.scene import Scene, make_tracker
 
 
 def joints_shown(rig: Rig) -> tuple[list[CameraModel], np.ndarray, np.ndarray]:
@@ -57,10 +60,17 @@ def test_a_palm_on_a_plane_is_shown_on_it() -> None:
     assert np.linalg.det(world[:3, :3]) == pytest.approx(1.0) and world[1, 0] < 0.0, "its fingers point away, upwards"
 
 
+def hands_of(rig: Rig) -> Sequence[ContourEstimator]:
+    """The trackers of a rig's two bare hands."""
+    scene = make_tracker(rig)
+    assert isinstance(scene, Scene)
+    return cast(Sequence[ContourEstimator], scene.hands)
+
+
 def test_two_hands_are_shown_apart() -> None:
     rig = msgspec.structs.replace(rig_of(two_cameras(distance=DISTANCE_M)), other_hand=LEFT_HAND,
                                   tracker=TrackerSettings("estimator", observe="contours"))
-    right, left = (hand.hand.start_pose.world_from_palm[:3, 3] for hand in TwoBareHands(rig).hands)
+    right, left = (hand.hand.start_pose.world_from_palm[:3, 3] for hand in hands_of(rig))
     assert left[0] - right[0] > 0.15
 
 
@@ -70,7 +80,7 @@ def test_the_rigs_poses_are_those_of_its_hands_and_come_back_from_its_file(tmp_p
     rig = msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, kind="estimator",
                                                                        observe="contours"))
     save_rig(tmp_path / "rig.json", rig)
-    for hand, pose in zip(TwoBareHands(load_rig(tmp_path / "rig.json")).hands, given, strict=True):
+    for hand, pose in zip(hands_of(load_rig(tmp_path / "rig.json")), given, strict=True):
         np.testing.assert_allclose(hand.hand.start_pose.world_from_palm, pose.world_from_palm, atol=1e-9)
         np.testing.assert_allclose(hand.hand.start_pose.angles, pose.angles, atol=1e-9)
 

@@ -18,7 +18,7 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig, TrackerSettings, load_rig, save_rig, with_tracker
 from rhot_app.state import Condition, HandState
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 from rhot_node.detect.edges import find_edges
 from rhot_node.detect.foreground import learn_background, skin_foreground
 from rhot_node.wire.search import SLICES_MAX

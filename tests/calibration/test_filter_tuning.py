@@ -31,7 +31,7 @@ from rhot_app.calibration.verdict import Grade, Verdict
 from rhot_app.errors import CalibrationError
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.project import FilterSettings, OneEuroSettings, load_rig, save_rig
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 RIG = make_rig()
 SECONDS = 5.0

@@ -19,7 +19,7 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.recording.raw_log import LogReader, RecordKind
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState, SeenContour
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 from rhot_node.capture.yuv import YuvWriter
 from rhot_node.detect.image import from_bgr
 from rhot_node.files import write_atomically

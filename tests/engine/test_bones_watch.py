@@ -20,8 +20,8 @@ from rhot_app.simulator.nodes.landmark_detector import (
     moving_hand,
 )
 from rhot_app.state import HandState
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import make_tracker
 
 FPS, SECONDS = 30.0, 6.0
 RIG = landmark_rig()

@@ -13,8 +13,8 @@ from synthetic_rig import WIDE, Trajectory, Viewing, hand_trajectory, make_rig, 
 from rhot_app.engine.advice import calibration_advice
 from rhot_app.engine.observer import HealthWatch
 from rhot_app.project import CameraCalibration, CameraPose, DepthSettings, Rig
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 
 RIG = make_rig()

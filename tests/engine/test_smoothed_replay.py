@@ -14,7 +14,7 @@ from rhot_app.project import with_tracker
 from rhot_app.recording.raw_log import LogReader, encode_header
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ from synthetic_rig import make_rig
 from rhot_app.engine.pipeline import warm_up
 from rhot_app.project import OTHER_HAND, CameraPose
 from rhot_app.state import Condition
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import Tracker
-from rhot_app.tracking.trackers import make_tracker
 
 
 class Spy(Tracker):

@@ -16,7 +16,7 @@ from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 
 PROCESS = ConstantVelocity()

@@ -108,7 +108,7 @@ def replayed(log: Path) -> list:
     from rhot_app.engine.offline.replay_summary import replay_states
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogValidator
-    from rhot_app.tracking.trackers import make_tracker
+    from rhot_app.tracking.scene import make_tracker
 
     reader = LogReader(log)
     door = LogValidator(reader.rig)

@@ -22,8 +22,8 @@ from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettin
 from rhot_app.recording.landmark_log import LandmarkTable, read_landmark_table, write_landmark_log
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogValidator
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 

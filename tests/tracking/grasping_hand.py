@@ -7,7 +7,7 @@ from synthetic_rig import WIDE, Preset, Trajectory, Viewing, hand_trajectory, ma
 
 from rhot_app.project import Rig
 from rhot_app.state import HandState, Knowledge
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 RIG = make_rig()
 GRASP = hand_trajectory(RIG, "grasp", 5.0)

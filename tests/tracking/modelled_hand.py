@@ -13,8 +13,8 @@ from synthetic_rig import WIDE, Trajectory, Viewing, hand_trajectory, make_rig, 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import Rig, TrackerSettings
 from rhot_app.state import HandState, Knowledge
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import make_tracker
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 

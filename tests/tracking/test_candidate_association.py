@@ -16,8 +16,8 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import with_tracker
 from rhot_app.tracking.association import GATE, MarkerAssociation, assign
 from rhot_app.tracking.rig_arrays import compile_rig
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations, Candidates
-from rhot_app.tracking.trackers import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 
 MODELS = [CameraModel.from_rig(node.intrinsics, node.pose) for node in RIG.nodes]

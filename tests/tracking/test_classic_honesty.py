@@ -25,7 +25,7 @@ from synthetic_rig import (
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.state import Condition, Knowledge
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 
 

@@ -25,7 +25,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import FilterSettings, TrackerSettings
 from rhot_app.state import LATENCY_STAGES, Knowledge
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 
 def test_a_grasping_hand_is_measured_to_a_fraction_of_a_millimetre():

@@ -11,7 +11,7 @@ from rhot_app.calibration.depth.fit import depth_from_disparity, depth_from_powe
 from rhot_app.project import CameraPose, DepthSettings
 from rhot_app.state import Condition, Knowledge
 from rhot_app.tracking.rig_arrays import disparity_law, locate_by_disparity
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 THEORY = DepthSettings(mode="disparity", baseline_m=0.075, view_angle_deg=62.2)
 LAW = DepthSettings(mode="disparity", baseline_m=0.075, view_angle_deg=62.2, k=45.4332, z=-1.035423)

@@ -17,8 +17,8 @@ from rhot_app.state import Condition, Knowledge
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.markers.marker_model import compile_markers
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import Tracker
-from rhot_app.tracking.trackers import make_tracker
 
 RIG = model_rig()
 SECONDS = 3.0

@@ -16,7 +16,7 @@ from synthetic_rig import (
 
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.project import FilterSettings
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 PRESETS = {"wide": (WIDE, 0.6), "fast": (FAST, 1.0)}
 

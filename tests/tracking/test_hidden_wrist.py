@@ -8,7 +8,7 @@ from grasping_hand import GRASP, MEASURED, RIG, UNKNOWN, VIEWING
 from synthetic_rig import WIDE, altered, hidden, observe, run, seconds
 
 from rhot_app.state import HandState, Knowledge
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 WRIST = 5
 

@@ -29,7 +29,7 @@ from rhot_app.state import Condition
 from rhot_app.tracking.markers import acquisition
 from rhot_app.tracking.markers.marker_model import compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 from rhot_node.wire.messages import MarkerFlag
 
 FPS, SECONDS, SETTLED_S = 30.0, 2.5, 1.0

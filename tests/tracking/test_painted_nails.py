@@ -13,7 +13,7 @@ from rhot_app.hand.model import build_model
 from rhot_app.project import FilterSettings, Rig, TrackerSettings
 from rhot_app.simulator.scene.motion import load_motion
 from rhot_app.tracking.rig_arrays import compile_rig
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 SECONDS = 3.0
 

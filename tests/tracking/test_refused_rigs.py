@@ -6,7 +6,7 @@ from modelled_hand import model_rig
 
 from rhot_app.errors import RigError
 from rhot_app.project import DepthSettings
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 RIG = model_rig()
 

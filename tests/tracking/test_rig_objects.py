@@ -29,8 +29,8 @@ from rhot_app.project import Rig, with_object, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.markers.estimator import Estimator
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trackers import make_tracker
 
 PALM = np.array([[0.0, 1.0, 0.0, 0.04], [-1.0, 0.0, 0.0, 0.07], [0.0, 0.0, 1.0, 0.6], [0.0, 0.0, 0.0, 1.0]])
 OBJECT = rigid(exp_so3([0.2, 0.1, 0.0]), [-0.1, 0.0, 0.55])

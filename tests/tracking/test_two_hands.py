@@ -17,8 +17,8 @@ from rhot_app.state import Condition, HandState
 from rhot_app.tracking.classic import ClassicTracker
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.markers.estimator import Estimator
-from rhot_app.tracking.trackers import make_tracker
-from rhot_app.tracking.two_hands import TwoHands
+from rhot_app.tracking.rig_arrays import rigs_of_hands
+from rhot_app.tracking.scene import Scene, make_tracker
 
 RIGHT, LEFT = model_rig("rhot8"), model_rig("rhot8", side="left")
 ASIDE = np.array([-0.14, 0.0, 0.05])  # where the left hand is, m
@@ -127,7 +127,7 @@ def test_a_hand_that_is_failed_over_costs_only_itself(one_hand, tracker_may_fail
     def make(rig):
         made.append(Failing(rig))
         return made[-1]
-    tracker = TwoHands(RIG, make)
+    tracker = Scene(RIG, [(make(own), columns) for own, columns in rigs_of_hands(RIG)])
     made[one_hand].side, made[one_hand].over = "left", range(60, 75)
     found = run(tracker, FRAMES)
     assert [state.sequence for state in found] == list(range(len(FRAMES)))
@@ -141,7 +141,6 @@ def test_a_hand_that_is_failed_over_costs_only_itself(one_hand, tracker_may_fail
 
 def test_both_are_predicted_to_one_instant():
     tracker = make_tracker(RIG)
-    assert isinstance(tracker, TwoHands)
     for frame in FRAMES:
         tracker.ingest(frame)
         state = tracker.solve()

@@ -7,7 +7,7 @@ from modelled_hand import states_of
 
 from rhot_app.project import DepthSettings, Rig, TrackerSettings
 from rhot_app.simulator.nodes.landmark_detector import detected_landmarks, landmark_rig, moving_hand
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 
 RIG = landmark_rig()
 

@@ -105,7 +105,7 @@ def _scale(rig: Rig, frames: list[CameraObservations]) -> Scale:
 
     from rhot_app.project import TrackerSettings
     from rhot_app.tracking.refinement.refined_rig import Scale
-    from rhot_app.tracking.trackers import make_tracker
+    from rhot_app.tracking.scene import make_tracker
 
     try:
         floating = msgspec.structs.replace(rig, tracker=TrackerSettings(kind="estimator", float_scale=True))

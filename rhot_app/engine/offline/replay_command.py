@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.project import load_rig, with_tracker
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.sources.replay import LogReplay
+    from rhot_app.tracking.scene import make_tracker
     from rhot_app.tracking.smoothing import NOT_SMOOTHED
-    from rhot_app.tracking.trackers import make_tracker
     from rhot_node.logs import log_to_stderr
 
     log_to_stderr(logging.INFO if args.verbose else logging.WARNING)

@@ -20,8 +20,8 @@ from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState, Knowledge
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker, frame_part, states_after
-from rhot_app.tracking.trackers import make_tracker
 
 
 def replay_states(records: Iterable[Record], door: LogValidator, tracker: Tracker,

@@ -160,6 +160,10 @@ class ContourEstimator(Tracker):
         """Whether there is a confirmed track: the hand has held its start pose, or markers and contours agree on it."""
         return self._tracking and self._evidence.confirmed
 
+    def stands(self, state: HandState) -> bool:
+        """See `Tracker`."""
+        return self.confirmed or not state.tracked
+
     def state_at(self, t_ns: int) -> Array:
         """The predicted state (n,) at master time `t_ns`."""
         return self._predict(t_ns)[0]

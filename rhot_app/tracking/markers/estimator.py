@@ -7,8 +7,11 @@ association, loss and re-acquisition; the estimation itself is in `rhot_app.esti
 
 from __future__ import annotations
 
+import copy
 import math
 import time
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +20,7 @@ from rhot_app.diagnostics import Diagnostics
 from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.track import LOST_NS, SESSION_NS, Life, TrackFilter
 from rhot_app.hand.landmarks import LASTING_S
+from rhot_app.hand.motion.hand_process import HandProcess
 from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
@@ -48,6 +52,31 @@ REJECTIONS = 2
 _PENDING = 16
 
 
+Kept = TypeVar("Kept")
+
+
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """What a state is made of beside its knot: the frame that was weighed, and, as they were after it, the other
+    `recent` observations, the process, the hand's scale with its standard deviation, and whether one camera alone had
+    begun the hand."""
+
+    frame: CameraObservations
+    recent: RecentObservations
+    process: HandProcess
+    scale: tuple[float, float]
+    by_one: bool
+
+
+def _copied(original: Kept) -> Kept:
+    """A copy with arrays of its own."""
+    out = copy.copy(original)
+    for name, value in vars(original).items():
+        if isinstance(value, np.ndarray):
+            setattr(out, name, value.copy())
+    return out
+
+
 class Estimator(Tracker):
     """Implements `Tracker`: a state after every frame."""
 
@@ -64,6 +93,7 @@ class Estimator(Tracker):
         plane = rig.tracker.palm_plane
         self._plane = None if plane is None else PalmOnPlane(plane)
         self._filter, self._life = TrackFilter(self._process), Life()
+        self._scale = 1.0, 0.0
         self._starter = Starter(self._rig, self._markers)
         self._association = MarkerAssociation(self._rig)  # without a prediction, by rays
         self._observations = RecentObservations(self._rig, self._markers)
@@ -81,6 +111,7 @@ class Estimator(Tracker):
             self._size.reset()
             self._resize(*self._size.known)
         self._life, self._by_one = Life(), False
+        self._filter.end()
         self._rejections = Rejections(len(self._rig.cameras), self._markers)
 
     def ingest(self, observations: CameraObservations) -> None:
@@ -174,10 +205,12 @@ class Estimator(Tracker):
         """Let the hand be exp(`log_scale`) times as large as its file says, with `variance` of the logarithm."""
         self._markers = self._file_size.scaled(math.exp(log_scale))
         self._process.dh = self._markers.dh
-        self._states.resize(math.exp(log_scale), math.sqrt(variance))
+        self._scale = math.exp(log_scale), math.sqrt(variance)
+        self._states.resize(*self._scale)
 
     def _give_up(self) -> None:
         self._life.end()
+        self._filter.end()
         self._starter.reset()
 
     def _update(self, frame: MarkerFrame) -> None:
@@ -197,18 +230,17 @@ class Estimator(Tracker):
             self._give_up()
             return
         inliers = self._observations.accept(frame, knot.state, knot.weights)
-        self._weighed(frame)
+        if self._filter.history is not None:
+            knot.label = Weighed(frame.observations, _copied(self._observations), _copied(self._process), self._scale,
+                                 self._by_one)
         wrong = self._rejections.wrong(frame, inliers, distances, self._observations.periods_s[frame.camera])
         if wrong:
             inflated = knot.covariance.copy()
             for part, factor in wrong:
                 self._process.inflate(inflated, part, factor)
-            self._filter.start(knot.t_s, knot.state, inflated)  # so that no late frame undoes it
+            self._filter.restart(knot, inflated)
         accepted = int(np.count_nonzero(inliers))
         self._life.observe(frame.t_ns, accepted=accepted > 0, plausible=bool(2 * accepted >= candidates))
-
-    def _weighed(self, frame: MarkerFrame) -> None:
-        """A frame has its knot; covariances are not inflated yet. A recording is smoothed from here (`smoothing`)."""
 
     def _note_bias(self, state: Array) -> None:
         m, bias = self._markers, np.empty((len(self._markers.finger), 3, 3))

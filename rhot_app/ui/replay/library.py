@@ -21,7 +21,7 @@ from rhot_app.recording.bookmarks import bookmarks_of
 from rhot_app.recording.raw_log import CONTINUES, LogReader
 from rhot_app.recording.video import videos_of
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.trackers import make_tracker
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.ui.dialogs.recordings import LOG_SUFFIX
 from rhot_app.ui.replay.run import CODES, LOST, ReadableLog, being_recorded, condition_bins
 from rhot_node.errors import NodeError, printable

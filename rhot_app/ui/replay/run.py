@@ -31,8 +31,8 @@ from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.films import RecordedFilm, recorded_films
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition, HandState
+from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.smoothing import NOT_SMOOTHED
-from rhot_app.tracking.trackers import make_tracker
 from rhot_app.ui.models.meters import JitterWindow
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Two bare hands at once: a `ContourEstimator` for each. The nodes search the contours of both.
+"""Two bare hands in the same images: the nodes search the contours of both.
 
 The part of an image that one hand occludes has no information on the other one. So the foreground of each is the rest,
 and its contour is searched where the other one does not occlude it. Two estimates in one place are one hand: the
@@ -7,6 +7,7 @@ foreground decides which.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -17,21 +18,19 @@ from numpy.typing import NDArray
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest
 from rhot_app.barehand.relocalisation import RELOCALISATION_LOG_ODDS
 from rhot_app.barehand.silhouette import CORRELATED, score
-from rhot_app.barehand.start import LATERAL_M, START_SD, STEP
+from rhot_app.barehand.start import START_SD, STEP
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.estimation.layout import pose_matrix
-from rhot_app.estimation.track import NEVER, SESSION_NS, comes_late
+from rhot_app.estimation.track import NEVER, SESSION_NS
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import Rig
-from rhot_app.state import HandState, SeenContour
 from rhot_app.tracking.contours.evidence import joints_of
 from rhot_app.tracking.contours.finder import Maps
 from rhot_app.tracking.contours.occlusion import Capsules, capsules_in, occluded_pixels, visible
 from rhot_app.tracking.contours.tracker import ContourEstimator
-from rhot_app.tracking.two_hands import TwoHands
 from rhot_node.detect.edges import Edges
 
 Array = NDArray[np.float64]
@@ -47,41 +46,27 @@ class _JointRequest(NamedTuple):
 _PALM_JOINTS = [0, *(joints.start for joints in JOINT_SLICES[1:])]  # wrist and knuckles
 
 
-class TwoBareHands(TwoHands[ContourEstimator]):
-    """For a rig with an `other_hand`: a state after the edges of each
-    frame."""
+class SharedImages:
+    """Gives each of two bare hands its part of every image, and joins their requests."""
 
-    def __init__(self, rig: Rig) -> None:
-        """Raises RigError as `ContourEstimator`."""
-        super().__init__(rig, lambda own: ContourEstimator(  # a right palm that faces a camera is to its left
-            own, hands=2, lateral_m=-LATERAL_M if own.hand.side == "right" else LATERAL_M))
-        self.key_frames = self._both[0].key_frames
-        for hand in self._both:
+    def __init__(self, rig: Rig, hands: Sequence[ContourEstimator]) -> None:
+        """`hands`: of the rig's hand and of its other hand."""
+        self._both = hands
+        for hand in hands:
             hand.occluder = partial(self._occluder, hand)
         self._cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
         self._thick_m = 1e-3 * rig.hand.palm_thickness_mm
-        self._clear()
+        self.reset()
 
     def reset(self) -> None:
-        """Discard everything but the number of states."""
-        super().reset()
-        self._clear()
-
-    def _clear(self) -> None:
-        self._asked: list[list[SliceRequest | None]] = [[None, None] for _ in self._newest]
-        self._maps: list[ForegroundFrame | None] = [None] * len(self._newest)
-        self._states: list[HandState | None] = [None, None]
-        self._published_ns = NEVER
+        """Discard everything."""
+        self._asked: list[list[SliceRequest | None]] = [[None, None] for _ in self._cameras]
+        self._maps: list[ForegroundFrame | None] = [None] * len(self._cameras)
         self._occluder_ns = [NEVER, NEVER]
-
-    @property
-    def hands(self) -> tuple[ContourEstimator, ContourEstimator]:
-        """The estimators of the rig's hand and of its other hand."""
-        return self._both
 
     # -- images --------------------------------------------------------------------------------------------------------
 
-    def ingest_image(self, frame: ImageFrame) -> None:
+    def ingest(self, frame: ImageFrame) -> None:
         """Take the edges or the foreground of one frame."""
         if isinstance(frame, EdgeFrame):
             self._take_edges(frame)
@@ -189,45 +174,13 @@ class TwoBareHands(TwoHands[ContourEstimator]):
         return found
 
     def warm_up(self) -> None:
-        """See `Tracker`."""
-        for hand in self._both:
-            hand.warm_up()
+        """Compile what hides one hand from another."""
         one, camera = self._both[0].hand, self._cameras[0]
         world = camera.world_from_camera @ rigid(np.eye(3), np.array([0.0, 0.0, 0.5]))
         state, covariance = one.process.start(world, one.model.pose_prior.mean.copy(), START_SD[:2])
         capsules = capsules_in(one, state)
         occluded_pixels(camera, capsules, (60, 80), STEP)
         visible(one, one.expected_contour(0, state, covariance), camera, state, capsules)
-
-    def wait(self) -> None:
-        """Wait for all running searches."""
-        for one in self._both:
-            one.wait()
-
-    # -- states --------------------------------------------------------------------------------------------------------
-
-    def solve(self) -> HandState | None:
-        """The state after the frames since the last one; None when they have no new information."""
-        fresh = [state for state, _ in self._each()]
-        self._states = [before if new is None else new for before, new in zip(self._states, fresh, strict=True)]
-        hand, other = self._states
-        if hand is None or other is None:  # both have states from the first frame on
-            return None
-        tracked = hand.tracked or other.tracked
-        if not any(new is not None and new.tracked >= tracked for new in fresh):
-            return None
-        if any(state.tracked and not one.confirmed for state, one in zip((hand, other), self._both, strict=True)):
-            return None  # its track was dropped; its next state says so
-        t_ns = max(state.t_master_ns for state in (hand, other) if state.tracked >= tracked)
-        if tracked and comes_late(t_ns, self._published_ns):
-            return None
-        self._published_ns = t_ns
-        received_ns = max(hand.t_receive_ns, other.t_receive_ns)
-        return self._merged_at(t_ns, replace(hand, t_receive_ns=received_ns), replace(other, t_receive_ns=received_ns))
-
-    def seen(self) -> list[SeenContour]:
-        """See `Tracker`."""
-        return [replace(contour, hand=number) for number, hand in enumerate(self._both) for contour in hand.seen()]
 
 
 def _palm_distance_m(ours: Array, theirs: Array) -> float:
