@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from rhot_app.errors import RigError
 from rhot_app.objects.object_file import BoxShape, CylinderShape, ObjectModel, SphereShape
@@ -288,7 +289,8 @@ def _require_closed(faces: Faces, where: str) -> None:
 
 
 def _compiled(vertices: Array, faces: Faces) -> _MeshArrays:
-    faces = faces[_along_z_order(vertices[faces].mean(axis=1))]
+    group = math.isqrt(len(faces)) + 1
+    faces = faces[cKDTree(vertices[faces].mean(axis=1), leafsize=group).indices]  # neighbours follow each other
     edge = _edges_of(faces)
     corners = vertices[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -307,7 +309,7 @@ def _compiled(vertices: Array, faces: Faces) -> _MeshArrays:
     radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
     normals /= np.sqrt(np.maximum(np.einsum("fki,fki->fk", normals, normals), 1e-300))[:, :, None]
     first, second = (np.ascontiguousarray(corners[:, k] - corners[:, 0]) for k in (1, 2))
-    begin = np.append(np.arange(0, len(faces), math.isqrt(len(faces)) + 1), len(faces))
+    begin = np.append(np.arange(0, len(faces), group), len(faces))
     middle = np.add.reduceat(centre, begin[:-1]) / np.diff(begin)[:, None]
     away = np.linalg.norm(centre - np.repeat(middle, np.diff(begin), axis=0), axis=1) + radius
     return _MeshArrays(np.ascontiguousarray(corners[:, 0]), first, second, centre, radius, normals, begin, middle,
@@ -318,17 +320,6 @@ def _edges_of(faces: Faces) -> Faces:
     """(F, 3) numbers of the edges ab, ac, bc of each face; an edge of two faces has one."""
     edges = np.sort(faces[:, [[0, 1], [0, 2], [1, 2]]], axis=2) @ [int(faces.max()) + 1, 1]
     return np.unique(edges.ravel(), return_inverse=True)[1].reshape(-1, 3)
-
-
-def _along_z_order(points: Array) -> Faces:
-    """(N,) order of points (N, 3) along the curve that visits a cube's eighths one after the other (Morton 1966)."""
-    low, size = points.min(axis=0), max(float(np.ptp(points, axis=0).max()), 1e-300)
-    cells = np.minimum((points - low) / size * 1024.0, 1023.0).astype(np.int64)
-    key = np.zeros(len(points), np.int64)
-    for bit in range(10):
-        for axis in range(3):
-            key |= (cells[:, axis] >> bit & 1) << (3 * bit + axis)
-    return np.argsort(key, kind="stable")
 
 
 @njit(cache=True)

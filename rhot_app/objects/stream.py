@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import ObjectError
+from rhot_app.estimation.quantiles import normal_isf
 from rhot_app.estimation.se3 import rotation_from_quaternion, rotation_vector
-from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.motion import START_SPEED, TWIST, PoseResidual, state_of
 from rhot_app.objects.pose import Mode
 from rhot_app.objects.state import ObjectState
@@ -29,13 +30,14 @@ Array = NDArray[np.float64]
 
 HEADER = "t", "x", "y", "z", "qw", "qx", "qy", "qz"
 
-FARTHEST_M = 1000.0
-"""m: a position farther from the origin is a mistake (as in a rig file)."""
+FARTHEST_M, LATEST_S, UNIT_ERROR = 1e3, 1e9, 0.1
+"""m from the origin (as in a rig file), s, and how far a unit quaternion's length is from 1: beyond, a line is a
+mistake."""
 
 SAMPLES = 8
 """Samples that an estimate of the noise needs: four third differences or more."""
 
-_TO_SD = 1.0 / (0.6744897501960817 * math.sqrt(20.0))
+_TO_SD = 1.0 / (normal_isf(0.25) * math.sqrt(1.0 + 9.0 + 9.0 + 1.0))
 """Standard deviation of white noise over the median absolute third difference (1, -3, 3, -1) of Gaussian samples."""
 
 
@@ -73,35 +75,27 @@ class PoseMeasurement:
 
 
 def read_pose_stream(path: Path) -> PoseStream:
-    """Read and check a file. Raises ObjectError that names the file, the line, what is wrong and what to do."""
-    try:
-        data = read_table(path)
-    except FileNotFoundError as exc:
-        raise ObjectError(f"{path}: no such file.") from exc
-    except (OSError, ValueError) as exc:
-        raise ObjectError(f"{path}: cannot be read ({why(exc)}).") from exc
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as exc:
-        raise ObjectError(f"{path}: this is no text. Give a CSV file with the header {','.join(HEADER)}.") from exc
-    samples = list(_samples(path, text))
-    if not samples:
+    """Read and check a file of poses; raises ObjectError as `read_samples`, and when there is no sample."""
+    rows = read_samples(path, HEADER, ObjectError)
+    if not len(rows):
         raise ObjectError(f"{path}: there is no sample behind the header. Is the file complete?")
-    return PoseStream(np.array([t_ns for t_ns, _ in samples]), np.array([pose for _, pose in samples]))
+    poses = np.tile(np.eye(4), (len(rows), 1, 1))
+    poses[:, :3, 3], poses[:, :3, :3] = rows[:, 1:4], rotation_from_quaternion(rows[:, 4:])
+    return PoseStream(np.rint(1e9 * rows[:, 0]).astype(np.int64), poses)
 
 
-def noise_of(stream: PoseStream) -> Array:
-    """(6, 6) covariance of a sample's white noise, m^2 and rad^2, one variance for the three axes of each.
+def noise_of(poses: Array) -> Array:
+    """(6, 6) covariance of the white noise of `poses` (N, 4, 4), m^2 and rad^2, with one variance for three axes.
 
     From the median absolute third difference, which a motion of slowly varying acceleration leaves alone and jumps do
     not move. At least the resolution of the file. Raises ObjectError for fewer than SAMPLES samples.
     """
-    if len(stream.t_ns) < SAMPLES:
-        raise ObjectError(f"the pose stream has {len(stream.t_ns)} samples; its noise needs {SAMPLES} or "
+    if len(poses) < SAMPLES:
+        raise ObjectError(f"the pose stream has {len(poses)} samples; its noise needs {SAMPLES} or "
                           "more. Give a longer recording.")
-    turns = np.array([rotation_vector(b, a) for a, b in zip(stream.poses, stream.poses[1:], strict=False)])
+    turns = np.array([rotation_vector(b, a) for a, b in pairwise(poses)])
     variances = []
-    for differences in (np.diff(stream.poses[:, :3, 3], n=3, axis=0), np.diff(turns, n=2, axis=0)):
+    for differences in (np.diff(poses[:, :3, 3], n=3, axis=0), np.diff(turns, n=2, axis=0)):
         sd = _TO_SD * float(np.median(np.abs(differences)))
         steps = np.abs(differences)[np.abs(differences) > 1e-12]
         resolution = float(steps.min()) if len(steps) else 1e-6
@@ -111,7 +105,7 @@ def noise_of(stream: PoseStream) -> Array:
 
 def track_stream(name: str, stream: PoseStream, covariance: Array | None = None) -> list[tuple[ObjectState, bool]]:
     """The state after every sample, and if it was accepted. `covariance`: of a sample; None: `noise_of`."""
-    covariance = noise_of(stream) if covariance is None else covariance
+    covariance = noise_of(stream.poses) if covariance is None else covariance
     track, found = ObjectTrack(name), []
     for t_ns, pose in zip(stream.t_ns.tolist(), stream.poses, strict=True):
         accepted = track.take(PoseMeasurement(t_ns, pose, covariance))
@@ -119,43 +113,56 @@ def track_stream(name: str, stream: PoseStream, covariance: Array | None = None)
     return found
 
 
-def _samples(path: Path, text: str) -> Iterator[tuple[int, Array]]:
-    """(time, ns; pose) of every line behind the header; blank lines are passed over."""
-    before_ns: int | None = None
-    lines = enumerate(csv.reader(text.splitlines()), 1)
-    _, header = next(lines, (1, []))
-    if tuple(cell.strip() for cell in header) != HEADER:
-        raise ObjectError(f"{path}, line 1: the header is {printable(','.join(header), 80)!r}. Let the first line be "
-                          f"{','.join(HEADER)}.")
-    for number, cells in lines:
-        if not any(cell.strip() for cell in cells):
-            continue
-        t_ns, pose = _sample(f"{path}, line {number}", cells)
-        if before_ns is not None and t_ns <= before_ns:
-            raise ObjectError(f"{path}, line {number}: the time {cells[0].strip()} s is not after that of the line "
-                              "before. Sort the lines by time and remove doubled ones.")
-        before_ns = t_ns
-        yield t_ns, pose
+def read_samples(path: Path, columns: Sequence[str], error: type[Exception]) -> Array:
+    """(N, len(columns)) numbers of a CSV file whose first line names `columns`, in any order: t, s, x, y, z, m, and
+    qw, qx, qy, qz of poses.
+
+    Lines that repeat the time before are left out. Raises `error` that names the file, the line, what is wrong and what
+    to do.
+    """
+    try:
+        text = read_table(path).decode("utf-8-sig")
+    except FileNotFoundError as exc:
+        raise error(f"{path}: no such file.") from exc
+    except UnicodeDecodeError as exc:
+        raise error(f"{path}: this is no text. Give a CSV file with the header {','.join(columns)}.") from exc
+    except (OSError, ValueError) as exc:
+        raise error(f"{path}: cannot be read ({why(exc)}).") from exc
+    lines = csv.reader(text.splitlines())
+    header = [cell.strip() for cell in next(lines, [])]
+    if any(header.count(name) != 1 for name in columns):
+        raise error(f"{path}, line 1: the header is {printable(','.join(header), 80)!r}. Let the first line be "
+                    f"{','.join(columns)}.")
+    rows: list[list[float]] = []
+    for number, cells in enumerate(lines, 2):
+        if any(cell.strip() for cell in cells):
+            where = f"{path}, line {number}"
+            row = _numbers(where, cells, header, columns, error)
+            if rows and row[0] < rows[-1][0]:
+                raise error(f"{where}: the time {row[0]:g} s is before that of the line above. Sort the lines by time.")
+            if not rows or row[0] > rows[-1][0]:
+                rows.append(row)
+    return np.array(rows).reshape(-1, len(columns))
 
 
-def _sample(where: str, cells: list[str]) -> tuple[int, Array]:
-    if len(cells) != len(HEADER):
-        raise ObjectError(f"{where}: {len(cells)} values where {len(HEADER)} belong. Remove or complete the line.")
+def _numbers(where: str, cells: list[str], header: list[str], columns: Sequence[str], error: type[Exception]
+             ) -> list[float]:
+    if len(cells) != len(header):
+        raise error(f"{where}: {len(cells)} values where {len(header)} belong. Remove or complete the line.")
     numbers = []
-    for column, cell in zip(HEADER, cells, strict=True):
+    for column in columns:
+        cell = cells[header.index(column)]
         try:
-            number = float(cell)
+            numbers.append(float(cell))
         except ValueError:
-            number = math.nan
-        if not math.isfinite(number):
-            raise ObjectError(f"{where}: {column} is {printable(cell, 40)!r}, which is no number. Remove or correct "
-                              "the line.")
-        numbers.append(number)
-    t_s, x, y, z, *quaternion = numbers
-    if abs(t_s) > 1e9 or max(abs(x), abs(y), abs(z)) > FARTHEST_M:
-        raise ObjectError(f"{where}: a time or place beyond all bounds ({t_s:g} s; {x:g}, {y:g}, {z:g} m). Give "
-                          "seconds and metres.")
-    if not 0.9 < math.hypot(*quaternion) < 1.1:
-        raise ObjectError(f"{where}: the quaternion has the length {math.hypot(*quaternion):.3g}, not 1. Give qw, qx, "
-                          "qy, qz of a rotation.")
-    return round(1e9 * t_s), rigid(rotation_from_quaternion(quaternion), (x, y, z))
+            numbers.append(math.nan)
+        if not math.isfinite(numbers[-1]):
+            raise error(f"{where}: {column} is {printable(cell, 40)!r}, which is no number. Remove or correct the "
+                        "line.")
+    if abs(numbers[0]) > LATEST_S or max(map(abs, numbers[1:4])) > FARTHEST_M:
+        raise error(f"{where}: a time or place beyond all bounds ({numbers[0]:g} s; {numbers[1]:g}, {numbers[2]:g}, "
+                    f"{numbers[3]:g} m). Give seconds and metres.")
+    if numbers[4:] and abs(math.hypot(*numbers[4:]) - 1.0) > UNIT_ERROR:
+        raise error(f"{where}: the quaternion has the length {math.hypot(*numbers[4:]):.3g}, not 1. Give qw, qx, qy, "
+                    "qz of a rotation.")
+    return numbers

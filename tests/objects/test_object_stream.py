@@ -56,7 +56,7 @@ def jumped(stream: PoseStream, share: float, seed: int = 2) -> tuple[PoseStream,
 
 def test_the_noise_is_that_of_the_stream_even_if_it_moves_and_jumps() -> None:
     for stream in (moving(4.0)[0], jumped(moving(4.0)[0], 0.05)[0]):
-        sd = np.sqrt(np.diag(noise_of(stream)))
+        sd = np.sqrt(np.diag(noise_of(stream.poses)))
         np.testing.assert_allclose(sd[:3], NOISE_M, rtol=0.5)
         np.testing.assert_allclose(sd[3:], NOISE_RAD, rtol=0.5)
 
@@ -106,7 +106,7 @@ def still() -> PoseStream:
 @needs_vive
 def test_a_real_tracker_that_stands_still() -> None:
     stream = still()
-    sd = np.sqrt(np.diag(noise_of(stream)))
+    sd = np.sqrt(np.diag(noise_of(stream.poses)))
     states = track_stream("vive", stream)
     accepted = np.array([kept for _, kept in states])
     places = np.array([state.world_from_object[:3, 3] for state, _ in states])
@@ -149,7 +149,7 @@ LINE = "0.1,0,0,0.5,1,0,0,0"
     (f"{HEADER}\n{LINE}\n0.2,0,0,inf,1,0,0,0", 3, "no number"),
     (f"{HEADER}\n{LINE}\n0.2,0,0,0.5,1,0,0", 3, "Remove or complete"),
     (f"{HEADER}\n{LINE}\n\x1b[2J", 3, "Remove or complete"),
-    (f"{HEADER}\n{LINE}\n{LINE}", 3, "Sort the lines"),
+    (f"{HEADER}\n{LINE}\n0.05,0,0,0.5,1,0,0,0", 3, "Sort the lines"),
     (f"{HEADER}\n0.1,0,0,0.5,0,0,0,0", 2, "quaternion"),
     (f"{HEADER}\n0.1,0,0,500000,1,0,0,0", 2, "metres"),
     (f"{HEADER}\n", 0, "Is the file complete"),
@@ -172,4 +172,4 @@ def test_a_file_that_is_none_and_a_short_one_are_refused(tmp_path: Path) -> None
         read_pose_stream(tmp_path / "image.csv")
     short = moving(0.4)[0]
     with pytest.raises(ObjectError, match="longer recording"):
-        noise_of(PoseStream(short.t_ns[:7], short.poses[:7]))
+        noise_of(short.poses[:7])

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from rhot_app.objects.alignment.report import AlignmentReport
 
 
-POSE_COLUMNS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz")
-POINT_COLUMNS = ("t", "x", "y", "z")
+LONGEST_SEARCH_S = 60.0
+"""s: clocks that differ by more have no common time: correct one of them first."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,14 +43,15 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.objects.alignment.alignment_file import save_alignment, to_alignment
     from rhot_app.objects.alignment.motion_stream import read_stream
     from rhot_app.objects.alignment.report import calibrate_alignment
+    from rhot_app.objects.stream import HEADER
     from rhot_app.progress import ProgressLine
 
     require_folder(args.out)
-    if not 0.0 < args.search <= 60.0:
-        raise CalibrationError(f"--search {args.search:g}: give a time from 0 to 60 s.")
+    if not 0.0 < args.search <= LONGEST_SEARCH_S:
+        raise CalibrationError(f"--search {args.search:g}: give a time from 0 to {LONGEST_SEARCH_S:g} s.")
     if args.check is not None and args.out is not None:
         raise CalibrationError("--check writes nothing; leave --out away, or leave --check away to align anew.")
-    foreign, rig = read_stream(args.foreign, POSE_COLUMNS), read_stream(args.rig_points, POINT_COLUMNS)
+    foreign, rig = read_stream(args.foreign, HEADER), read_stream(args.rig_points, HEADER[:4])
     if args.check is not None:
         return _check(args.check, foreign, rig, as_json=args.json)
     line = ProgressLine("alignment")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,11 @@ from rhot_app.objects.alignment.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
 
-TRANSLATION, ROTATION, POINT, OFFSET, BODY = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 10), slice(10, 13))
+POINTS, POSES = 10, 13
+"""Unknowns of an alignment by a rig's positions, and by its poses."""
+
+TRANSLATION, ROTATION, POINT, OFFSET, BODY = (
+    slice(first, end) for first, end in pairwise((*range(0, POINTS, 3), POINTS, POSES)))
 """Order of the covariance: rig_from_foreign's translation (m) and rotation (rad, along the rig's axes),
 tracker_from_body's translation (m, the device's axes), the time offset (s), and, if the rig reports poses,
 tracker_from_body's rotation (rad, the body's axes)."""
@@ -39,10 +44,10 @@ class AlignmentEstimate:
     body: Array
 
     def moved(self, step: Array) -> AlignmentEstimate:
-        """After a step (10,) or (13,) in the order of the covariance."""
-        body = self.body @ exp_so3(step[BODY]) if len(step) > 10 else self.body
+        """After a step (POINTS,) or (POSES,) in the order of the covariance."""
+        body = self.body @ exp_so3(step[BODY]) if len(step) == POSES else self.body
         return AlignmentEstimate(exp_so3(step[ROTATION]) @ self.rotation, self.centre + step[TRANSLATION],
-                                 self.point + step[POINT], self.offset_s + float(step[9]), body)
+                                 self.point + step[POINT], self.offset_s + float(step[OFFSET][0]), body)
 
 
 class AlignmentModel:
@@ -51,7 +56,7 @@ class AlignmentModel:
     def __init__(self, foreign: MotionStream, rig: MotionStream) -> None:
         self.foreign, self.rig = foreign, rig
         self.poses = rig.has_rotations
-        self.size = 13 if self.poses else 10
+        self.size = POSES if self.poses else POINTS
         self.at_rig = len(rig.times_s) / rig.duration_s <= len(foreign.times_s) / foreign.duration_s
         self.centre = foreign.positions.mean(axis=0)
         self._times = rig.times_s if self.at_rig else foreign.times_s
@@ -95,7 +100,8 @@ class AlignmentModel:
         jacobian[:, :, TRANSLATION] = np.eye(3)
         jacobian[:, :, ROTATION] = -skew(predicted)
         jacobian[:, :, POINT] = estimate.rotation @ device
-        jacobian[:, :, 9] = (-(speed + np.cross(turning, arm)) @ estimate.rotation.T if self.at_rig else -seen_speed)
+        body_speed = (speed + np.cross(turning, arm)) @ estimate.rotation.T if self.at_rig else seen_speed
+        jacobian[:, :, OFFSET.start] = -body_speed
         if not self.poses:
             return error, jacobian, np.empty((0, 3)), np.empty((0, 3, self.size))
         predicted_rotation = estimate.rotation @ device @ estimate.body
@@ -107,5 +113,5 @@ class AlignmentModel:
         by[:, :, BODY] = turn @ predicted_rotation
         rate, slope = ((turning @ estimate.rotation.T, turn) if self.at_rig else
                        (seen_turning, inverse_left_jacobian(turned)))
-        by[:, :, 9] = -np.einsum("nij,nj->ni", slope, rate)
+        by[:, :, OFFSET.start] = -np.einsum("nij,nj->ni", slope, rate)
         return error, jacobian, turned, by

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.quantiles import chi_squared, chi_squared_isf
-from rhot_node.errors import printable
-from rhot_node.files import read_table, why
+from rhot_app.estimation.se3 import rotation_from_quaternion
+from rhot_app.objects.stream import read_samples
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -53,11 +54,6 @@ class MotionStream:
             raise CalibrationError("A stream holds numbers that are not finite. Leave missing samples out.")
         if not (np.diff(self.times_s) > 0.0).all():
             raise CalibrationError("The times of a stream do not ascend. Sort it, and keep one sample of each time.")
-
-    @classmethod
-    def of_quaternions(cls, times_s: Array, positions: Array, quaternions_wxyz: Array) -> MotionStream:
-        """From unit quaternions (N, 4) wxyz of either sign."""
-        return cls(times_s, positions, Rotation.from_quat(quaternions_wxyz[:, [1, 2, 3, 0]]).as_matrix())
 
     @classmethod
     def of_poses(cls, times_s: Array, poses: Array) -> MotionStream:
@@ -146,52 +142,10 @@ def _off_the_cubic(times_s: Array, values: Array) -> Array:
     return off
 
 
-def read_stream(path: Path, columns: tuple[str, ...]) -> MotionStream:
-    """Read a CSV whose first line names `columns`, in any order: t in s, x y z in m, and qw qx qy qz for poses.
-
-    Rows that repeat the time before are left out. Raises CalibrationError naming file, line and remedy.
-    """
-    try:
-        data = read_table(path)
-    except (OSError, ValueError) as exc:
-        raise CalibrationError(f"{path}: cannot be read ({why(exc)}).") from exc
-    try:
-        lines = [line.strip() for line in data.decode("utf-8-sig").splitlines()]
-    except UnicodeDecodeError as exc:
-        raise CalibrationError(f"{path}: this is not a text file. Save the stream as CSV, in UTF-8.") from exc
-    header = [cell.strip() for cell in lines[0].split(",")] if lines else []
-    if any(header.count(name) != 1 for name in columns):
-        named = printable(", ".join(header)[:80]) or "nothing"
-        raise CalibrationError(f"{path}, line 1: the header names {named}; it must name {','.join(columns)} once each. "
-                               "Put that line first.")
-    places = [header.index(name) for name in columns]
-    rows: list[list[float]] = []
-    for number, line in enumerate(lines[1:], start=2):
-        if line:
-            row = _numbers(path, number, line, places, len(header))
-            if rows and row[0] < rows[-1][0]:
-                raise CalibrationError(f"{path}, line {number}: the time {row[0]:g} s is before that of the line "
-                                       "above. Sort the file by t.")
-            if not rows or row[0] > rows[-1][0]:
-                rows.append(row)
+def read_stream(path: Path, columns: Sequence[str]) -> MotionStream:
+    """Read a CSV file of positions or poses (`objects.stream.read_samples`); raises CalibrationError."""
+    rows = read_samples(path, columns, CalibrationError)
     if len(rows) < SAMPLES:
         raise CalibrationError(f"{path}: {len(rows)} samples; at least {SAMPLES} are needed. Record 20 s.")
-    table = np.array(rows)
-    if len(columns) == 4:
-        return MotionStream(table[:, 0], table[:, 1:4])
-    return MotionStream.of_quaternions(table[:, 0], table[:, 1:4], table[:, 4:8])
-
-
-def _numbers(path: Path, number: int, line: str, places: list[int], count: int) -> list[float]:
-    cells = line.split(",")
-    try:
-        row = [float(cells[place]) for place in places] if len(cells) == count else []
-    except ValueError:
-        row = []
-    if not row or not np.isfinite(row).all():
-        raise CalibrationError(f"{path}, line {number}: {printable(line[:40])!r} does not hold {count} numbers. "
-                               "Correct or delete the line.")
-    if len(row) == 8 and not 0.9 < float(np.linalg.norm(row[4:])) < 1.1:
-        raise CalibrationError(f"{path}, line {number}: the quaternion's length is {np.linalg.norm(row[4:]):.3f}, not "
-                               "1. Check the columns, or delete the line.")
-    return row
+    rotations = rotation_from_quaternion(rows[:, 4:]) if len(columns) > 4 else None
+    return MotionStream(rows[:, 0], rows[:, 1:4], rotations)

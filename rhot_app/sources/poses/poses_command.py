@@ -87,7 +87,7 @@ def figures(poses: Sequence[ForeignPose]) -> dict[str, Any]:
     import numpy as np
 
     from rhot_app.objects.pose import Validity
-    from rhot_app.objects.stream import SAMPLES, PoseStream, noise_of
+    from rhot_app.objects.stream import SAMPLES, noise_of
     from rhot_app.sources.poses.source import PoseGate
 
     tracked = [pose for pose in poses if pose.validity is Validity.TRACKED]
@@ -98,9 +98,7 @@ def figures(poses: Sequence[ForeignPose]) -> dict[str, Any]:
     steps_s = np.diff(times_s)
     sd = np.full(6, np.nan)
     if len(tracked) >= SAMPLES:
-        stream = PoseStream(np.array([pose.t_master_ns for pose in tracked]),
-                            np.array([pose.world_from_body for pose in tracked]))
-        sd = np.sqrt(np.diag(noise_of(stream)))
+        sd = np.sqrt(np.diag(noise_of(np.array([pose.world_from_body for pose in tracked]))))
     return {"poses": len(poses), "tracked": len(tracked), "seconds": float(times_s[-1] - times_s[0]),
             "rate_hz": float((len(times_s) - 1) / (times_s[-1] - times_s[0])),
             "jitter_ms": 1e3 * float(np.std(steps_s)), "longest_gap_ms": 1e3 * float(steps_s.max()),

@@ -83,8 +83,7 @@ class StreamNoise:
         self._fresh += 1
         if self._fresh >= NOISE_SAMPLES // 2 and len(self._samples) == NOISE_SAMPLES:
             self._fresh = 0
-            times, poses = zip(*self._samples, strict=True)
-            self.covariance = noise_of(PoseStream(np.array(times), np.array(poses)))
+            self.covariance = noise_of(np.array([pose for _, pose in self._samples]))
         return self.covariance
 
 
@@ -121,7 +120,7 @@ class FilePoses:
         """Raises ObjectError as `read_pose_stream` and `noise_of` do."""
         self.name, self.notice = path.name, ""
         self._stream: PoseStream | None = read_pose_stream(path)
-        self._covariance = noise_of(self._stream)
+        self._covariance = noise_of(self._stream.poses)
 
     @property
     def ended(self) -> bool:
