@@ -32,8 +32,8 @@ from tables import arguments, publish, table
 from thesis_pipeline import ThesisPipeline
 
 from rhot_node.detect.fast import SEARCH_STEP, FastDetector
-from rhot_node.detect.gate import ColourGate
 from rhot_node.detect.image import YuvImage, to_bgr
+from rhot_node.detect.search import ColourGate
 
 SCENES = {"compact": ("compact", "grey"), "spread": ("spread", "grey"), "textured": ("hand", "blotches")}
 RING = 64  # frames: 29 MB of YUV, 59 MB of BGR

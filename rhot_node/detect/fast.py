@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect.find import DOUBTFUL, SEARCH_STEP, Finder
-from rhot_node.detect.gate import Labels, guess_illuminant
-from rhot_node.detect.illuminant import DEAD_ZONE, MARKERS_LEAST, SWITCHED, Illuminant
+from rhot_node.detect.illuminant import DEAD_ZONE, MARKERS_LEAST, SWITCHED, Illuminant, guess_illuminant
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.occlusion import widen_touching
+from rhot_node.detect.search import Labels
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 

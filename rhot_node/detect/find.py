@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect.colour import directions, sector_table
-from rhot_node.detect.gate import AREA_MIN, ColourGate, merits
 from rhot_node.detect.illuminant import Illuminant
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.region import measure as m
 from rhot_node.detect.region.outline import INTERIOR, OUTSIDE
-from rhot_node.detect.search import AREA, LABEL, SUM_U, SUM_V, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
+from rhot_node.detect.search import AREA_MIN, Blob, ColourGate
 from rhot_node.detect.tracks.follow import learn_noise, noise_level
 from rhot_node.detect.tracks.followed import Followed
 from rhot_node.detect.tracks.track import (
@@ -46,8 +45,6 @@ SEARCH_STEP = 2  # chroma rows: every other one shows all markers
 INTERLACED = (0, 4, 2, 6)  # chroma rows, of 8, that are searched in turn: four frames search as much as SEARCH_STEP
 
 _NOT_PLAIN = int(DOUBTFUL | MarkerFlag.LOST)
-
-Blob = list[float]  # a row of a search's blobs
 
 
 class Finder:
@@ -135,8 +132,8 @@ class Finder:
         """
         everything: list[list[MarkerObservation]] = [[] for _ in self._markers]
         self._balanced = None
-        for blob in self.gate.blobs(self._light.balanced(image), range(self._count)).tolist():
-            index = int(blob[LABEL]) - 1
+        for blob in self.gate.blobs(self._light.balanced(image), range(self._count)):
+            index = int(blob.label) - 1
             if self._measure(image, index, self._request_of(index, blob)):
                 everything[index].append(Track(self._shapes[index]).observe(index, self._row.tolist(), self._noise,
                                                                             MarkerFlag.ACQUIRED))
@@ -220,13 +217,13 @@ class Finder:
         self._searches += 1
         image = self._light.balanced(camera_image, step, first)
         left: list[tuple[int, Blob]] = []
-        blobs = self.gate.blobs(image, range(self._count), AREA_MIN, step, first).tolist()
+        blobs = self.gate.blobs(image, range(self._count), AREA_MIN, step, first)
         for index, own in self._unexplained(blobs, seen).items():
             if self._best[index] not in seen:
                 own = self._acquire(camera_image, index, own, seen, whole)
             left += [(index, blob) for blob in own]
         if whole:
-            left.sort(key=lambda one: -one[1][AREA])
+            left.sort(key=lambda one: -one[1].area)
         elif left:  # another one each time that the same rows are searched
             left = [left[(self._searches + self._searches // len(INTERLACED)) % len(left)]]
         for index, blob in left:
@@ -240,9 +237,9 @@ class Finder:
             tracked[slot % self._count].append((state[TRACK_X], state[TRACK_Y], state[EXTENT]))
         found: dict[int, list[Blob]] = {}
         for blob in blobs:
-            index, area = int(blob[LABEL]) - 1, blob[AREA]
-            x, y = blob[SUM_X] / area, blob[SUM_Y] / area
-            size = max(blob[X_MAX] - blob[X_MIN], blob[Y_MAX] - blob[Y_MIN]) + 1.0
+            index, area = int(blob.label) - 1, blob.area
+            x, y = blob.centroid
+            size = max(blob.x_max - blob.x_min, blob.y_max - blob.y_min) + 1.0
             if area < LARGEST * self._scratch.mask.size and not any(
                     math.hypot(x - track_x, y - track_y) < 0.5 * (size + extent)
                     for track_x, track_y, extent in tracked[index]):
@@ -253,17 +250,16 @@ class Finder:
                  careful: bool) -> list[Blob]:
         """Find a lost marker among its blobs `own` and add it to `seen`; returns the other blobs.
 
-        While the track is remembered, blobs are tried in the order of its motion and size, else in that of `merits`.
+        While the track is remembered, blobs are tried in the order of its motion and size, else by `Blob.merit`.
         """
         slot = self._best[index]
         track = self._tracks[slot]
         if len(own) > 1:
             if track.remembered:
-                scores = [-track.candidate_cost(blob[SUM_X] / blob[AREA], blob[SUM_Y] / blob[AREA], blob[AREA])
-                         for blob in own]
+                own = sorted(own, key=track.candidate_cost)
             else:
-                scores = merits(np.array(own), self._markers[index], self._scratch.mask.shape).tolist()
-            own = [own[k] for k in np.argsort(scores)[::-1]]
+                marker, shape = self._markers[index], self._scratch.mask.shape
+                own = sorted(own, key=lambda blob: -blob.merit(marker, shape))
         for place, blob in enumerate(own[:CANDIDATES_MAX]):
             if self._measure(camera_image, slot, self._request_of(index, blob), careful) \
                     and not self._is_pale(slot, self._row[m.LEVEL]):
@@ -291,13 +287,13 @@ class Finder:
 
     def _request_of(self, index: int, blob: Blob) -> NDArray[np.float64]:
         """The request to measure a blob as marker `index`."""
-        out, area, direction = self._request, blob[AREA], self._directions[index]
-        out[m.PX], out[m.PY] = blob[SUM_X] / area, blob[SUM_Y] / area
-        out[m.HALF_X] = max(blob[X_MAX] - out[m.PX], out[m.PX] - blob[X_MIN]) + MARGIN
-        out[m.HALF_Y] = max(blob[Y_MAX] - out[m.PY], out[m.PY] - blob[Y_MIN]) + MARGIN
+        out, area, direction = self._request, blob.area, self._directions[index]
+        out[m.PX], out[m.PY] = blob.centroid
+        out[m.HALF_X] = max(blob.x_max - out[m.PX], out[m.PX] - blob.x_min) + MARGIN
+        out[m.HALF_Y] = max(blob.y_max - out[m.PY], out[m.PY] - blob.y_min) + MARGIN
         out[m.SIGMA] = 1.0 + 0.25 * math.sqrt(area)
         out[m.AREA_REF] = area
-        out[m.LEVEL_REF] = (blob[SUM_U] * direction[0] + blob[SUM_V] * direction[1]) / area
+        out[m.LEVEL_REF] = (blob.sum_u * direction[0] + blob.sum_v * direction[1]) / area
         out[m.IS_BAND] = self._shapes[index] == "band"
         return out
 

@@ -9,6 +9,7 @@ calibration.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,6 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_node.detect.image import YuvImage
+from rhot_node.detect.search import ColourGate
 from rhot_node.markers import Marker, MarkerSet
 
 Array = NDArray[np.float64]
@@ -151,27 +153,63 @@ def _byte(chroma):
     return min(max(int(np.floor(chroma + 128.5)), 0), 255)
 
 
-@njit(cache=True)
-def fit_temperature_shift(hues, predicted, grid):
+def fit_temperature_shift(hues: Array, predicted: Array, grid: Array) -> tuple[float, float]:
     """The warmth (of the `grid` (K,), interpolated) that explains the hues (N,) deg best, and how much they tell of it.
 
     Least squares over the difference to the `predicted` hues (N, K), each capped, and over the warmth itself. The
     information is the curvature of the hues' share: 1 / variance.
     """
-    best, best_cost = 0, np.inf
-    costs = np.zeros(len(grid))
-    for k in range(len(grid)):
-        cost = (grid[k] / WARMTH_SIGMA) ** 2
-        for n in range(len(hues)):
-            away = abs(hues[n] - predicted[n, k]) % 360.0
-            away = min(away, 360.0 - away, HUE_CAP_DEG)
-            cost += (away / HUE_SIGMA_DEG) ** 2
-        costs[k] = cost
-        if cost < best_cost:
-            best, best_cost = k, cost
-    if best == 0 or best == len(grid) - 1:
-        return grid[best], 0.0
-    step = grid[1] - grid[0]
-    bend = costs[best - 1] - 2.0 * costs[best] + costs[best + 1]
-    shift = 0.5 * (costs[best - 1] - costs[best + 1]) / bend if bend > 0.0 else 0.0
-    return grid[best] + shift * step, max(0.5 * bend / step**2 - 1.0 / WARMTH_SIGMA**2, 0.0)
+    away = np.abs(np.remainder(hues[:, None] - predicted + 180.0, 360.0) - 180.0)
+    misfit = np.sum((np.minimum(away, HUE_CAP_DEG) / HUE_SIGMA_DEG) ** 2, axis=0)
+    costs = (grid / WARMTH_SIGMA) ** 2 + misfit
+    best = int(np.argmin(costs))
+    if best in (0, len(grid) - 1):
+        return float(grid[best]), 0.0
+    before, here, after = costs[best - 1:best + 2].tolist()
+    bend = before - 2.0 * here + after
+    shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    curvature = float(np.diff(misfit[best - 1:best + 2], 2)[0]) / STEP**2
+    return float(grid[best]) + shift * STEP, max(0.5 * curvature, 0.0)
+
+
+# -- illuminant estimation without a prior -----------------------------------------------------------------------------
+
+GUESSES = np.arange(-6, 7) * (WARMTH_MOST / 6.5)
+GUESS_SIGMA_DEG = 6.0  # what a guess half a step beside the light leaves
+COMPACT = 0.5  # of the bounding box: a marker fills as much
+RECOGNISED = 0.25  # score of a marker
+ADVANTAGE = 1.0  # markers more than in the last known light
+GUESS_AREA_MIN = 12  # chroma pixels
+ROW_STEP = 4  # chroma rows: every fourth is searched
+ALL_THERE = 0.6  # of the greatest score: no other light can be much better
+
+
+def guess_illuminant(image: YuvImage, light: Illuminant, gate: ColourGate, markers: MarkerSet) -> bool:
+    """Set the light in which clearly more markers are recognised than in the present one; says whether it did.
+
+    Two colours may be explained by many a light: with fewer than MARKERS_LEAST nothing is guessed.
+    """
+    if len(markers.markers) < MARKERS_LEAST:
+        return False
+    hues, present = np.array([marker.chroma.hue_rad for marker in markers.markers]), light.temperature_shift
+    scores = _scores(image, light, gate, hues)
+    if scores.sum() >= ALL_THERE * len(hues):
+        return False
+    best, best_score = present, float(scores.sum()) + ADVANTAGE
+    for guess in GUESSES:
+        light.temperature_shift = float(guess)
+        scores = _scores(image, light, gate, hues)
+        if scores.sum() > best_score and np.count_nonzero(scores > RECOGNISED) >= MARKERS_LEAST:
+            best, best_score = light.temperature_shift, float(scores.sum())
+    light.temperature_shift = best
+    return best != present
+
+
+def _scores(image: YuvImage, light: Illuminant, gate: ColourGate, marker_hues: Array) -> Array:
+    """(M,) 0..1: how well each marker's best blob has its hue, as far as it is compact."""
+    scores = np.zeros(len(marker_hues))
+    for blob in gate.blobs(light.balanced(image, ROW_STEP), range(len(marker_hues)), GUESS_AREA_MIN, ROW_STEP):
+        index = int(blob.label) - 1
+        match = math.exp(-0.5 * (blob.off_hue(marker_hues[index]) / math.radians(GUESS_SIGMA_DEG)) ** 2)
+        scores[index] = max(scores[index], min(blob.compactness / COMPACT, 1.0) * match)
+    return scores

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 import cv2
 import numpy as np
@@ -14,8 +13,13 @@ from rhot_node.wire.messages import MarkerObservation
 Plane = NDArray[np.uint8]
 
 
-@dataclass(frozen=True, slots=True)
-class YuvImage:
+def table_of(record: Any) -> np.dtype[Any]:
+    """The dtype of an array of such records, all of whose fields are float64. Compiled code reads and writes its fields
+    by their names. `record`: a named tuple."""
+    return np.dtype([(name, np.float64) for name in record._fields])
+
+
+class YuvImage(NamedTuple):
     """Three planes: `y` (H, W), `u` = Cb and `v` = Cr (H/2, W/2), uint8, H and W even.
 
     A chroma sample (x, y) lies at luma 2 (x, y) + 0.5: it is the mean of a 2x2 block.

@@ -3,90 +3,165 @@
 Runs of equal label per row are joined with those of the row above by union-find into area, sums and box: no mask is
 written. Eight pixels at a time are passed over when all lie in a box of the chroma plane that is nobody's: grey and
 what is nearly grey, skin and wood, which is what most of a picture is like.
+
+`FastDetector` searches with `ColourGate`, and whoever shows or judges the colours asks the same object: what is drawn
+as the mask is what the detector computes.
 """
 
 from __future__ import annotations
+
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect.colour import Table
-from rhot_node.detect.image import Plane
+from rhot_node.detect.colour import Table, acquisition_table
+from rhot_node.detect.image import YuvImage, table_of
+from rhot_node.markers import Marker, MarkerSet
 
+AREA_MIN = 6  # chroma pixels; smaller blobs are specks (a marker of 5.5 px across)
 RUNS_MAX = 16384  # more runs than this is noise or foliage, not markers; the rest of the frame is not searched
 BLOBS_MAX = 512
-WORD = 8  # pixels
-ROOM, ROOM_SIGMA = (-10.0, 8.0), 16.0  # grey levels: the chroma (cb, cr) of rooms, mostly, and how far it spreads
-BOX_HALF_MOST, BOX_STEP = 60, 3  # grey levels on either side of grey that the box of nobody's colours may reach
+GREY = 128  # of U and V
+DULL_REACH = 60  # grey levels on either side of grey that the box of nobody's colours may reach
 
-# Columns of a blob row; positions and areas in chroma pixels.
-LABEL, AREA, SUM_X, SUM_Y, SUM_U, SUM_V, X_MIN, X_MAX, Y_MIN, Y_MAX = range(10)
-BLOB_COLUMNS = 10
-# Columns of a run.
-_LABEL, _START, _END, _ROW, _SUM_U, _SUM_V, _PARENT = range(7)
-
-_ONES = np.uint64(0x0101010101010101)
-_TOPS = np.uint64(0x8080808080808080)
+WORD = np.uint64().nbytes  # pixels
+_BYTES = range(WORD)
+_ONES = np.uint64(sum(1 << 8 * k for k in _BYTES))
+_TOPS = np.uint64(sum(1 << 8 * k + 7 for k in _BYTES))
 _NO_WORDS = np.zeros((0, 0), dtype=np.uint64)
 
+Labels = NDArray[np.uint8]
 
-class Searcher:
-    """Owns the buffers of the search so that a frame allocates nothing."""
 
-    def __init__(self, table: Table, luma_limits: NDArray[np.uint8]) -> None:
-        """`table`: acquisition table; `luma_limits`: (M, 2) lowest and highest luma of each marker."""
-        self._table = table
-        self._luma_limits = luma_limits
-        self._dull = np.array([dull_box(table)], dtype=np.uint64)
+class Blob(NamedTuple):
+    """A blob of one marker's colour: 1 + the marker's index, area, and the sums of places and of chroma (minus 128)
+    over its pixels; its box. Chroma pixels."""
+
+    label: float
+    area: float
+    sum_x: float
+    sum_y: float
+    sum_u: float
+    sum_v: float
+    x_min: float
+    x_max: float
+    y_min: float
+    y_max: float
+
+    @property
+    def centroid(self) -> tuple[float, float]:
+        """(x, y)."""
+        return self.sum_x / self.area, self.sum_y / self.area
+
+    @property
+    def compactness(self) -> float:
+        """Share of its box that it fills."""
+        return self.area / ((self.x_max - self.x_min + 1.0) * (self.y_max - self.y_min + 1.0))
+
+    def touches_border(self, shape: tuple[int, ...]) -> bool:
+        """Whether its box touches the border of planes of this `shape` (H/2, W/2)."""
+        return (self.x_min <= 0.0 or self.y_min <= 0.0
+                or self.x_max >= shape[1] - 1.0 or self.y_max >= shape[0] - 1.0)
+
+    def off_hue(self, hue_rad: float) -> float:
+        """Angle of its chroma from a hue, rad, -pi to pi."""
+        return math.remainder(math.atan2(self.sum_v, self.sum_u) - hue_rad, math.tau)
+
+    def merit(self, marker: Marker, shape: tuple[int, ...]) -> float:
+        """Score as a marker; higher is likelier: area * compactness * match of the hue, half of it at the border."""
+        match = math.exp(-(self.off_hue(marker.chroma.hue_rad) / math.radians(marker.chroma.hue_tolerance_deg)) ** 2)
+        return self.area * self.compactness * match * (0.5 if self.touches_border(shape) else 1.0)
+
+
+_RUN = np.dtype([(name, np.int32) for name in ("label", "start", "end", "row", "sum_u", "sum_v", "parent")])
+
+
+class _Words(NamedTuple):
+    """Planes by words of eight pixels, (H/2, W/16) or empty, and scratch (W/16,): is a pixel of a word not dull?"""
+
+    u: NDArray[np.uint64]
+    v: NDArray[np.uint64]
+    bright: NDArray[np.uint64]
+
+
+class _Gate(NamedTuple):
+    """Labels of chroma pairs (256, 256), lowest and highest luma of each marker (M, 2), labels that are wanted
+    (M + 1,), and the box that is nobody's: least and greatest U and V (4,)."""
+
+    table: Table
+    luma_limits: NDArray[np.uint8]
+    wanted: NDArray[np.bool_]
+    dull: NDArray[np.uint64]
+
+
+class ColourGate:
+    """The colours of one marker set: hue sectors, magnitude and luma gates, and the search for their blobs.
+
+    Holds buffers, so that a frame allocates nothing: one thread only.
+    """
+
+    def __init__(self, markers: MarkerSet) -> None:
+        self.table: Table = acquisition_table(markers)
+        self.luma_limits = np.array([(mark.chroma.luma_min, mark.chroma.luma_max) for mark in markers.markers],
+                                    dtype=np.uint8)
+        self._gate = _Gate(self.table, self.luma_limits, np.zeros(len(markers.markers) + 1, dtype=np.bool_),
+                           np.array(dull_box(self.table), dtype=np.uint64))
         self._bright = np.zeros(0, dtype=np.uint64)
-        self._runs = np.zeros((RUNS_MAX, 7), dtype=np.int32)
+        self._runs = np.zeros(RUNS_MAX, dtype=_RUN)
         self._slots = np.zeros(RUNS_MAX, dtype=np.int32)
-        self._blobs = np.zeros((BLOBS_MAX, BLOB_COLUMNS), dtype=np.float64)
+        self._blobs = np.zeros(BLOBS_MAX, dtype=table_of(Blob))
 
-    def find(self, y: Plane, u: Plane, v: Plane, wanted: NDArray[np.bool_], area_min: int, *,
-             step: int = 1, first: int = 0) -> NDArray[np.float64]:
-        """(N, 10) blobs of the wanted labels with at least `area_min` chroma pixels; a view, valid until the next.
+    def labels(self, image: YuvImage) -> Labels:
+        """(H/2, W/2) for every chroma pixel 1 + the index of the marker it is taken for, 0 for none."""
+        out = np.empty(image.u.shape, dtype=np.uint8)
+        _label_plane(image, self.table, self.luma_limits, out)
+        return out
 
-        Every `step`-th row from `first` on is searched and stands for the others.
+    def blobs(self, image: YuvImage, indices: list[int] | range, area_min: int = AREA_MIN,
+              step: int = 1, first: int = 0) -> list[Blob]:
+        """The blobs of the markers `indices`.
+
+        A blob has at least `area_min` chroma pixels. Every `step`-th chroma row from `first` on stands for the others.
         """
+        self._gate.wanted[:] = False
+        for index in indices:
+            self._gate.wanted[index + 1] = True
         words_u = words_v = _NO_WORDS
-        if u.shape[1] % WORD == 0 and u.strides[1] == v.strides[1] == 1:
-            words_u, words_v = u.view(np.uint64), v.view(np.uint64)
+        if image.u.shape[1] % WORD == 0 and image.u.strides[1] == image.v.strides[1] == 1:
+            words_u, words_v = image.u.view(np.uint64), image.v.view(np.uint64)
             if len(self._bright) != words_u.shape[1]:
                 self._bright = np.zeros(words_u.shape[1], dtype=np.uint64)
-        runs = label_runs(y, u, v, words_u, words_v, self._bright, self._dull, self._table, wanted, self._luma_limits,
-                          step, first, self._runs)
+        runs = label_runs(image, _Words(words_u, words_v, self._bright), self._gate, step, first, self._runs)
         count = gather_blobs(self._runs, runs, area_min, step, self._slots, self._blobs)
-        return self._blobs[:count]
+        return [Blob(*row) for row in self._blobs[:count].tolist()]
 
 
 def dull_box(table: Table) -> tuple[int, int, int, int]:
-    """U and V of a box, (u_min, u_max, v_min, v_max), in which nothing is labelled: that which most of a room is in.
+    """The largest box of U and V round grey, (u_min, u_max, v_min, v_max), in which nothing is labelled.
 
-    It holds grey (128, 128) unless that has a label: then it is empty (u_min 1, u_max 0).
+    Empty (u_min 1, u_max 0) when grey itself has a label.
     """
-    u, v = np.meshgrid(np.arange(256.0), np.arange(256.0), indexing="ij")
-    often = np.exp(-0.5 * ((u - 128.0 - ROOM[0]) ** 2 + (v - 128.0 - ROOM[1]) ** 2) / ROOM_SIGMA**2)
-    weight = np.pad(np.cumsum(np.cumsum(often, axis=0), axis=1), ((1, 0), (1, 0)))
-    best, box = 0.0, (1, 0, 1, 0)
-    for u_min in range(128 - BOX_HALF_MOST, 129, BOX_STEP):
-        taken = np.cumsum(table[u_min:129 + BOX_HALF_MOST] != 0, axis=0) > 0
-        for u_max in range(128, 128 + BOX_HALF_MOST, BOX_STEP):
-            labelled = np.flatnonzero(taken[u_max - u_min])
-            v_min = int(max(labelled[labelled <= 128].max(initial=-1) + 1, 128 - BOX_HALF_MOST))
-            v_max = int(min(labelled[labelled >= 128].min(initial=256) - 1, 127 + BOX_HALF_MOST))
-            if v_min > v_max:
+    best, box = 0, (1, 0, 1, 0)
+    for u_min in range(GREY - DULL_REACH, GREY + 1):
+        labelled = np.zeros(len(table), np.bool_)
+        for u_max in range(u_min, GREY + DULL_REACH):
+            labelled |= table[u_max] != 0
+            if u_max < GREY or labelled[GREY]:
                 continue
-            share = (weight[u_max + 1, v_max + 1] - weight[u_min, v_max + 1]
-                     - weight[u_max + 1, v_min] + weight[u_min, v_min])
-            if share > best:
-                best, box = share, (u_min, u_max, v_min, v_max)
+            places = np.flatnonzero(labelled)
+            v_min = max(int(places[places < GREY].max(initial=-1)) + 1, GREY - DULL_REACH)
+            v_max = min(int(places[places > GREY].min(initial=len(table))), GREY + DULL_REACH) - 1
+            size = (u_max - u_min + 1) * (v_max - v_min + 1)
+            if size > best:
+                best, box = size, (u_min, u_max, v_min, v_max)
     return box
 
 
 @njit(cache=True)
-def label_at(y, u, v, row, column, table, luma_limits):
+def _label_at(y, u, v, row, column, table, luma_limits):
     """1 + the index of the marker that a chroma pixel is taken for, 0 for none: hue and magnitude, then luma."""
     label = np.int64(table[u[row, column], v[row, column]])
     if label != 0:
@@ -97,6 +172,15 @@ def label_at(y, u, v, row, column, table, luma_limits):
 
 
 @njit(cache=True)
+def _label_plane(image, table, luma_limits, out):
+    """Write the label of every chroma pixel to `out`."""
+    y, u, v = image
+    for row in range(out.shape[0]):
+        for column in range(out.shape[1]):
+            out[row, column] = _label_at(y, u, v, row, column, table, luma_limits)
+
+
+@njit(cache=True)
 def _outside(word, low, span):
     """Sets the top bit of every byte of `word` that is not within low..low + span; span is below 128. All by bytes."""
     away = ((word | _TOPS) - (low & ~_TOPS)) ^ ((word ^ ~low) & _TOPS)  # word - low, byte by byte
@@ -104,84 +188,88 @@ def _outside(word, low, span):
 
 
 @njit(cache=True)
-def _mark_bright(words_u, words_v, row, dull, bright):
+def _mark_bright(words, row, dull):
     """Write for every word of a row whether a pixel of it lies outside the box `dull`."""
-    low_u, span_u = dull[0, 0] * _ONES, (dull[0, 1] - dull[0, 0]) * _ONES
-    low_v, span_v = dull[0, 2] * _ONES, (dull[0, 3] - dull[0, 2]) * _ONES
-    for k in range(words_u.shape[1]):
-        bright[k] = (_outside(words_u[row, k], low_u, span_u) | _outside(words_v[row, k], low_v, span_v)) & _TOPS
+    low_u, span_u = dull[0] * _ONES, (dull[1] - dull[0]) * _ONES
+    low_v, span_v = dull[2] * _ONES, (dull[3] - dull[2]) * _ONES
+    u, v, bright = words.u[row], words.v[row], words.bright
+    for k in range(bright.shape[0]):
+        bright[k] = (_outside(u[k], low_u, span_u) | _outside(v[k], low_v, span_v)) & _TOPS
 
 
 @njit(cache=True)
-def label_runs(y, u, v, words_u, words_v, bright, dull, table, wanted, luma_limits, step, first_row, runs):
+def label_runs(image, words, gate, step, first_row, runs):
     """Fill `runs` with the runs of equal wanted label, each joined to its neighbours above; return how many.
 
-    Every `step`-th row from `first_row` on is searched.
-    Words that are all in the box `dull` (1, 4) are passed over; `words_u` and `words_v` (H/2, W/16) may be empty.
-    Scratch: `bright` (W/16,).
+    Every `step`-th row from `first_row` on is searched. Words that are all in the gate's dull box are passed over.
     """
+    y, u, v = image
+    table, luma_limits, wanted, dull = gate
+    bright = words.bright
     height, width = u.shape
-    by_words = words_u.shape[1] > 0 and dull[0, 0] <= dull[0, 1]
+    by_words = words.u.shape[1] > 0 and dull[0] <= dull[1]
     block = WORD if by_words else width
     count = above_start = above_end = np.int64(0)
     for row in range(first_row, height, step):
         row_start = count
         current = 0
         if by_words:
-            _mark_bright(words_u, words_v, row, dull, bright)
+            _mark_bright(words, row, dull)
         for first in range(0, width, block):
             if by_words and bright[first // WORD] == 0:
                 current = 0
                 continue
             for column in range(first, first + block):
-                label = label_at(y, u, v, row, column, table, luma_limits)
+                label = _label_at(y, u, v, row, column, table, luma_limits)
                 if not wanted[label]:
                     current = 0
                     continue
                 if label != current:
                     if count == runs.shape[0]:
                         return count
-                    _start_run(runs, count, label, row, column)
+                    _start_run(runs[count], count, label, row, column)
                     count += 1
                     current = label
-                runs[count - 1, _END] = column
-                runs[count - 1, _SUM_U] += np.int32(u[row, column]) - 128
-                runs[count - 1, _SUM_V] += np.int32(v[row, column]) - 128
+                run = runs[count - 1]
+                run.end = column
+                run.sum_u += np.int32(u[row, column]) - GREY
+                run.sum_v += np.int32(v[row, column]) - GREY
         _join_rows(runs, above_start, above_end, row_start, count, step)
         above_start, above_end = row_start, count
     return count
 
 
 @njit(cache=True)
-def _start_run(runs, count, label, row, column):
-    runs[count, _LABEL] = label
-    runs[count, _START] = column
-    runs[count, _ROW] = row
-    runs[count, _SUM_U] = 0
-    runs[count, _SUM_V] = 0
-    runs[count, _PARENT] = count
+def _start_run(run, number, label, row, column):
+    run.label = label
+    run.start = column
+    run.row = row
+    run.sum_u = 0
+    run.sum_v = 0
+    run.parent = number
 
 
 @njit(cache=True)
 def _join_rows(runs, above, above_end, here, here_end, reach):
-    """Union runs of two looked-at rows that touch (for neighbours: 8-connected) and have the same label."""
-    for run in range(here, here_end):
-        while above < above_end and runs[above, _END] + reach < runs[run, _START]:
+    """Union runs of two searched rows that touch (for neighbours: 8-connected) and have the same label."""
+    for number in range(here, here_end):
+        run = runs[number]
+        while above < above_end and runs[above].end + reach < run.start:
             above += 1
         other = above
-        while other < above_end and runs[other, _START] <= runs[run, _END] + reach:
-            if runs[other, _LABEL] == runs[run, _LABEL]:
+        while other < above_end and runs[other].start <= run.end + reach:
+            if runs[other].label == run.label:
                 first = _root(runs, other)
-                second = _root(runs, run)
-                runs[max(first, second), _PARENT] = min(first, second)
+                second = _root(runs, number)
+                runs[max(first, second)].parent = min(first, second)
             other += 1
 
 
 @njit(cache=True)
 def _root(runs, index):
-    while runs[index, _PARENT] != index:
-        runs[index, _PARENT] = runs[runs[index, _PARENT], _PARENT]
-        index = runs[index, _PARENT]
+    while runs[index].parent != index:
+        runs[index].parent = runs[runs[index].parent].parent
+        index = runs[index].parent
     return index
 
 
@@ -191,7 +279,7 @@ def gather_blobs(runs, run_count, area_min, step, slots, blobs):
     areas = slots[:run_count]
     areas[:] = 0
     for index in range(run_count):
-        areas[_root(runs, index)] += step * (runs[index, _END] - runs[index, _START] + 1)
+        areas[_root(runs, index)] += step * (runs[index].end - runs[index].start + 1)
     count = 0
     for index in range(run_count):
         root = _root(runs, index)
@@ -199,27 +287,30 @@ def gather_blobs(runs, run_count, area_min, step, slots, blobs):
             if areas[index] < area_min or count == blobs.shape[0]:
                 areas[index] = -1
             else:
-                blobs[count, :] = 0.0
-                blobs[count, LABEL] = runs[index, _LABEL]
-                blobs[count, X_MIN] = runs[index, _START]
-                blobs[count, Y_MIN] = runs[index, _ROW]
+                _start_blob(blobs[count], runs[index])
                 areas[index] = count
                 count += 1
         if areas[root] >= 0:
-            _add_run(runs, index, step, blobs, areas[root])
+            _add_run(blobs[areas[root]], runs[index], step)
     return count
 
 
 @njit(cache=True)
-def _add_run(runs, index, step, blobs, slot):
-    start = runs[index, _START]
-    end = runs[index, _END]
-    area = step * (end - start + 1)
-    blobs[slot, AREA] += area
-    blobs[slot, SUM_X] += 0.5 * (start + end) * area
-    blobs[slot, SUM_Y] += (runs[index, _ROW] + 0.5 * (step - 1)) * area
-    blobs[slot, SUM_U] += step * runs[index, _SUM_U]
-    blobs[slot, SUM_V] += step * runs[index, _SUM_V]
-    blobs[slot, X_MIN] = min(blobs[slot, X_MIN], start)
-    blobs[slot, X_MAX] = max(blobs[slot, X_MAX], end)
-    blobs[slot, Y_MAX] = runs[index, _ROW] + step - 1
+def _start_blob(blob, run):
+    blob.label = run.label
+    blob.area = blob.sum_x = blob.sum_y = blob.sum_u = blob.sum_v = blob.x_max = blob.y_max = 0.0
+    blob.x_min = run.start
+    blob.y_min = run.row
+
+
+@njit(cache=True)
+def _add_run(blob, run, step):
+    area = step * (run.end - run.start + 1)
+    blob.area += area
+    blob.sum_x += 0.5 * (run.start + run.end) * area
+    blob.sum_y += (run.row + 0.5 * (step - 1)) * area
+    blob.sum_u += step * run.sum_u
+    blob.sum_v += step * run.sum_v
+    blob.x_min = min(blob.x_min, run.start)
+    blob.x_max = max(blob.x_max, run.end)
+    blob.y_max = run.row + step - 1

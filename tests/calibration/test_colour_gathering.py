@@ -13,7 +13,7 @@ from rhot_app.calibration.colour.samples import VIEWS_MOST
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
-from rhot_node.detect.gate import ColourGate
+from rhot_node.detect.search import ColourGate
 from rhot_node.markers import ChromaModel
 
 BESIDE = (12.0, 0.0)

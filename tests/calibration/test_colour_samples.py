@@ -11,8 +11,8 @@ from rhot_app.calibration.colour.paint_region import region_at, region_in
 from rhot_app.calibration.colour.samples import ColourSamples
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
-from rhot_node.detect.gate import ColourGate
 from rhot_node.detect.image import YuvImage
+from rhot_node.detect.search import ColourGate
 
 
 def test_a_click_takes_the_marker_and_nothing_else() -> None:

@@ -20,10 +20,10 @@ from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 from rhot_node.detect.colour import box_mask, colours_of
 from rhot_node.detect.fast import FastDetector
-from rhot_node.detect.gate import ColourGate
 from rhot_node.detect.illuminant import gains_of
 from rhot_node.detect.image import YuvImage
 from rhot_node.detect.reference import ReferenceDetector
+from rhot_node.detect.search import ColourGate
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 

@@ -6,9 +6,8 @@ import numpy as np
 from marker_rendering import SKIN, Canvas, capsule, disc
 from shipped_markers import RHOT6
 
-from rhot_node.detect.gate import ColourGate
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.search import AREA, LABEL
+from rhot_node.detect.search import ColourGate
 
 
 def picture() -> YuvImage:
@@ -20,10 +19,10 @@ def picture() -> YuvImage:
 
 def test_labels_are_the_pixels_of_the_blobs() -> None:
     image, gate = picture(), ColourGate(RHOT6)
-    labels, blobs = gate.labels(image), gate.blobs(image, range(6)).copy()
-    assert set(blobs[:, LABEL]) == {1, 2, 3, 4, 5, 6}
+    labels, blobs = gate.labels(image), gate.blobs(image, range(6))
+    assert {blob.label for blob in blobs} == {1, 2, 3, 4, 5, 6}
     for label in range(1, 7):
-        in_blobs = blobs[blobs[:, LABEL] == label, AREA].sum()
+        in_blobs = sum(blob.area for blob in blobs if blob.label == label)
         specks = (labels == label).sum() - in_blobs
         assert in_blobs > 60
         assert 0 <= specks <= 6  # what the search leaves out as noise

@@ -1,15 +1,24 @@
 """The one-pass search against OpenCV's connected components, colour by colour."""
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 from shipped_markers import RHOT6
 
 from rhot_node.detect import search as s
 from rhot_node.detect.colour import acquisition_table
+from rhot_node.detect.image import YuvImage
+from rhot_node.markers import MarkerSet
 
-ANY_LUMA = np.tile(np.array([0, 255], dtype=np.uint8), (6, 1))
-ALL = np.array([False] + 6 * [True])
+ANY_LUMA = (0, 255)
+
+
+def gate_of(table: np.ndarray, monkeypatch: pytest.MonkeyPatch, luma: tuple[int, int] = ANY_LUMA) -> s.ColourGate:
+    """The gate of a table of labels, of at most six markers with these limits of luma."""
+    monkeypatch.setattr(s, "acquisition_table", lambda markers: table)
+    return s.ColourGate(MarkerSet(tuple(msgspec.structs.replace(marker, chroma=msgspec.structs.replace(
+        marker.chroma, luma_min=luma[0], luma_max=luma[1])) for marker in RHOT6.markers)))
 
 
 def oracle(labels: np.ndarray, u: np.ndarray, v: np.ndarray, area_min: int) -> list[tuple[float, ...]]:
@@ -25,14 +34,9 @@ def oracle(labels: np.ndarray, u: np.ndarray, v: np.ndarray, area_min: int) -> l
     return sorted(rows)
 
 
-def find(labels: np.ndarray, table: np.ndarray, u: np.ndarray, v: np.ndarray, area_min: int) -> np.ndarray:
-    limits = np.tile(np.array([0, 255], dtype=np.uint8), (3, 1))
-    luma = np.full((2 * labels.shape[0], 2 * labels.shape[1]), 90, dtype=np.uint8)
-    return s.Searcher(table, limits).find(luma, u, v, np.array([False, True, True, True]), area_min)
-
-
 @pytest.mark.parametrize(("seed", "density", "area_min"), [(0, 0.3, 1), (1, 0.55, 1), (2, 0.8, 5), (3, 0.05, 2)])
-def test_blobs_equal_connected_components(seed: int, density: float, area_min: int) -> None:
+def test_blobs_equal_connected_components(seed: int, density: float, area_min: int,
+                                           monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(seed)
     labels = np.where(rng.random((23, 41)) < density, rng.integers(1, 4, (23, 41)), 0)
     if seed == 2:
@@ -41,11 +45,12 @@ def test_blobs_equal_connected_components(seed: int, density: float, area_min: i
     table[10:20, :], table[20:30, :], table[30:40, :] = 1, 2, 3
     u = (10 * labels + rng.integers(0, 10, labels.shape)).astype(np.uint8)
     v = rng.integers(0, 256, labels.shape).astype(np.uint8)
-    blobs = find(labels, table, u, v, area_min)
-    assert sorted(map(tuple, blobs.tolist())) == oracle(labels, u, v, area_min)
+    image = YuvImage(np.full((2 * labels.shape[0], 2 * labels.shape[1]), 90, dtype=np.uint8), u, v)
+    blobs = gate_of(table, monkeypatch).blobs(image, range(3), area_min)
+    assert sorted(map(tuple, blobs)) == oracle(labels, u, v, area_min)
 
 
-def test_luma_limits_and_unwanted_labels_are_left_out() -> None:
+def test_luma_limits_and_unwanted_labels_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     table = np.zeros((256, 256), dtype=np.uint8)
     table[200, :], table[60, :] = 1, 2
     u = np.full((20, 20), 128, dtype=np.uint8)
@@ -53,25 +58,21 @@ def test_luma_limits_and_unwanted_labels_are_left_out() -> None:
     v = np.full((20, 20), 128, dtype=np.uint8)
     luma = np.full((40, 40), 100, dtype=np.uint8)
     luma[4:16, 4:10] = 5
-    limits = np.array([(12, 250), (12, 250)], dtype=np.uint8)
-    searcher = s.Searcher(table, limits)
-    first = searcher.find(luma, u, v, np.array([False, True, False]), 4)
-    assert first.shape[0] == 1
-    assert first[0, s.AREA] == 18
-    assert first[0, s.X_MIN] == 5
+    (first,) = gate_of(table, monkeypatch, (12, 250)).blobs(YuvImage(luma, u, v), [0], 4)
+    assert first.area == 18
+    assert first.x_min == 5
 
 
-def test_more_runs_than_the_buffer_holds_end_the_search_quietly() -> None:
+def test_more_runs_than_the_buffer_holds_end_the_search_quietly(monkeypatch: pytest.MonkeyPatch) -> None:
     table = np.zeros((256, 256), dtype=np.uint8)
     table[200, :] = 1
     u = np.full((400, 400), 128, dtype=np.uint8)
     u[:, ::2] = 200
     v = np.full((400, 400), 128, dtype=np.uint8)
     luma = np.full((800, 800), 100, dtype=np.uint8)
-    limits = np.array([(12, 250)], dtype=np.uint8)
-    blobs = s.Searcher(table, limits).find(luma, u, v, np.array([False, True]), 4)
-    assert blobs.shape[0] == 200
-    assert blobs[:, s.AREA].sum() == 200 * (s.RUNS_MAX // 200)
+    blobs = gate_of(table, monkeypatch).blobs(YuvImage(luma, u, v), [0], 4)
+    assert len(blobs) == 200
+    assert sum(blob.area for blob in blobs) == 200 * (s.RUNS_MAX // 200)
 
 
 def colourful_picture(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -84,12 +85,12 @@ def colourful_picture(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_passing_over_dull_words_loses_no_pixel(seed: int) -> None:
+def test_passing_over_dull_words_loses_no_pixel(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     luma, u, v = colourful_picture(seed)
     table = acquisition_table(RHOT6)
-    blobs = s.Searcher(table, ANY_LUMA).find(luma, u, v, ALL, 1)
+    blobs = gate_of(table, monkeypatch).blobs(YuvImage(luma, u, v), range(6), 1)
     assert len(blobs) > 5
-    assert sorted(map(tuple, blobs.tolist())) == oracle(table[u, v], u, v, 1)
+    assert sorted(map(tuple, blobs)) == oracle(table[u, v], u, v, 1)
 
 
 def test_the_dull_box_holds_grey_and_skin_and_nobodys_colour() -> None:
@@ -103,18 +104,18 @@ def test_the_dull_box_holds_grey_and_skin_and_nobodys_colour() -> None:
     assert u_min > u_max
 
 
-def test_every_other_row_stands_for_its_neighbour() -> None:
+def test_every_other_row_stands_for_its_neighbour(monkeypatch: pytest.MonkeyPatch) -> None:
     table = np.zeros((256, 256), dtype=np.uint8)
     table[200, :], table[60, :] = 1, 2
     u, v = np.full((80, 96), 128, dtype=np.uint8), np.full((80, 96), 128, dtype=np.uint8)
     for x, y, radius, level in ((20, 20, 5, 200), (60, 31, 11, 60), (25, 61, 8, 60)):
         cv2.circle(u, (x, y), radius, level, -1)
     luma = np.full((160, 192), 90, dtype=np.uint8)
-    searcher = s.Searcher(table, ANY_LUMA)
-    whole, half = (searcher.find(luma, u, v, ALL, 6, step=step).copy() for step in (1, 2))
+    gate = gate_of(table, monkeypatch)
+    whole, half = (gate.blobs(YuvImage(luma, u, v), range(6), 6, step) for step in (1, 2))
     assert len(whole) == len(half) == 3
     for blob, same in zip(whole, half, strict=True):
-        assert same[s.LABEL] == blob[s.LABEL]
-        assert same[s.AREA] == pytest.approx(blob[s.AREA], rel=0.1)
-        np.testing.assert_allclose(same[s.SUM_X:s.SUM_U] / same[s.AREA], blob[s.SUM_X:s.SUM_U] / blob[s.AREA], atol=0.6)
-        np.testing.assert_allclose(same[s.X_MIN:], blob[s.X_MIN:], atol=1)
+        assert same.label == blob.label
+        assert same.area == pytest.approx(blob.area, rel=0.1)
+        np.testing.assert_allclose(same.centroid, blob.centroid, atol=0.6)
+        np.testing.assert_allclose(same[-4:], blob[-4:], atol=1)

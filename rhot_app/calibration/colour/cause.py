@@ -17,16 +17,14 @@ from rhot_app.calibration.colour.paint_region import Mask, PaintRegion
 from rhot_node.detect.colour import SECTOR_MAGNITUDE_MIN, Colours, colours_of, sector_table
 from rhot_node.detect.fast import SEARCH_STEP, FastDetector
 from rhot_node.detect.find import LARGEST
-from rhot_node.detect.gate import AREA_MIN, ColourGate, Labels
 from rhot_node.detect.illuminant import Illuminant
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.search import AREA, SUM_X, SUM_Y, X_MAX, X_MIN, Y_MAX, Y_MIN
+from rhot_node.detect.search import AREA_MIN, Blob, ColourGate, Labels
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import CANDIDATES_MAX, MarkerFlag, MarkerObservation
 
 Code = Literal["hue", "pale", "dark", "bright", "other", "small", "large", "joined", "thin", "rival", "crowded",
                "border", "hidden", "track"]
-Blob = NDArray[np.float64]
 
 JOINED = 2.2  # of the marker's area: a larger blob includes something else
 PASSING = 0.5  # of a marker's sample: if fewer pixels pass, the colour's bounds are the cause
@@ -84,20 +82,20 @@ class Explainer:
         joined = None if blob is None else self._joined(own, blob, index, region, paint or {})
         if joined is not None:
             return joined
-        if blob is None or (blob[AREA] < AREA_MIN and region is not None):
+        if blob is None or (blob.area < AREA_MIN and region is not None):
             colour = self._colour(balanced, index, region)
             if colour is not None:
                 return colour
-        if blob is None or blob[AREA] < AREA_MIN:
+        if blob is None or blob.area < AREA_MIN:
             return _small(blob, region, balanced)
-        if blob[AREA] >= LARGEST * image.u.size:
+        if blob.area >= LARGEST * image.u.size:
             return Cause("large", f"What has its colour {_at(blob)} is too large for a marker: "
-                         f"{100 * blob[AREA] / image.u.size:.0f} % of the picture, less than {100 * LARGEST:.0f} % is "
+                         f"{100 * blob.area / image.u.size:.0f} % of the picture, less than {100 * LARGEST:.0f} % is "
                          "taken.")
         near = region.whole if region is not None else _box(blob, image.u.shape)
         if not any(_inside(mark, near) for mark in detector.all_blobs(image)[index]):
             return Cause("thin", f"Its blob {_at(blob)} is a seam between two other colours, or too uneven to be "
-                         f"measured: {4 * blob[AREA]:.0f} px² without a pixel that is all paint.")
+                         f"measured: {4 * blob.area:.0f} px² without a pixel that is all paint.")
         if region is not None and any(_inside(mark, near) for mark in own):
             return self._colour(balanced, index, region, partly=True) or Cause(
                 "hidden", "Only a part of it is found: the rest is hidden or of another colour.")
@@ -132,8 +130,8 @@ class Explainer:
         blobs = self._gate.blobs(balanced, [index], 1, SEARCH_STEP)
         if region is not None:
             own = self._gate.labels(balanced) == index + 1
-            blobs = blobs[[bool((own & region.whole)[_slices(blob)].any()) for blob in blobs]]
-        return blobs[int(np.argmax(blobs[:, AREA]))].copy() if len(blobs) else None
+            blobs = [blob for blob in blobs if (own & region.whole)[_slices(blob)].any()]
+        return max(blobs, key=lambda blob: blob.area, default=None)
 
     def _colour(self, balanced: YuvImage, index: int, region: PaintRegion | None, partly: bool = False) -> Cause | None:
         """The colour test that the paint does not pass; None when most of it passes, with `partly` all of it."""
@@ -182,9 +180,9 @@ class Explainer:
         """The cause if the blob, or the observation made of it, is much larger than the marker."""
         if region is None:
             return None
-        held = [mark for mark in own if math.hypot(mark.x - 2.0 * blob[SUM_X] / blob[AREA],
-                                                   mark.y - 2.0 * blob[SUM_Y] / blob[AREA]) < 0.5 * mark.diameter]
-        area = max([0.25 * _area(mark) for mark in held] + [float(blob[AREA])])
+        x, y = blob.centroid
+        held = [mark for mark in own if math.hypot(mark.x - 2.0 * x, mark.y - 2.0 * y) < 0.5 * mark.diameter]
+        area = max([0.25 * _area(mark) for mark in held] + [blob.area])
         if area <= JOINED * region.area:
             return None
         others = [name for name, one in paint.items()
@@ -199,17 +197,17 @@ class Explainer:
         if len(own) >= CANDIDATES_MAX:
             return Cause("crowded", f"{len(own)} other objects of its colour are likelier, the first at {other.x:.0f}, "
                          f"{other.y:.0f}; no more than {CANDIDATES_MAX} are followed.")
-        why = "larger" if _area(other) > 4.0 * blob[AREA] else "likelier by its hue and shape"
-        cut = " The marker is cut by the picture's border." if _touches_border(blob, image.u.shape) else ""
+        why = "larger" if _area(other) > 4.0 * blob.area else "likelier by its hue and shape"
+        cut = " The marker is cut by the picture's border." if blob.touches_border(image.u.shape) else ""
         return Cause("rival", f"Another blob of its colour at {other.x:.0f}, {other.y:.0f} is {why}: "
-                     f"{_area(other):.0f} px², the marker has {4 * blob[AREA]:.0f} px².{cut}")
+                     f"{_area(other):.0f} px², the marker has {4 * blob.area:.0f} px².{cut}")
 
 
 def _small(blob: Blob | None, region: PaintRegion | None, image: YuvImage) -> Cause:
-    count = 0.0 if blob is None else float(blob[AREA])
+    count = 0.0 if blob is None else blob.area
     where = f" {_at(blob)}" if blob is not None else ""
     edges = [] if region is None else [region.whole[0], region.whole[-1], region.whole[:, 0], region.whole[:, -1]]
-    if any(edge.any() for edge in edges) or (blob is not None and _touches_border(blob, image.u.shape)):
+    if any(edge.any() for edge in edges) or (blob is not None and blob.touches_border(image.u.shape)):
         return Cause("border", f"It is cut by the picture's border: {4 * count:.0f} px² are left{where}, "
                      f"{4 * AREA_MIN} px² are needed.")
     return Cause("small", f"It is too small: the largest blob of its colour{where} has {4 * count:.0f} px², "
@@ -217,22 +215,18 @@ def _small(blob: Blob | None, region: PaintRegion | None, image: YuvImage) -> Ca
 
 
 def _at(blob: Blob) -> str:
-    return f"at {2.0 * blob[SUM_X] / blob[AREA] + 0.5:.0f}, {2.0 * blob[SUM_Y] / blob[AREA] + 0.5:.0f}"
+    x, y = blob.centroid
+    return f"at {2.0 * x + 0.5:.0f}, {2.0 * y + 0.5:.0f}"
 
 
 def _slices(blob: Blob) -> tuple[slice, slice]:
-    return slice(int(blob[Y_MIN]), int(blob[Y_MAX]) + 1), slice(int(blob[X_MIN]), int(blob[X_MAX]) + 1)
+    return slice(int(blob.y_min), int(blob.y_max) + 1), slice(int(blob.x_min), int(blob.x_max) + 1)
 
 
 def _box(blob: Blob, shape: tuple[int, ...]) -> Mask:
     mask = np.zeros(shape, dtype=np.bool_)
     mask[_slices(blob)] = True
     return mask
-
-
-def _touches_border(blob: Blob, shape: tuple[int, ...]) -> bool:
-    height, width = shape
-    return bool(blob[X_MIN] == 0 or blob[Y_MIN] == 0 or blob[X_MAX] >= width - 1 or blob[Y_MAX] >= height - SEARCH_STEP)
 
 
 def _inside(mark: MarkerObservation, where: Mask) -> bool:

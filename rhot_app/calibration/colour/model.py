@@ -18,8 +18,7 @@ from rhot_app.calibration.colour.paint_region import hue_of, polar
 from rhot_app.calibration.colour.samples import PaintSamples
 from rhot_app.calibration.colour.surroundings import SurroundingColours
 from rhot_node.detect.colour import Colours
-from rhot_node.detect.gate import MARKERS_LEAST
-from rhot_node.detect.illuminant import RGB_FROM_YCC
+from rhot_node.detect.illuminant import MARKERS_LEAST, RGB_FROM_YCC
 from rhot_node.markers import ChromaModel, RangeModel
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ from rhot_app.calibration.colour.illuminant import LAMPS, Lamp, balanced, chance
 from rhot_app.calibration.colour.model import WINDOW_LEVEL
 from rhot_app.calibration.colour.samples import PaintSamples
 from rhot_node.detect.colour import Colours, directions, sector_table
-from rhot_node.detect.gate import ColourGate
+from rhot_node.detect.search import ColourGate
 from rhot_node.markers import MarkerSet
 
 SKIN, ROOM = "skin", "room"

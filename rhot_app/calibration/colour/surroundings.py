@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from rhot_app.calibration.colour.paint_region import Mask, only
 from rhot_app.calibration.colour.samples import MarkedPicture
 from rhot_node.detect.colour import Colours, colours_of
-from rhot_node.detect.gate import ColourGate, merits
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.search import AREA, SUM_X, SUM_Y
+from rhot_node.detect.search import ColourGate
 from rhot_node.markers import Marker, MarkerSet
 
 HUE_STEP_DEG = 5
@@ -104,16 +103,15 @@ def surrounding_colours(views: Sequence[MarkedPicture], name: str) -> Surroundin
 
 def _rival(gate: ColourGate, marker: Marker, index: int, view: MarkedPicture, picture: int, room: Mask) -> Rival | None:
     name, shape = marker.id, view.image.u.shape
-    blobs = gate.blobs(only(view.image, room), [index]).copy()
-    if not len(blobs):
+    blobs = gate.blobs(only(view.image, room), [index])
+    if not blobs:
         return None
-    worth = merits(blobs, marker, shape)
-    own = merits(gate.blobs(only(view.image, view.paint[name].whole), [index]), marker, shape)
-    best_own = float(np.max(own, initial=0.0)) or view.paint[name].area
-    best = blobs[int(np.argmax(worth))]
-    return Rival(name, picture, x=2.0 * float(best[SUM_X] / best[AREA]) + 0.5,
-                 y=2.0 * float(best[SUM_Y] / best[AREA]) + 0.5, area_px=4.0 * float(best[AREA]),
-                 passing_px=4.0 * float(blobs[:, AREA].sum()), merit=float(worth.max()) / best_own)
+    best = max(blobs, key=lambda blob: blob.merit(marker, shape))
+    own = [blob.merit(marker, shape) for blob in gate.blobs(only(view.image, view.paint[name].whole), [index])]
+    x, y = best.centroid
+    return Rival(name, picture, x=2.0 * x + 0.5, y=2.0 * y + 0.5, area_px=4.0 * best.area,
+                 passing_px=4.0 * sum(blob.area for blob in blobs),
+                 merit=best.merit(marker, shape) / (max(own, default=0.0) or view.paint[name].area))
 
 
 def _hue_bins() -> NDArray[np.uint8]:

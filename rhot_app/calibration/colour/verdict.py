@@ -20,8 +20,7 @@ from rhot_app.calibration.colour.surroundings import SurroundingsReport
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.progress import Progress, silent
 from rhot_node.detect.fast import FastDetector
-from rhot_node.detect.gate import MARKERS_LEAST
-from rhot_node.detect.illuminant import RGB_FROM_YCC
+from rhot_node.detect.illuminant import MARKERS_LEAST, RGB_FROM_YCC
 from rhot_node.detect.image import YuvImage
 from rhot_node.markers import ChromaModel, MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_node.detect.region import measure as m
 from rhot_node.detect.region import position as p
+from rhot_node.detect.search import Blob
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import FLAGS, MarkerFlag, MarkerObservation
 
@@ -206,13 +207,14 @@ class Track:
         out[m.PX], out[m.PY] = self.x + self.sag_x, self.y + self.sag_y
         return out
 
-    def candidate_cost(self, x: float, y: float, area: float) -> float:
+    def candidate_cost(self, blob: Blob) -> float:
         """How badly a blob of a full search fits the last observation, in squared standard deviations."""
+        x, y = blob.centroid
         gap = self.missed + 1
         reach = self.extent + gap * (3.0 + 0.75 * math.hypot(self.vx, self.vy))
         hold = min(gap, 4)  # a velocity says little after a few frames
         away = math.hypot(x - self.x - hold * self.vx, y - self.y - hold * self.vy) / reach
-        size = math.log(area / self.area) / (0.35 + 0.02 * gap)
+        size = math.log(blob.area / self.area) / (0.35 + 0.02 * gap)
         return away * away + size * size
 
     def is_outside(self, row: Row) -> bool:
