@@ -30,7 +30,6 @@ from rhot_app.tracking.tracker import (
     CameraFrame,
     CameraObservations,
     Tracker,
-    feed,
     frame_part,
     may_be_due,
 )
@@ -126,7 +125,7 @@ class Pipeline:
         for frame in frames:
             solved = None
             with frame_part(self.diagnostics, tracker, frame, cameras):
-                feed(tracker, frame)
+                tracker.ingest(frame)
                 # Live, only the newest instant matters to anybody; a replay leaves none out.
                 if may_be_due(frame) and (not live or frame is last):
                     if not live:
@@ -233,7 +232,7 @@ def warm_up(tracker: Tracker, rig: Rig) -> None:
     """
     tags = [fiducials for model in rig.models for fiducials in _tag_frames(model, rig)]
     for fiducials in tags:
-        feed(tracker, fiducials)
+        tracker.ingest(fiducials)
     points_m, extrapolator = _worn_points(rig), Extrapolator(rig) if rig.tracker.kind == "estimator" else None
     for frame in range(FRAMES):
         moved_m = points_m + np.array([0.002 * frame, 0.0, 0.0])

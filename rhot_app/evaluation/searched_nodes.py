@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.state import HandState
-from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker, feed, may_be_due
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker, may_be_due
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import Foreground, foreground_map
 from rhot_node.wire.messages import MarkerFlag
@@ -68,7 +68,7 @@ class SearchedNodes:
 
     def give(self, frame: CameraFrame) -> None:
         """Hand one frame to the tracker, keep its state if one is due, and note what it asks for."""
-        feed(self.tracker, frame)
+        self.tracker.ingest(frame)
         self.tracker.wait()
         state = self.tracker.solve() if may_be_due(frame) else None
         if state is not None:

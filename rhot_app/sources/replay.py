@@ -90,9 +90,9 @@ class LogValidator:
                 if (started := self._by_id.get(entry.node_id)) is not None:
                     started.door.expect_session(message.session)
         elif isinstance(message, Slices):
-            for camera, link in enumerate(self.links):
-                if link.node.node_id == message.node_id:
-                    link.door.searches.read(camera, message)
+            searching = self._by_id.get(message.node_id)
+            if searching is not None:
+                searching.door.searches.read(message)
         elif isinstance(message, ClockRequest | ClockReply):
             asked = self._by_id.get(message.node_id)
             if asked is not None and isinstance(message, ClockRequest):

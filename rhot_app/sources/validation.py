@@ -6,28 +6,21 @@ No sockets and no threads. Nothing in a datagram raises past `DatagramValidator.
 from __future__ import annotations
 
 import functools
+from collections import Counter
 from collections.abc import Callable
 
-from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
-from rhot_app.objects.observations import fiducial_frame
 from rhot_app.project import Rig, RigNode
 from rhot_app.sources.clock import ClockEstimate, NodeClockModel
-from rhot_app.sources.hand_landmarks import LandmarkMarkers
-from rhot_app.sources.searches import NodeSearches
 from rhot_app.sources.text_datagrams import TextReader
-from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Candidates
+from rhot_app.tracking.kinds.edges import EdgeKind
+from rhot_app.tracking.kinds.kind import Collected, FrameTimes, Kind
+from rhot_app.tracking.kinds.landmarks import LandmarkKind
+from rhot_app.tracking.kinds.markers import MarkerKind
+from rhot_app.tracking.kinds.registry import KINDS
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import Seal, decode, decode_sealed, is_tagged
-from rhot_node.wire.marker_table import MarkerTable
-from rhot_node.wire.messages import (
-    Fiducials,
-    ForegroundPart,
-    FrameMessage,
-    HandLandmarks,
-    Message,
-    Observations,
-    SliceEdges,
-)
+from rhot_node.wire.messages import FrameMessage, Message, Observations
 from rhot_node.wire.sequence import SequenceVerdict, SequenceWindow
 
 # -- authentication ----------------------------------------------------------------------------------------------------
@@ -53,9 +46,8 @@ def refuse_without_key(data: bytes) -> Message:
 OLDEST_FRAME_NS = 1_000_000_000
 """A frame taken longer ago than this is not worth a state, or its time is wrong."""
 
-Verified = tuple[FrameMessage, int, int, int, float] | CameraObservations | EdgeFrame | ForegroundFrame
-"""A message with its row-0, send and receive times, master ns, and clock bound, s; what is put together from several
-datagrams, and text, need no second half."""
+Verified = Collected | CameraObservations
+"""What is verified and waits for `DatagramValidator.convert`; text needs no second half."""
 
 _CLOCK_SLACK_NS = 1_000_000  # scheduling between the stamps at both ends
 
@@ -67,15 +59,16 @@ class DatagramValidator:
         """`camera` is the node's index in the rig."""
         self.clock = clock
         self.open: Open = decode
-        self.sequence = SequenceWindow()  # of observations
-        self._sequences: dict[type, SequenceWindow] = {
-            Observations: self.sequence, Fiducials: SequenceWindow(), HandLandmarks: SequenceWindow(),
-            SliceEdges: SequenceWindow(), ForegroundPart: SequenceWindow()}
-        self.searches = NodeSearches()
+        self._kinds = [kind() for kind in reversed(KINDS)]
+        self._takers: dict[type, list[Kind]] = {
+            message: [kind for kind in self._kinds if message in kind.messages]
+            for kind in self._kinds for message in kind.messages}
+        self._sequences = {message: SequenceWindow() for message in self._takers}
+        self.sequence = self._sequences[Observations]
+        self.searches = next(kind for kind in self._kinds if isinstance(kind, EdgeKind))
         self.received = 0  # datagrams of any kind
         self.taken = 0  # of the stream, and come for the first time: they are recorded
-        self.accepted = 0  # observations and hand landmarks
-        self.fiducials = self.searched = 0  # accepted ones; frames with edges or a foreground map
+        self.frames: Counter[str] = Counter()  # accepted ones, by the names of their kinds
         self.dropped: dict[str, int] = {}
         self.refused: dict[str, int] = {}  # those of them that were not taken: anybody can send them again
         self.image_size: tuple[int, int] | None = None  # of the last refused frame of another size
@@ -87,14 +80,18 @@ class DatagramValidator:
     def configure(self, rig: Rig, camera: int) -> None:
         """Expect what the rig says about this node: marker set, image size, text or binary."""
         node: RigNode = rig.nodes[camera]
-        self._camera = camera
         self._node_id = node.node_id
-        self._count = len(rig.markers.markers)
-        self._checksum = rig.markers.checksum
-        self._landmarks = LandmarkMarkers(rig)
         self._size = (node.intrinsics.width, node.intrinsics.height)
+        for kind in self._kinds:
+            kind.configure(rig, camera)
         self._time_offset_ns = round(1e9 * node.time_offset_s)
-        self._text = TextReader(camera, self._count, self._size, self._time_offset_ns) if node.text_datagrams else None
+        self._text = (TextReader(camera, len(rig.markers.markers), self._size, self._time_offset_ns)
+                      if node.text_datagrams else None)
+
+    @property
+    def accepted(self) -> int:
+        """Accepted frames of markers and landmarks."""
+        return self.frames[MarkerKind.name] + self.frames[LandmarkKind.name]
 
     @property
     def clock_in_doubt(self) -> bool:
@@ -110,7 +107,8 @@ class DatagramValidator:
         """The node counts from a new first number."""
         for sequence in self._sequences.values():
             sequence.restart()
-        self.searches.restart()
+        for kind in self._kinds:
+            kind.restart()
 
     def admit(self, data: bytes, t_receive_ns: int) -> CameraFrame | None:
         """The datagram as observations or fiducials, or None when it was dropped and counted."""
@@ -136,26 +134,16 @@ class DatagramValidator:
             return None
         if verified is None:  # a part of something
             return None
-        if isinstance(verified, EdgeFrame | ForegroundFrame):
-            self.searched += 1
-        elif isinstance(verified, tuple) and isinstance(verified[0], Fiducials):
-            self.fiducials += 1
-        else:
-            self.accepted += 1
+        self.frames[MarkerKind.name if isinstance(verified, CameraObservations) else verified[0].name] += 1
         self.last_t_receive_ns = t_receive_ns
         return verified
 
     def convert(self, verified: Verified) -> CameraFrame:
         """Second half of `admit`: arrays in the rig's marker order, times in master time."""
-        if isinstance(verified, CameraObservations | EdgeFrame | ForegroundFrame):
+        if isinstance(verified, CameraObservations):
             return verified
-        message, t_row0_ns, t_send_ns, t_receive_ns, bound_s = verified
-        if isinstance(message, Fiducials):
-            return fiducial_frame(message, self._camera, t_row0_ns, t_receive_ns)
-        if isinstance(message, HandLandmarks):
-            return self._landmarks.observations(message, self._camera, t_row0_ns, t_send_ns, t_receive_ns, bound_s)
-        assert isinstance(message, Observations)
-        return self._build(message, t_row0_ns, t_send_ns, t_receive_ns, bound_s)
+        kind, collected, times = verified
+        return kind.observe(collected, times)
 
     def _verify_text(self, data: bytes, t_receive_ns: int) -> Verified | str:
         if not self._session:
@@ -176,9 +164,13 @@ class DatagramValidator:
             return reason
         sequence.take(message.sequence)  # also what is refused now has come: it is not lost
         self.taken += 1
-        reason = self._unlike_the_rig(message)
+        kind = next(one for one in self._takers[type(message)] if one.accepts(message))
+        reason = kind.refusal(message)
         if reason is not None:
             return reason
+        if (message.width, message.height) != self._size:
+            self.image_size = (message.width, message.height)
+            return "image_size"
         estimate = self.clock.estimate_at(t_receive_ns)
         if estimate is None:
             return "no_clock"
@@ -189,11 +181,9 @@ class DatagramValidator:
             return "time"
         if not self._travel.believed(t_receive_ns - t_send_ns, t_receive_ns, estimate):
             return "clock_in_doubt"
-        if isinstance(message, SliceEdges | ForegroundPart):
-            parts = self.searches.add(message)
-            return None if parts is None else self.searches.frame(parts, self._camera, t_row0_ns, t_send_ns,
-                                                                  t_receive_ns)
-        return message, t_row0_ns, t_send_ns, t_receive_ns, bound_s
+        times = FrameTimes(t_row0_ns, t_send_ns, t_receive_ns, bound_s)
+        collected = kind.collect(message, times)
+        return None if collected is None else (kind, collected, times)
 
     def _not_of_the_stream(self, message: FrameMessage, sequence: SequenceWindow) -> str | None:
         """Why this message is not a new one of the stream that we asked for; None when it is."""
@@ -206,40 +196,11 @@ class DatagramValidator:
             return verdict.name.lower()
         return None
 
-    def _unlike_the_rig(self, message: FrameMessage) -> str | None:
-        """What of this message is not as the rig says; None when all is."""
-        if isinstance(message, Observations) and (message.marker_checksum != self._checksum
-                                                  or message.marker_count != self._count):
-            return "marker_set"
-        if isinstance(message, HandLandmarks) and not self._landmarks:
-            return "no_landmarks"
-        if (message.width, message.height) != self._size:
-            self.image_size = (message.width, message.height)
-            return "image_size"
-        return None
-
     def _plausible(self, t_row0_ns: int, t_send_ns: int, t_receive_ns: int, bound_s: float) -> bool:
         """Whether a frame can have been taken and sent at these times: not in the future, not long ago."""
         latest_ns = t_receive_ns + _CLOCK_SLACK_NS + round(1e9 * bound_s)
         return (t_receive_ns - OLDEST_FRAME_NS <= t_row0_ns <= latest_ns + abs(self._time_offset_ns)
                 and t_send_ns <= latest_ns)
-
-    def _build(self, message: Observations, t_row0_ns: int, t_send_ns: int, t_receive_ns: int,
-               bound_s: float) -> CameraObservations:
-        assert isinstance(message.markers, MarkerTable)  # as everything that was decoded
-        count = self._count
-        pixels, covariances, diameters, qualities, flags = message.markers.columns()
-        further = None
-        if len(message.markers) > count:
-            further = Candidates(message.markers.indices()[count:], pixels[count:], covariances[count:],
-                                 diameters[count:], qualities[count:], flags[count:])
-        return CameraObservations(
-            camera=self._camera, t_row0_master_ns=t_row0_ns, row_time_ns=message.row_time_ns,
-            clock_bound_s=bound_s, t_receive_ns=t_receive_ns,
-            detect_s=1e-9 * message.processing_ns, network_s=1e-9 * (t_receive_ns - t_send_ns),
-            pixels=pixels[:count], covariances=covariances[:count], diameters=diameters[:count],
-            qualities=qualities[:count], flags=flags[:count], further=further,
-            t_row0_node_ns=message.t_frame_node_ns)
 
 
 # -- how long a node's datagrams take to arrive ------------------------------------------------------------------------

@@ -28,7 +28,7 @@ from rhot_app.tracking.association import MarkerAssociation
 from rhot_app.tracking.locate import LocateArrays
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig, filter_settings
-from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker
 
 Array = NDArray[np.float64]
 
@@ -70,10 +70,10 @@ class ClassicTracker(Tracker):
         self._measured_s: float | None = None
         self._all_measured = False
 
-    def ingest(self, observations: CameraObservations) -> None:
-        """Take one frame in; about 10 µs."""
-        if self._tracked_with[observations.camera]:
-            self._pairing.ingest(self._association.select(observations))
+    def ingest(self, frame: CameraFrame) -> None:
+        """Take one frame's markers in; about 10 µs."""
+        if isinstance(frame, CameraObservations) and self._tracked_with[frame.camera]:
+            self._pairing.ingest(self._association.select(frame))
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, None before its first."""

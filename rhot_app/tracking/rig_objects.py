@@ -56,7 +56,7 @@ class RigObjects:
         for contacts in self._contacts:
             contacts.reset()
 
-    def ingest_objects(self, frame: ObjectFrame) -> None:
+    def ingest(self, frame: ObjectFrame) -> None:
         """Take the tags of one frame, or a pose of another tracker, in."""
         if isinstance(frame, MeasuredPose):
             self._tracker.take_pose(frame.name, PoseMeasurement(frame.t_ns, frame.world_from_object, frame.covariance))
@@ -128,9 +128,9 @@ class SmoothedObjects(RigObjects):
         self._diagnostics = diagnostics
         self._histories = [_History(model.name) for model in rig.models]
 
-    def ingest_objects(self, frame: ObjectFrame) -> None:
+    def ingest(self, frame: ObjectFrame) -> None:
         """See `RigObjects`."""
-        super().ingest_objects(frame)
+        super().ingest(frame)
         self._keep()
 
     def ingest_markers(self, frame: CameraObservations) -> None:

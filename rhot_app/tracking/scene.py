@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.observations import ImageFrame, SliceRequest
+from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.barehand.start import LATERAL_M
 from rhot_app.diagnostics import Diagnostics, diagnostics_of
 from rhot_app.errors import RigError
 from rhot_app.estimation.track import NEVER, comes_late
-from rhot_app.objects.observations import ObjectFrame
+from rhot_app.objects.observations import FiducialFrame, MeasuredPose
 from rhot_app.objects.state import ObjectState
 from rhot_app.project import Rig, estimator_obstacle, observation_obstacle
 from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
@@ -29,7 +29,7 @@ from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.rig_arrays import rigs_of_hands
 from rhot_app.tracking.rig_objects import RigObjects, SmoothedObjects
 from rhot_app.tracking.smoothing import RECENT, Instant, RecordingEstimator
-from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker, may_be_due
 from rhot_node.wire.messages import MarkerFlag
 
 Indices = NDArray[np.intp]
@@ -118,28 +118,27 @@ class Scene(Tracker):
 
     # -- frames --------------------------------------------------------------------------------------------------------
 
-    def ingest(self, observations: CameraObservations) -> None:
-        """Take one frame's markers in; each hand and object gets its own."""
-        last = self._newest[observations.camera]
-        if last is None or not comes_late(observations.t_row0_master_ns, last.t_row0_master_ns):
-            self._newest[observations.camera] = observations
-        self._latest = observations
-        if self._objects is not None:
-            self._objects.ingest_markers(observations)
-        for hand, columns in zip(self._hands, self._columns, strict=True):
-            hand.ingest(observations.of(columns))
-
-    def ingest_objects(self, frame: ObjectFrame) -> None:
-        """Take one frame's tags, or a pose of another tracker, in."""
-        if self._objects is not None:
-            self._objects.ingest_objects(frame)
-
-    def ingest_image(self, frame: ImageFrame) -> None:
-        """Take one frame's edges or foreground in."""
-        if self._images is None:
-            self._hands[0].ingest_image(frame)
-        else:
+    def ingest(self, frame: CameraFrame) -> None:
+        """Take one frame in; each hand and object gets its own."""
+        if isinstance(frame, CameraObservations):
+            self._ingest_markers(frame)
+        elif isinstance(frame, EdgeFrame | ForegroundFrame) and self._images is not None:
             self._images.ingest(frame)
+        elif isinstance(frame, FiducialFrame | MeasuredPose):
+            if self._objects is not None:
+                self._objects.ingest(frame)
+        else:
+            self._hands[0].ingest(frame)
+
+    def _ingest_markers(self, frame: CameraObservations) -> None:
+        last = self._newest[frame.camera]
+        if last is None or not comes_late(frame.t_row0_master_ns, last.t_row0_master_ns):
+            self._newest[frame.camera] = frame
+        self._latest = frame
+        if self._objects is not None:
+            self._objects.ingest_markers(frame)
+        for hand, columns in zip(self._hands, self._columns, strict=True):
+            hand.ingest(frame.of(columns))
 
     def requests(self) -> list[SliceRequest]:
         """See `Tracker`."""
@@ -260,10 +259,10 @@ class SmoothedScene(Scene):
         for hand in self._hands:
             hand.reset()
 
-    def ingest(self, observations: CameraObservations) -> None:
+    def ingest(self, frame: CameraFrame) -> None:
         """Take one frame in."""
-        super().ingest(observations)
-        for number in range(len(self._hands)):
+        super().ingest(frame)
+        for number in range(len(self._hands) if may_be_due(frame) else 0):
             self._solve(number)
 
     def states(self) -> Iterator[HandState]:

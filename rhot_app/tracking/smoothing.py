@@ -15,7 +15,7 @@ from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, no_hand
 from rhot_app.tracking.markers.estimator import Estimator, Weighed
 from rhot_app.tracking.markers.estimator_state import EstimatorStates
-from rhot_app.tracking.tracker import CameraObservations
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations
 
 NOT_SMOOTHED = ("only the estimator smooths, and only markers and landmarks. Choose it (tracker.kind, or --tracker "
                 "estimator), or do not smooth.")
@@ -62,11 +62,12 @@ class RecordingEstimator(Estimator):
         if self._filter.history is not None:
             self.conclude()
 
-    def ingest(self, observations: CameraObservations) -> None:
+    def ingest(self, frame: CameraFrame) -> None:
         """Take one frame in."""
-        self._instants.setdefault(_key(observations), Instant(self._count, observations, observations.t_row0_master_ns))
-        self._count += 1
-        super().ingest(observations)
+        if isinstance(frame, CameraObservations):
+            self._instants.setdefault(_key(frame), Instant(self._count, frame, frame.t_row0_master_ns))
+            self._count += 1
+        super().ingest(frame)
 
     def solve(self) -> HandState | None:
         """The filtered state after the frame, None when it came before."""

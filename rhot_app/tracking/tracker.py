@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import EdgeFrame, ImageFrame, SliceRequest
 from rhot_app.diagnostics import Diagnostics, Part
+from rhot_app.estimation.residual import Residual
 from rhot_app.objects.observations import MeasuredPose, ObjectFrame
 from rhot_app.state import HandState, SeenContour
 
@@ -77,6 +78,23 @@ class CameraObservations:
                        further=None if self.further is None else self.further.of(markers))
 
 
+class HandFrame:
+    """An observation of the rig's hand of a kind that the trackers do not know: residuals on the hand's state."""
+
+    def __init__(self, camera: int, t_ns: int) -> None:
+        """`camera`: its index in the rig. `t_ns`: master time."""
+        self.camera, self.t_ns = camera, t_ns
+
+    def residuals(self, state: Array) -> Sequence[Residual]:
+        """Those of a hand predicted to be in `state` (`hand.motion.hand_state`)."""
+        raise NotImplementedError
+
+
+CameraFrame = CameraObservations | ObjectFrame | ImageFrame | HandFrame
+"""What a source delivers: markers, fiducial tags, edges or foreground of one camera's frame, a pose of another tracker,
+or what another kind observes."""
+
+
 class Tracker:
     """Fed with every frame as it arrives, asked for a state when one may be due. One thread only.
 
@@ -89,8 +107,9 @@ class Tracker:
     key_frames: KeyFrames | None = None
     """The frames that tell most of a bare hand's shape; None for a tracker without contours. Any thread may read."""
 
-    def ingest(self, observations: CameraObservations) -> None:
-        """Take one frame in. Cheap: called for every datagram even when flooded."""
+    def ingest(self, frame: CameraFrame) -> None:
+        """Take one frame in; of kinds that do not concern it, nothing. Cheap: called for every datagram even when
+        flooded."""
         raise NotImplementedError
 
     def reset(self) -> None:
@@ -119,12 +138,6 @@ class Tracker:
         """Each camera's newest frame, None before its first. May be called by another thread."""
         return ()
 
-    def ingest_objects(self, frame: ObjectFrame) -> None:
-        """Take the fiducial tags of one frame, or a pose of another tracker, in."""
-
-    def ingest_image(self, frame: ImageFrame) -> None:
-        """Take the edges or the foreground of one frame in."""
-
     def requests(self) -> list[SliceRequest]:
         """What the nodes shall search in their images now; asked for after every `solve`."""
         return []
@@ -140,24 +153,9 @@ class Tracker:
         """Wait until searches on other threads have ended. A replay calls it; live, nobody waits."""
 
 
-CameraFrame = CameraObservations | ObjectFrame | ImageFrame
-"""What a source delivers: markers, fiducial tags, edges or foreground of one camera's frame, or a pose of another
-tracker."""
-
-
 def may_be_due(frame: CameraFrame) -> bool:
     """Whether a tracker may have a state after this frame."""
     return isinstance(frame, CameraObservations | EdgeFrame)
-
-
-def feed(tracker: Tracker, frame: CameraFrame) -> None:
-    """Have `tracker` take a frame in."""
-    if isinstance(frame, CameraObservations):
-        tracker.ingest(frame)
-    elif isinstance(frame, ImageFrame):
-        tracker.ingest_image(frame)
-    else:
-        tracker.ingest_objects(frame)
 
 
 def frame_part(diagnostics: Diagnostics, tracker: Tracker, frame: CameraFrame, cameras: Sequence[str]) -> Part:
@@ -169,7 +167,7 @@ def frame_part(diagnostics: Diagnostics, tracker: Tracker, frame: CameraFrame, c
 
 def states_after(tracker: Tracker, frame: CameraFrame) -> list[HandState]:
     """The states after one frame of a recording, if the frame completes any; nothing is left for later."""
-    feed(tracker, frame)
+    tracker.ingest(frame)
     tracker.wait()
     tracker.requests()  # nobody searches again
     return list(tracker.states()) if may_be_due(frame) else []

@@ -121,7 +121,7 @@ def test_edges_requested_for_one_hand_alone_are_left_out() -> None:
     slices = np.tile([100.0, 100.0, 1.0, 0.0, 5.0], (3, 1))
     edges = find_edges(EMPTY[0], slices, learn_background(skin_foreground(), [EMPTY[0]]), 2.0)
     request = SliceRequest(0, slices, 8, ("a place", "a contour"))
-    tracker.ingest_image(EdgeFrame(0, FIRST_NS, 0, FIRST_NS, 0.0, 0.0, request, edges))
+    tracker.ingest(EdgeFrame(0, FIRST_NS, 0, FIRST_NS, 0.0, 0.0, request, edges))
     assert tracker.solve() is None
 
 

@@ -105,7 +105,7 @@ def triangulated(cameras: list[CameraModel], pixels: list[np.ndarray]) -> np.nda
 
 @needs_recording
 @needs_networks
-@pytest.mark.study("rhot_app/sources/hand_landmarks.py", "rhot_app/export/landmark_track.py", "rhot_node/landmarks")
+@pytest.mark.study("rhot_app/tracking/kinds/landmarks.py", "rhot_app/export/landmark_track.py", "rhot_node/landmarks")
 def test_a_film_beside_its_mirrored_copy_is_two_hands_that_cross(tmp_path: Path) -> None:
     pair = symmetric_pair()
     pixels, pictures = turned(pair)

@@ -113,7 +113,7 @@ def replayed(log: Path) -> list:
     reader = LogReader(log)
     door = LogValidator(reader.rig)
     states = list(replay_states(reader, door, make_tracker(reader.rig)))
-    assert all(link.door.fiducials > SECONDS * FPS for link in door.links)
+    assert all(link.door.frames["tags"] > SECONDS * FPS for link in door.links)
     return states
 
 

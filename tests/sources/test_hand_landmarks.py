@@ -10,8 +10,9 @@ from test_door import NODE_CLOCK, NOW_NS, SESSION, known_clock
 
 from rhot_app.project import OTHER_HAND, Rig
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
-from rhot_app.sources.hand_landmarks import LandmarkMarkers
 from rhot_app.sources.validation import DatagramValidator
+from rhot_app.tracking.kinds.kind import FrameTimes
+from rhot_app.tracking.kinds.landmarks import LandmarkKind
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.codec import encode
@@ -100,11 +101,12 @@ FPS = 30.0
 
 def followed(rig: Rig, frames: list[list[LandmarkedHand]], fps: float = FPS) -> np.ndarray:
     """(T, H) x of the wrist of each of the rig's hands, NaN without."""
-    markers, found = LandmarkMarkers(rig), []
+    kind, found = LandmarkKind(), []
+    kind.configure(rig, 0)
     for number, hands in enumerate(frames):
         t_ns = NOW_NS + round(1e9 * number / fps)
-        found.append(shown(markers.observations(HandLandmarks(1, SESSION, number, t_ns, t_ns, 0, 0, 0, 640, 480, number,
-                                                              hands), 0, t_ns, t_ns, t_ns, 0.0)))
+        message = HandLandmarks(1, SESSION, number, t_ns, t_ns, 0, 0, 0, 640, 480, number, hands)
+        found.append(shown(kind.observe(message, FrameTimes(t_ns, t_ns, t_ns, 0.0))))
     return np.array(found)
 
 

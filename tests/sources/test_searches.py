@@ -54,7 +54,7 @@ def test_a_request_goes_out_in_parts_and_its_edges_come_back_as_one_frame(door: 
     assert abs(frame.t_row0_master_ns - (NOW_NS - 9_000_000)) < 1_000_000 and frame.row_time_ns == 48_000
     assert frame.edges.number.tolist() == [1, 0, 0, 3, *[0] * 295, 2]
     np.testing.assert_allclose(frame.edges.offset[3, :4], [1.5, 1.5, 1.5, 0.0])
-    assert door.searched == 1
+    assert door.frames["edges"] == 1
 
 
 def test_a_map_comes_back_as_it_was(door: DatagramValidator) -> None:

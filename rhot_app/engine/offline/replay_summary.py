@@ -20,6 +20,7 @@ from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState, Knowledge
+from rhot_app.tracking.kinds.tags import TagKind
 from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker, frame_part, states_after
 
@@ -67,7 +68,7 @@ def summarise(reader: LogReader, rig: Rig, tracker: Tracker) -> dict[str, Any]:
         "states": len(states), "state_rate_hz": (len(states) - 1) / duration_s if duration_s else 0.0,
         "nodes": {link.node.name: {
             "received": link.door.received, "accepted": link.door.accepted,
-            "fiducials": link.door.fiducials, "lost": link.door.sequence.lost,
+            "fiducials": link.door.frames[TagKind.name], "lost": link.door.sequence.lost,
             "dropped": link.door.dropped, "clock_offset_s": link.clock.offset_s, "clock_bound_s": link.clock.bound_s,
         } for link in door.links},
         "markers": _marker_statistics(states, rig),
@@ -155,12 +156,14 @@ class SmoothedReplay(Tracker):
         """Go on wherever the next frame is in the log."""
         self._begins = True
 
-    def ingest(self, observations: CameraObservations) -> None:
+    def ingest(self, frame: CameraFrame) -> None:
         """Take one frame of the log."""
+        if not isinstance(frame, CameraObservations):
+            return
         if self._begins:
             self._begins = False
-            self._place = int(np.searchsorted(self._latest_ns, observations.t_receive_ns))
-        self._frame = self._newest[observations.camera] = observations
+            self._place = int(np.searchsorted(self._latest_ns, frame.t_receive_ns))
+        self._frame = self._newest[frame.camera] = frame
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, None before its first."""

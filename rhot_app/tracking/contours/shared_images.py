@@ -79,14 +79,14 @@ class SharedImages:
             self._resolve_duplicate(t_ns)
         masked = [self._masked_for(number, frame) for number in range(2)]
         for hand, one in zip(self._both, masked, strict=True):
-            hand.ingest_image(one)
+            hand.ingest(one)
 
     def _take_edges(self, frame: EdgeFrame) -> None:
         """Give each hand the edges of its own slices; from a log, which does not attribute them, all."""
         own = frame.request.expected
         if own is None:
             for hand in self._both:
-                hand.ingest_image(frame)
+                hand.ingest(frame)
         if not isinstance(own, _JointRequest):  # a log, or the request of an earlier tracker
             return
         first = 0
@@ -96,7 +96,7 @@ class SharedImages:
             part = slice(first, first + len(request.slices))
             first = part.stop
             edges = Edges._make(column[part] for column in frame.edges)
-            hand.ingest_image(replace(frame, request=request, edges=edges))
+            hand.ingest(replace(frame, request=request, edges=edges))
 
     def _masked_for(self, number: int, frame: ForegroundFrame) -> ForegroundFrame:
         """The foreground for one hand: NaN, not known, where the other one may occlude it."""

@@ -32,7 +32,7 @@ from rhot_app.tracking.contours.finder import SAME_MAPS_NS, Finder, Maps, Newest
 from rhot_app.tracking.contours.markers import MarkersOfHand
 from rhot_app.tracking.contours.occlusion import Capsules
 from rhot_app.tracking.contours.requests import Requests, requested_contour
-from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, HandFrame, Tracker
 from rhot_node.wire.search import SLICES_MAX
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ class ContourEstimator(Tracker):
         marked = rig.tracker.observe != "contours" and len(rig.markers.markers) > 0
         self._markers = MarkersOfHand(rig, self._hand) if marked else None
         self._finder = Finder(self._hand)
-        self._pending: deque[CameraObservations | ImageFrame] = deque(maxlen=64)
+        self._pending: deque[CameraObservations | ImageFrame | HandFrame] = deque(maxlen=64)
         self._names, self._tracked_with = tuple(node.name for node in rig.nodes), rig.tracked_with
         self.key_frames: KeyFrames = KeyFrames(self._hand.model)
         self._shown_contours: list[SeenContour] = []
@@ -85,14 +85,11 @@ class ContourEstimator(Tracker):
 
     # -- Tracker -------------------------------------------------------------------------------------------------------
 
-    def ingest(self, observations: CameraObservations) -> None:
-        """Take the markers of one frame, which also has the time of the camera's frame."""
-        if self._tracked_with[observations.camera]:
-            self._pending.append(observations)
-
-    def ingest_image(self, frame: ImageFrame) -> None:
-        """Take the edges or the foreground of one frame."""
-        if self._tracked_with[frame.camera]:
+    def ingest(self, frame: CameraFrame) -> None:
+        """Take the edges or the foreground of one frame, or its markers, which also have the time of the camera's
+        frame."""
+        if (isinstance(frame, CameraObservations | EdgeFrame | ForegroundFrame | HandFrame)
+                and self._tracked_with[frame.camera]):
             self._pending.append(frame)
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
@@ -206,6 +203,8 @@ class ContourEstimator(Tracker):
                 due = self._take_frame(frame) or due
             elif isinstance(frame, EdgeFrame):
                 due = self._take_edges(frame) or due
+            elif isinstance(frame, HandFrame):
+                self._weigh(frame)
             else:
                 self._take_map(frame)
             self._verify()
@@ -240,6 +239,15 @@ class ContourEstimator(Tracker):
             self._latest = frame
             return True
         return False
+
+    def _weigh(self, frame: HandFrame) -> None:
+        """Weigh what another kind observes of a hand that is tracked."""
+        hand = self._hand
+        if self._tracking and not hand.filter.forgot(frame.t_ns):
+            t_s = hand.filter.seconds(frame.t_ns)
+            prediction = hand.filter.predict(t_s)
+            hand.prepare_update((), t_s)
+            hand.filter.add(t_s, [*frame.residuals(prediction[0]), *hand.constraints], prediction)
 
     def _take_edges(self, frame: EdgeFrame) -> bool:
         """Collect the edges of one frame, and update once all cameras have theirs: one camera alone measures depth

@@ -33,7 +33,7 @@ from rhot_app.tracking.markers.hand_size import HandSize
 from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
 from rhot_app.tracking.rig_arrays import compile_rig
-from rhot_app.tracking.tracker import CameraObservations, Tracker
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, HandFrame, Tracker
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -103,7 +103,7 @@ class Estimator(Tracker):
 
     def reset(self) -> None:
         """Forget everything but the count of states."""
-        self._pending: list[CameraObservations] = []
+        self._pending: list[CameraObservations | HandFrame] = []
         self._starter.reset()
         self._association.reset()
         self._observations.reset()
@@ -114,10 +114,10 @@ class Estimator(Tracker):
         self._filter.end()
         self._rejections = Rejections(len(self._rig.cameras), self._markers)
 
-    def ingest(self, observations: CameraObservations) -> None:
+    def ingest(self, frame: CameraFrame) -> None:
         """Take one frame in; it is weighed by the next `solve`."""
-        if self._tracked_with[observations.camera]:
-            self._pending = [*self._pending[1 - _PENDING:], observations]
+        if isinstance(frame, CameraObservations | HandFrame) and self._tracked_with[frame.camera]:
+            self._pending = [*self._pending[1 - _PENDING:], frame]
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, None before its first."""
@@ -127,7 +127,12 @@ class Estimator(Tracker):
         """The state after the frames since the last one, None without any."""
         pending, self._pending = self._pending, []
         begun = time.perf_counter()
-        taken = [observations for observations in pending if self._take(observations)]
+        taken = []
+        for frame in pending:
+            if isinstance(frame, HandFrame):
+                self._weigh(frame)
+            elif self._take(frame):
+                taken.append(frame)
         if not taken:
             return None
         if self._size is not None:
@@ -180,6 +185,13 @@ class Estimator(Tracker):
         if self._life.lost(newest_ns, period_ns) or self._life.wrong(newest_ns, period_ns):
             self._give_up()
         return True
+
+    def _weigh(self, frame: HandFrame) -> None:
+        """Weigh what another kind observes of a hand that is tracked."""
+        if self._life.alive and not self._filter.forgot(frame.t_ns):
+            t_s = self._filter.seconds(frame.t_ns)
+            prediction = self._filter.predict(t_s)
+            self._filter.add(t_s, frame.residuals(prediction[0]), prediction)
 
     def _alone_with(self, frame: MarkerFrame) -> bool:
         """Whether this camera alone sees landmarks: another one would show how far they are."""

@@ -134,7 +134,7 @@ def test_poses_are_delivered_recorded_and_replayed_alike(rig: Rig) -> None:
     objects = [RigObjects(rig, Diagnostics()), RigObjects(rig, Diagnostics())]
     for tracked, given in zip(objects, (delivered, replayed), strict=True):
         for one in given:
-            tracked.ingest_objects(one)  # type: ignore[arg-type]
+            tracked.ingest(one)  # type: ignore[arg-type]
     states = [tracked.states(delivered[-1].t_ns)[0] for tracked in objects]
     assert states[0].validity is ObjectValidity.TRACKED
     assert states[0].world_from_object == pytest.approx(RIG_FROM_FOREIGN @ FOREIGN @ TRACKER_FROM_OBJECT, abs=1e-4)
@@ -253,5 +253,5 @@ def replace_model(entry: RigObject) -> RigObject:
 def test_a_pose_of_an_unknown_object_changes_nothing(rig: Rig) -> None:
     objects = RigObjects(rig, Diagnostics())
     one = in_rig(measured(10**9), "spoon", poses("a"), alignment_of())
-    objects.ingest_objects(replace(one))
+    objects.ingest(replace(one))
     assert objects.states(10**9)[0].validity is ObjectValidity.SEARCHING

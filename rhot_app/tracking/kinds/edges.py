@@ -1,12 +1,14 @@
-"""What one node was asked to search in its images, and its answers, put together from their datagrams. No sockets."""
+"""Edges of a bare hand and its foreground: what one node was asked to search in its images, and its answers."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest, edges_of
+from rhot_app.tracking.kinds.kind import FrameTimes, Kind
 from rhot_node.errors import WireError
 from rhot_node.wire.messages import U32_MAX, ForegroundPart, SliceEdges, Slices
 from rhot_node.wire.search import SLICES_FIT, SLICES_MAX, EdgeTable, pack_slices, unpack_map, unpack_slices
@@ -21,8 +23,14 @@ Answer = SliceEdges | ForegroundPart
 _Key = tuple[type, int, int]
 
 
-class NodeSearches:
-    """Requests to one node and answers of it. Requests are made by one thread at a time, answers are taken by one."""
+class EdgeKind(Kind):
+    """See `Kind`. Their residual is `barehand.contour_residual`. An answer comes in several datagrams.
+
+    Requests are made by one thread at a time, answers are taken by one.
+    """
+
+    name = "edges"
+    messages = (SliceEdges, ForegroundPart)
 
     def __init__(self) -> None:
         self._requests: dict[int, SliceRequest] = {}
@@ -48,17 +56,18 @@ class NodeSearches:
                                 request.map_step, pack_slices(own)))
         return found
 
-    def read(self, camera: int, message: Slices) -> None:
-        """Take a recorded message in: its answers follow in the log."""
+    def read(self, message: Slices) -> None:
+        """Take a recorded request in: its answers follow in the log."""
         parts = self._records.setdefault(message.request, {})
         parts[message.part] = message
         if len(parts) == message.parts:
             records = b"".join(parts[part].records for part in sorted(parts))
-            self._remember(message.request, SliceRequest(camera, unpack_slices(records), message.map_step))
+            self._remember(message.request, SliceRequest(self.camera, unpack_slices(records), message.map_step))
             self._records.clear()
 
-    def add(self, message: Answer) -> list[Answer] | None:
-        """All parts of a frame's answer once this one completes it. Raises WireError 'request' when nobody asked."""
+    def collect(self, message: Any, times: FrameTimes) -> EdgeFrame | ForegroundFrame | None:
+        """The frame that a message completes. Raises WireError 'request' when nobody asked, 'count' or 'range' when the
+        parts do not make one."""
         if message.request not in self._requests:
             raise WireError("request", f"an answer to the request {message.request}, which was not made of late")
         key = type(message), message.frame_number, message.request
@@ -69,16 +78,20 @@ class NodeSearches:
         if len(parts) < message.parts:
             return None
         del self._parts[key]
-        return [parts[part] for part in sorted(parts)]
+        return self._frame([parts[part] for part in sorted(parts)], times)
 
-    def frame(self, parts: Sequence[Answer], camera: int, t_row0_ns: int, t_send_ns: int,
-              t_receive_ns: int) -> EdgeFrame | ForegroundFrame:
-        """The frame of a whole answer. Raises WireError 'count' or 'range' when the parts do not make one."""
+    def observe(self, collected: Any, times: FrameTimes) -> EdgeFrame | ForegroundFrame:
+        """See `Kind`."""
+        found: EdgeFrame | ForegroundFrame = collected
+        return found
+
+    def _frame(self, parts: Sequence[Answer], times: FrameTimes) -> EdgeFrame | ForegroundFrame:
+        """The frame of a whole answer."""
         last = parts[-1]
         request = self._requests.get(last.request)
         if isinstance(last, ForegroundPart):
             data = b"".join(part.data for part in parts if isinstance(part, ForegroundPart))
-            return ForegroundFrame(camera, t_row0_ns, last.row_time_ns, t_receive_ns, last.step,
+            return ForegroundFrame(self.camera, times.t_row0_ns, last.row_time_ns, times.t_receive_ns, last.step,
                                    unpack_map(data, last.width, last.height, last.step))
         if request is None or any(not isinstance(part, SliceEdges) or part.slice_count != len(request.slices)
                                   for part in parts):
@@ -87,9 +100,9 @@ class NodeSearches:
                    and isinstance(part.edges, EdgeTable)]
         indices = np.concatenate([one for one, _ in columns])
         values = np.concatenate([one for _, one in columns])
-        return EdgeFrame(camera, t_row0_ns, last.row_time_ns, t_receive_ns, 1e-9 * last.processing_ns,
-                         1e-9 * (t_receive_ns - t_send_ns), request, edges_of(len(request.slices), indices, values),
-                         last.t_frame_node_ns)
+        return EdgeFrame(self.camera, times.t_row0_ns, last.row_time_ns, times.t_receive_ns, 1e-9 * last.processing_ns,
+                         1e-9 * (times.t_receive_ns - times.t_send_ns), request,
+                         edges_of(len(request.slices), indices, values), last.t_frame_node_ns)
 
     def _remember(self, number: int, request: SliceRequest) -> None:
         self._requests[number] = request

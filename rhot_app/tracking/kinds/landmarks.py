@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rhot_app.estimation.track import LOST_NS
 from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.project import OTHER_HAND, Rig
+from rhot_app.tracking.kinds.kind import FrameTimes, Kind
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import HandLandmarks, LandmarkedHand, MarkerFlag
 
@@ -74,14 +75,19 @@ class _Track:
             self.t_ns, self.points = t_ns, points
 
 
-class LandmarkMarkers:
-    """Which of a rig's markers are landmarks, and of which hand. The frames of one camera, in the order of time.
+class LandmarkKind(Kind):
+    """See `Kind`: the rig's markers that are landmarks. Their residual is that of markers.
 
     Hands are followed from frame to frame by their landmarks; those of the rig are told by the side that the networks
     have said of them lately.
     """
 
-    def __init__(self, rig: Rig) -> None:
+    name = "landmarks"
+    messages = (HandLandmarks,)
+
+    def configure(self, rig: Rig, camera: int) -> None:
+        """See `Kind`."""
+        super().configure(rig, camera)
         self._count = len(rig.markers.markers)
         self._hands: list[tuple[bool, NDArray[np.intp], NDArray[np.intp]]] = []  # right; markers; their landmarks
         self._tracks: list[_Track] = []
@@ -93,16 +99,18 @@ class LandmarkMarkers:
                 markers, landmarks = np.array(rows, np.intp).T
                 self._hands.append((hand.side == "right", markers, landmarks))
 
-    def __bool__(self) -> bool:
-        return bool(self._hands)
+    def refusal(self, message: Any) -> str | None:
+        """A rig without landmarks."""
+        return None if self._hands else "no_landmarks"
 
-    def observations(self, message: HandLandmarks, camera: int, t_row0_ns: int, t_send_ns: int, t_receive_ns: int,
-                     bound_s: float) -> CameraObservations:
-        """The landmarks of one frame; all other markers are lost. Times are in master ns."""
+    def observe(self, collected: Any, times: FrameTimes) -> CameraObservations:
+        """The landmarks of one frame; all other markers are lost."""
+        message: HandLandmarks = collected
         pixels, covariances = np.full((self._count, 2), np.nan), np.zeros((self._count, 2, 2))
         diameters, qualities = np.zeros(self._count), np.zeros(self._count)
         flags = np.full(self._count, MarkerFlag.LOST, np.uint16)
-        for (_, markers, landmarks), found in zip(self._hands, self._assigned(message.hands, t_row0_ns), strict=True):
+        assigned = self._assigned(message.hands, times.t_row0_ns)
+        for (_, markers, landmarks), found in zip(self._hands, assigned, strict=True):
             if found is None:
                 continue
             points = np.array(found.points)[landmarks]
@@ -112,10 +120,10 @@ class LandmarkMarkers:
             covariances[own] = points[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
             diameters[own], qualities[own], flags[own] = DIAMETER_PX, found.presence, 0
         return CameraObservations(
-            camera=camera, t_row0_master_ns=t_row0_ns, row_time_ns=message.row_time_ns, clock_bound_s=bound_s,
-            t_receive_ns=t_receive_ns, detect_s=1e-9 * message.processing_ns,
-            network_s=1e-9 * (t_receive_ns - t_send_ns), pixels=pixels, covariances=covariances, diameters=diameters,
-            qualities=qualities, flags=flags)
+            camera=self.camera, t_row0_master_ns=times.t_row0_ns, row_time_ns=message.row_time_ns,
+            clock_bound_s=times.bound_s, t_receive_ns=times.t_receive_ns, detect_s=1e-9 * message.processing_ns,
+            network_s=1e-9 * (times.t_receive_ns - times.t_send_ns), pixels=pixels, covariances=covariances,
+            diameters=diameters, qualities=qualities, flags=flags)
 
     def _assigned(self, found: Sequence[LandmarkedHand], t_ns: int) -> list[LandmarkedHand | None]:
         """Which hand of a frame is which of the rig's: the likeliest by their sides, and by what they were before.

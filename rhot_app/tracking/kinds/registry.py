@@ -1,0 +1,16 @@
+"""All kinds of observations that nodes send."""
+
+from __future__ import annotations
+
+from rhot_app.tracking.kinds.edges import EdgeKind
+from rhot_app.tracking.kinds.kind import Kind
+from rhot_app.tracking.kinds.landmarks import LandmarkKind
+from rhot_app.tracking.kinds.markers import MarkerKind
+from rhot_app.tracking.kinds.tags import TagKind
+
+KINDS: list[type[Kind]] = [MarkerKind, LandmarkKind, EdgeKind, TagKind]
+
+
+def register(kind: type[Kind]) -> None:
+    """Add a kind of another package. Validators that are made from now on ask it before those that are there."""
+    KINDS.append(kind)
