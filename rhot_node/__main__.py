@@ -1,4 +1,4 @@
-"""The ``rhot-node`` command: the daemon; the other commands stand in commands.py."""
+"""The ``rhot-node`` command: the daemon; the other commands are in `rhot_node.commands`."""
 
 from __future__ import annotations
 
@@ -133,15 +133,14 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     from rhot_node.health.checks import HealthMonitor
     from rhot_node.health.machine import Machine
     from rhot_node.keys import trust_state
-    from rhot_node.network.announce import Announcer
     from rhot_node.network.control import ControlServer
     from rhot_node.network.link import UdpLink
     from rhot_node.network.pairing import OfferFile, Reception, offer_path
-    from rhot_node.network.presence import Presence
+    from rhot_node.network.presence import Announcer, Presence
     from rhot_node.network.requests import Responder, SettingsStore
     from rhot_node.network.session import LinkKeys
     from rhot_node.plugins import DetectorChoice
-    from rhot_node.service.notify import ServiceManager
+    from rhot_node.service import ServiceManager
     from rhot_node.video.recorder import VideoRecorder, video_folder
 
     clock = settings.clock.clock(time.monotonic_ns())
@@ -210,7 +209,7 @@ def _trust(path: Path, settings: NodeSettings) -> NodeTrust | None:
 
 def _invite(settings: NodeSettings, offers: OfferFile) -> None:
     """Show a pairing code on the console. Raises TrustError."""
-    from rhot_node.commands.trust_command import invitation
+    from rhot_node.commands.setup_command import invitation
     logging.getLogger(__name__).warning("not paired yet\n%s",
                                         invitation(settings, offers.current() or offers.renew()))
 

@@ -20,7 +20,7 @@ from rhot_app.sources.key_exchange import KeyExchange
 from rhot_app.sources.lost_nodes import LostNodes
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.poses.followed import FollowedObjects
-from rhot_app.sources.poses.line_inputs import why
+from rhot_app.sources.poses.open_source import why
 from rhot_app.sources.receiver import DatagramSink, Deliver, NodeReceiver, open_data_socket
 from rhot_node.clock import ANCILLARY_SIZE, KernelTime, ask_for_times
 from rhot_node.errors import WireError, printable

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import fcntl
 import json
@@ -9,22 +10,23 @@ import logging
 import os
 import select
 import selectors
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 import msgspec
 
-from rhot_app.errors import SourceError
+from rhot_app.errors import RhotError, SourceError
 from rhot_app.keys import load_master_keys
 from rhot_node.config import NodeSettings, load_settings, save_settings
-from rhot_node.errors import SettingsError
+from rhot_node.errors import NodeError, SettingsError, system_sentence
 from rhot_node.keys import keys_path, pair_beforehand
-from rhot_node.logs import cut_log
+from rhot_node.logs import cut_log, log_to_stderr
 
 log = logging.getLogger(__name__)
 
@@ -253,6 +255,33 @@ class NodeSupervisor:
         """End every daemon. May be called twice."""
         for node in self.nodes:
             node.close()
+
+
+# -- the program that serves them --------------------------------------------------------------------------------------
+
+def add_serve_arguments(parser: argparse.ArgumentParser) -> None:
+    """``--while-locked`` of a program that serves nodes."""
+    parser.add_argument("--while-locked", type=Path, metavar="FILE",
+                        help="end when the program that started this one has ended and for half a minute no engine has "
+                             "locked FILE")
+
+
+def serve(work: Callable[[Callable[[], bool]], None], while_locked: Path | None) -> int:
+    """Do `work`, given what tells that nobody uses it any more, until it ends or a signal comes. Returns the program's
+    exit code: 2 after an error."""
+    log_to_stderr()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        work((lambda: False) if while_locked is None else Use(while_locked).over)
+    except (RhotError, NodeError) as exc:
+        print(f"rhot: {exc}", file=sys.stderr)
+        return 2
+    except OSError as exc:
+        print(f"rhot: {system_sentence(exc)}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        pass
+    return 0
 
 
 # -- whether somebody uses them ----------------------------------------------------------------------------------------

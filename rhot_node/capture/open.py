@@ -1,4 +1,4 @@
-"""Camera specs, as typed behind ``--camera``: which backend opens what."""
+"""Camera specs, as typed behind ``--camera``: which backend opens what, and how its pictures are turned."""
 
 from __future__ import annotations
 
@@ -6,17 +6,21 @@ import contextlib
 import os
 import re
 import stat
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Reporting
-from rhot_node.capture.orientation import OrientedCamera
+import cv2
+import numpy as np
+
+from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Reporting, Rewindable
 from rhot_node.capture.paced import IMAGE_SUFFIXES, ImageFiles, ImageSource, PacedCamera, VideoFile
 from rhot_node.capture.stream import StreamCamera
 from rhot_node.capture.webcam import NetworkCamera, Webcam
 from rhot_node.capture.yuv import YuvRecording
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
+from rhot_node.detect.image import Plane, YuvImage
 from rhot_node.errors import CameraError, NodeError, PluginError
 from rhot_node.plugins import PREFIX, about_plugin, load_plugin
 from rhot_node.threads import FOREIGN
@@ -114,6 +118,56 @@ def _split_options(text: str, spec: str, *known: str) -> tuple[str, dict[str, st
     if not name:
         raise CameraError(f"camera {spec!r}: it names no file.")
     return name, options
+
+
+# -- cameras that hang upside down, or whose program mirrors their pictures ---------------------------------------------
+
+_BOTH_AXES, _AROUND_X, _AROUND_Y = -1, 0, 1  # of cv2.flip
+
+
+class OrientedCamera:
+    """A camera whose pictures are turned by 180 degrees (`settings.turned`), mirrored (`settings.mirrored`), or both.
+
+    The rows of a rolling shutter would then be exposed from the last to the first, which no message can say: such
+    frames are refused.
+    """
+
+    def __init__(self, camera: Camera, settings: CameraSettings) -> None:
+        self._camera = camera
+        self._turned = settings.turned
+        self._way = (_AROUND_X if settings.mirrored else _BOTH_AXES) if settings.turned else _AROUND_Y
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), px."""
+        return self._camera.size
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """The next frame, as `Camera.read`."""
+        frame = self._camera.read(timeout_s)
+        if frame is None:
+            return None
+        if self._turned and frame.row_time_ns:
+            raise CameraError("a picture whose rows are exposed one after the other cannot be turned here. Take "
+                              "\"turned\" out of the settings and mount the camera upright, or set row_time_us to 0.")
+        image = frame.image
+        return replace(frame, image=YuvImage(self._flip(image.y), self._flip(image.u), self._flip(image.v)))
+
+    def rewind(self) -> None:
+        """Go before the first frame, where the camera can."""
+        if isinstance(self._camera, Rewindable):
+            self._camera.rewind()
+
+    def report(self) -> dict[str, Any]:
+        """What the camera says of itself."""
+        return self._camera.report() if isinstance(self._camera, Reporting) else {}
+
+    def close(self) -> None:
+        """Release the camera."""
+        self._camera.close()
+
+    def _flip(self, plane: Plane) -> Plane:
+        return np.asarray(cv2.flip(plane, self._way), np.uint8)
 
 
 # -- cameras from other packages ---------------------------------------------------------------------------------------

@@ -3,64 +3,50 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
-from functools import partial
+import importlib
+from collections.abc import Sequence
+from types import ModuleType
 
-Command = tuple[argparse.ArgumentParser, Callable[[argparse.Namespace], int]]
-"""The parser of a command's arguments, and what runs it with them."""
+_SETUP = "rhot_node.commands.setup_command"
 
+COMMANDS = {
+    "detect": ("rhot_node.commands.detect_command",
+               "Find the markers in an image, a folder of images or a video, frame by frame."),
+    "doctor": ("rhot_node.commands.doctor_command",
+               "Look at everything that a node needs: power, heat, memory, clock, network, cameras and their light, "
+               "compiled code, pairing and the service. Exit code 0: nothing is wrong, as far as can be seen; 1: "
+               "something could be better; 2: something is wrong."),
+    "install": (_SETUP, "Make the node a system service (systemd): started at boot, restarted when it ends or hangs, "
+                        "held in bounds. To be run as root. Its settings then lie in /var/lib/rhot-node/node.json."),
+    "landmarks": ("rhot_node.landmarks.install_command",
+                  "Install the networks that find 21 landmarks of a bare hand. They are taken out of a wheel, which "
+                  "pip downloads (36 MB) and which is not installed."),
+    "pair": (_SETUP, "Show a fresh one-time code to pair a master with; the code before it is void."),
+    "uninstall": (_SETUP, "Stop the service and remove it; settings and keys stay."),
+    "unpair": (_SETUP, "Forget every master and the node's own keys, as when it was shipped. A running node does so at "
+                       "once."),
+}
+"""By name: the module that has its ``add_arguments(parser)`` and ``run(options) -> int``, and what it does."""
 
-def run_command(name: str, arguments: Sequence[str]) -> int:
-    """Run command `name` of COMMANDS; returns its exit code. Raises NodeError."""
-    parser, run = COMMANDS[name](name)
-    return run(parser.parse_args(arguments))
-
-
-def _detect(name: str) -> Command:
-    from rhot_node.commands import detect_command
-    parser = _parser(name, "Find the markers in an image, a folder of images or a video, frame by frame.")
-    detect_command.add_arguments(parser)
-    return parser, detect_command.run
-
-
-def _trust(name: str) -> Command:
-    from rhot_node.commands import trust_command
-    parser = _parser(name, trust_command.SUMMARIES[name])
-    trust_command.add_arguments(name, parser)
-    return parser, partial(trust_command.run, name)
-
-
-def _service(name: str) -> Command:
-    from rhot_node.service import command
-    parser = _parser(name, command.SUMMARIES[name])
-    command.add_arguments(name, parser)
-    return parser, partial(command.run, name)
-
-
-def _doctor(name: str) -> Command:
-    from rhot_node.commands import doctor_command
-    parser = _parser(name, doctor_command.SUMMARY)
-    doctor_command.add_arguments(parser)
-    return parser, doctor_command.run
-
-
-def _landmarks(name: str) -> Command:
-    from rhot_node.landmarks import install_command
-    parser = _parser(name, install_command.SUMMARY)
-    install_command.add_arguments(parser)
-    return parser, install_command.run
-
-
-def _parser(name: str, description: str) -> argparse.ArgumentParser:
-    return argparse.ArgumentParser(prog=f"rhot-node {name}", description=description)
-
-
-COMMANDS: dict[str, Callable[[str], Command]] = {
-    "detect": _detect, "doctor": _doctor, "install": _service, "landmarks": _landmarks, "pair": _trust,
-    "uninstall": _service, "unpair": _trust}
 HELP = """rhot-node detect   finds markers in files instead
 rhot-node doctor   looks at power, heat, memory, clock, network, camera and says what to do
 rhot-node install, rhot-node uninstall   make the node a system service
 rhot-node landmarks install   install the networks that find a bare hand's landmarks
 rhot-node pair, rhot-node unpair   who may use this node
 (each with --help)"""
+
+
+def parser_of(name: str) -> tuple[ModuleType, argparse.ArgumentParser]:
+    """The module of a command, and the parser of its arguments."""
+    where, summary = COMMANDS[name]
+    module, parser = importlib.import_module(where), argparse.ArgumentParser(
+        prog=f"rhot-node {name}", description=summary)
+    parser.set_defaults(command=name)
+    module.add_arguments(parser)
+    return module, parser
+
+
+def run_command(name: str, arguments: Sequence[str]) -> int:
+    """Run command `name` of COMMANDS; returns its exit code. Raises NodeError."""
+    module, parser = parser_of(name)
+    return int(module.run(parser.parse_args(arguments)))

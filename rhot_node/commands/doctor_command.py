@@ -33,12 +33,9 @@ from rhot_node.health.checks import (
 from rhot_node.health.machine import Machine
 from rhot_node.keys import NodeTrust, keys_path
 from rhot_node.landmark_search import OpenNetworks, open_networks
-from rhot_node.service.install import NAME, STATE_FOLDER
+from rhot_node.service import NAME, STATE_FOLDER
 from rhot_node.terminal import add_examples
 
-SUMMARY = ("Look at everything that a node needs: power, heat, memory, clock, network, cameras and their light, "
-           "compiled code, pairing and the service. Exit code 0: nothing is wrong, as far as can be seen; 1: something "
-           "could be better; 2: something is wrong.")
 EXIT_CODES: dict[Level, int] = {"ok": 0, "unknown": 0, "warning": 1, "error": 2}
 SERVICE_CACHE = Path("var/cache") / STATE_FOLDER.name
 

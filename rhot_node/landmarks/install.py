@@ -21,7 +21,7 @@ from typing import Final
 
 from rhot_node.errors import KeypointError, printable
 from rhot_node.files import open_input, read_input, replacing, why
-from rhot_node.service.install import STATE_FOLDER
+from rhot_node.service import STATE_FOLDER
 
 Progress = Callable[[str, float], None]
 """Called with what is done and how much of it, 0..1. Whoever wants it to stop raises from here."""

@@ -15,16 +15,14 @@ from rhot_node.landmarks.install import (
     install_networks,
     user_folder,
 )
-from rhot_node.service.install import STATE_FOLDER
+from rhot_node.service import STATE_FOLDER
 from rhot_node.terminal import add_examples
-
-SUMMARY = (f"Install the networks that find 21 landmarks of a bare hand. They are taken out of the wheel {PACKAGE}, "
-           f"which pip downloads (36 MB) and which is not installed. Their licence is the {LICENCE}.")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of ``rhot-node landmarks``."""
-    parser.add_argument("what", choices=("install",), help="install: place the networks on this machine")
+    parser.add_argument("what", choices=("install",),
+                        help=f"install: place the networks on this machine (of {PACKAGE}, {LICENCE})")
     add_wheel(parser)
     parser.add_argument("--service", action="store_true",
                         help=f"for the node's system service, in {SERVICE_FOLDER}; to be run as root")

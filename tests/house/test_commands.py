@@ -20,7 +20,7 @@ from rhot_app.__main__ import main as rhot
 from rhot_app.calibration.calibrate_command import ALIASES, FILES, KINDS
 from rhot_app.ui.wizards.framework.plan import WIZARDS
 from rhot_node.__main__ import daemon_parser
-from rhot_node.commands import COMMANDS
+from rhot_node.commands import COMMANDS, parser_of
 
 ROOT = Path(__file__).parents[2]
 MODULES = {"rhot": "rhot_app", "rhot-node": "rhot_node"}
@@ -175,7 +175,7 @@ def test_help_ends_with_two_examples_that_are_valid(command: str, tmp_path: Path
         if program == "rhot":
             parse(arguments)
         elif arguments[0] in COMMANDS:
-            COMMANDS[arguments[0]](arguments[0])[0].parse_args(arguments[1:])
+            parser_of(arguments[0])[1].parse_args(arguments[1:])
         else:
             daemon_parser().parse_args(arguments)
 

@@ -11,8 +11,15 @@ import pytest
 from patience import PATIENCE_S
 
 from rhot_node.network import announce
-from rhot_node.network.announce import Announcer
-from rhot_node.network.presence import SERVICE, Presence, host_of, instance_of, presence_of, properties_of
+from rhot_node.network.presence import (
+    SERVICE,
+    Announcer,
+    Presence,
+    host_of,
+    instance_of,
+    presence_of,
+    properties_of,
+)
 from rhot_node.wire.messages import TrustState
 
 LEFT = Presence(3, 0xB007, "left", 47800, 47801, 47802, 47803, TrustState.UNPAIRED)

@@ -14,8 +14,7 @@ from shipped_markers import RHOT6
 
 from rhot_node.config import NodeSettings, load_settings, save_settings
 from rhot_node.errors import NodeError
-from rhot_node.service.install import Host, Service, Wish, install, uninstall, unit_text
-from rhot_node.service.notify import ServiceManager
+from rhot_node.service import Host, Service, ServiceManager, Wish, install, uninstall, unit_text
 
 SERVICE = Service(Path("/opt/rhot/bin/python"), Path("/var/lib/rhot-node/node.json"), "pi")
 

@@ -27,7 +27,7 @@ from rhot_app.sources.discovery import (
     find_nodes,
     together,
 )
-from rhot_node.network.announce import announce_by_zeroconf
+from rhot_node.network.presence import announce_by_zeroconf
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import Find, Here, NodeState, TrustState
 

@@ -12,7 +12,6 @@ import argparse
 import contextlib
 import json
 import os
-import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -31,9 +30,9 @@ from rhot_app.simulator.nodes.remote import SERVER_NAME, Request, decode_request
 from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
 from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_arguments, scene_of, show_of
 from rhot_app.simulator.scene.scene_description import Show
-from rhot_app.sources.local_nodes import READY_TIMEOUT_S, NodeSupervisor, Use
+from rhot_app.sources.local_nodes import READY_TIMEOUT_S, NodeSupervisor, add_serve_arguments, serve
 from rhot_node.errors import NodeError
-from rhot_node.logs import cut_log, log_to_stderr
+from rhot_node.logs import cut_log
 from rhot_node.network.context import Context
 from rhot_node.threads import Worker
 
@@ -139,24 +138,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add_show_arguments(parser)
     parser.add_argument("--directory", type=Path, required=True, help="folder for sockets, settings and logs")
     parser.add_argument("--rig", type=Path, required=True, help="rig file to write when the nodes are ready")
-    parser.add_argument("--while-locked", type=Path, metavar="FILE",
-                        help="end when the program that started this one has ended and for half a minute no engine has "
-                             "locked FILE")
+    add_serve_arguments(parser)
     args = parser.parse_args(arguments)
-    log_to_stderr()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with contextlib.suppress(OSError):
         os.nice(_NICE)
-    try:
-        directory = args.directory.absolute()
-        over = (lambda: False) if args.while_locked is None else Use(args.while_locked).over
-        run(scene_of(args), show_of(args), directory, args.rig.absolute(), over)
-    except (RhotError, NodeError) as exc:
-        print(f"rhot: {exc}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 0
-    return 0
+    return serve(lambda over: run(scene_of(args), show_of(args), args.directory.absolute(), args.rig.absolute(), over),
+                 args.while_locked)
 
 
 if __name__ == "__main__":

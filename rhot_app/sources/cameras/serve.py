@@ -11,21 +11,20 @@ import argparse
 import contextlib
 import json
 import os
-import signal
 import stat
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from rhot_app.errors import RhotError, SourceError
+from rhot_app.errors import SourceError
 from rhot_app.project import load_rig, save_rig
 from rhot_app.sources.cameras.camera_set import CameraSet, camera_set_of, node_settings, nodes_folder, with_ports
-from rhot_app.sources.local_nodes import READY_TIMEOUT_S, NodeSupervisor, Use, settings_path
+from rhot_app.sources.local_nodes import READY_TIMEOUT_S, NodeSupervisor, add_serve_arguments, serve, settings_path
 from rhot_node.config import NodeSettings, load_settings
-from rhot_node.errors import NodeError, SettingsError, system_sentence
+from rhot_node.errors import SettingsError
 from rhot_node.files import write_atomically
-from rhot_node.logs import cut_log, log_to_stderr
+from rhot_node.logs import cut_log
 
 _POLL_S = 0.05
 _BEGIN_NS = 300_000_000
@@ -100,23 +99,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                                      description="Nodes of this computer's cameras.")
     parser.add_argument("--rig", type=Path, required=True, help="rig file of a set of cameras")
     parser.add_argument("--log", type=Path, help="file that standard error goes to, which is kept short")
-    parser.add_argument("--while-locked", type=Path, metavar="FILE",
-                        help="end when the program that started this one has ended and for half a minute no engine has "
-                             "locked FILE")
+    add_serve_arguments(parser)
     args = parser.parse_args(arguments)
-    log_to_stderr()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        run(args.rig, args.log, (lambda: False) if args.while_locked is None else Use(args.while_locked).over)
-    except (RhotError, NodeError) as exc:
-        print(f"rhot: {exc}", file=sys.stderr)
-        return 2
-    except OSError as exc:
-        print(f"rhot: {system_sentence(exc)}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 0
-    return 0
+    return serve(lambda over: run(args.rig, args.log, over), args.while_locked)
 
 
 if __name__ == "__main__":

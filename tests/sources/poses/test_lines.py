@@ -18,9 +18,8 @@ from rhot_app.__main__ import main
 from rhot_app.errors import SourceError
 from rhot_app.objects.pose import Validity
 from rhot_app.objects.stream import read_pose_stream
-from rhot_app.sources.poses.line_inputs import ProgramLines, TcpLines, UdpLines
 from rhot_app.sources.poses.lines import LINE_MAX, SILENCE_NS, WINDOW_S, ArrivalClock, LinePoses, parse_line
-from rhot_app.sources.poses.open_source import open_source
+from rhot_app.sources.poses.open_source import ProgramLines, TcpLines, UdpLines, open_source
 from rhot_node import compiled
 
 LINE = b"1.5 T20 0.1 -0.2 0.3 0 1 0 0"

@@ -1,1 +1,0 @@
-"""A node as a system service: the unit, its installation, and what the daemon tells the service manager."""
