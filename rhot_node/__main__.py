@@ -142,6 +142,7 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     from rhot_node.plugins import DetectorChoice
     from rhot_node.service import ServiceManager
     from rhot_node.video.recorder import VideoRecorder, video_folder
+    from rhot_node.wire.messages import U32_MAX
 
     clock = settings.clock.clock(time.monotonic_ns())
     store = SettingsStore(options.settings, settings)
@@ -156,7 +157,7 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
                         troubles=lambda: [*choice.troubles(), *health.troubles()], video=videos.offer,
                         foreground=foreground)
     manager = ServiceManager()
-    boot_id = secrets.randbits(32)
+    boot_id = secrets.randbelow(U32_MAX)
     with contextlib.ExitStack() as stack:
         stack.callback(videos.close)
         stack.callback(daemon.close)

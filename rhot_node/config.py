@@ -28,6 +28,9 @@ VERSION: Final = 1
 
 Port = Annotated[int, Meta(ge=0, le=65535)]
 Pixels = Annotated[int, Meta(ge=16, le=16384, multiple_of=2)]
+FPS = 0.1, 1000.0
+"""frames/s that a camera or a film can have."""
+
 Gain = Annotated[float, Meta(gt=0, le=1000)]
 
 
@@ -36,7 +39,7 @@ class CameraSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     width: Pixels = 640
     height: Pixels = 480
-    fps: Annotated[float, Meta(ge=0.1, le=1000)] = 30.0
+    fps: Annotated[float, Meta(ge=FPS[0], le=FPS[1])] = 30.0
     exposure_us: Annotated[float, Meta(gt=0, le=1_000_000)] = 4000.0
     gain: Gain | None = None
     saturation: float | None = None

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from rhot_node.capture.camera import FIRST_FRAME_S, Camera, EndOfRecording, Frame, Reporting, Rewindable
+from rhot_node.capture.camera import FIRST_FRAME_S, READ_S, Camera, EndOfRecording, Frame, Reporting, Rewindable
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings, NodeSettings
 from rhot_node.detect.image import Detector
@@ -28,7 +28,6 @@ from rhot_node.wire.messages import U32_MAX, FrameMessage, MarkerObservation, No
 
 log = logging.getLogger(__name__)
 
-READ_S = 0.05  # how long to wait for a frame before looking at everything else
 REOPEN_S = 1.0  # between tries to open a lost camera
 _LIGHT_PERIOD_S = 1.0
 _OPENING_S = 2.0 * FIRST_FRAME_S

@@ -5,6 +5,9 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+NAME_LIMIT = 64
+"""Characters of a name that somebody else gave something; those of our own nodes have as many."""
+
 
 def printable(text: str, limit: int = 400) -> str:
     """What somebody else wrote, safe for a terminal and a log: one line, control characters as escapes, cut off at

@@ -299,6 +299,12 @@ def _require_regular(mode: int, path: Path, done: str) -> None:
         raise OSError(code, f"it is {kind}; only files are {done}", str(path))
 
 
+def free_bytes(folder: Path) -> int:
+    """What an ordinary user may still write in `folder`; raises OSError."""
+    facts = os.statvfs(folder)
+    return facts.f_bavail * facts.f_frsize
+
+
 def sync_folder(path: Path) -> None:
     """Have the disk take the name of a new file, too: without it a power cut may lose the whole file."""
     with contextlib.suppress(OSError):  # some file systems cannot

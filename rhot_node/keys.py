@@ -85,7 +85,7 @@ def _check_owner_and_mode(path: Path, info: os.stat_result) -> None:
     if info.st_uid not in (os.geteuid(), 0):
         raise TrustError(f"{path}: belongs to user {info.st_uid}, not to you. It holds secret keys, which only their "
                          "owner may choose; remove it, or run this as its owner.")
-    if info.st_mode & 0o077:
+    if info.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise TrustError(f"{path}: is open to other users (mode {info.st_mode & 0o777:o}), but holds secret keys. If "
                          f"nobody can have read it, run `chmod 600 {path}`; otherwise remove it and pair again.")
 

@@ -255,7 +255,7 @@ def _do(host: Host, *command: str) -> None:
         raise NodeError(f"`{' '.join(command)}` failed: {failure}")
 
 
-# -- what the running node says (sd_notify(3)) --------------------------------------------------------------------------
+# -- what the running node says (sd_notify(3)) -------------------------------------------------------------------------
 
 class ServiceManager:
     """Says that the node is ready and, often enough, that it is alive. Silent where nobody asked for it."""
@@ -268,7 +268,7 @@ class ServiceManager:
         watched = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
         microseconds = environment.get("WATCHDOG_USEC", "")
         # A third of what the manager waits for: one sign may be late.
-        self._period_s = int(microseconds) / 3e6 if watched and microseconds.isdigit() else None
+        self._period_s = 1e-6 * int(microseconds) / 3 if watched and microseconds.isdigit() else None
         self._now_s = now_s
         self._due_s = 0.0
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) if address else None

@@ -14,6 +14,7 @@ from typing import Final
 
 from rhot_app.errors import RecordingError
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_record
+from rhot_node.wire.fields import TIME_MAX_NS
 
 TEXT_MAX: Final = 1024  # bytes of UTF-8
 
@@ -31,7 +32,7 @@ def bookmark_record(bookmark: Bookmark) -> Record:
     data = bookmark.text.encode(errors="replace")
     if len(data) > TEXT_MAX or not (bookmark.text.isprintable()):
         raise RecordingError(f"a bookmark is one line of at most {TEXT_MAX} bytes, without control characters.")
-    if not -(1 << 63) <= bookmark.t_master_ns < 1 << 63:
+    if abs(bookmark.t_master_ns) >= TIME_MAX_NS:
         raise RecordingError("a bookmark's time is a number of nanoseconds of the master's clock.")
     return Record(RecordKind.BOOKMARK, 0, bookmark.t_master_ns, data)
 

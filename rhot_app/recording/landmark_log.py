@@ -51,7 +51,9 @@ DIAMETER_PX: Final = 1.0  # a point has none
 _BEGIN_NS, _EXCHANGE_NS = 1_000_000_000_000, 500_000_000
 _BOUND_NS = 10_000  # of the times in a table
 
-FIRST_NS = _BEGIN_NS + 10 * _EXCHANGE_NS
+_LEAD_NS = 10 * _EXCHANGE_NS
+
+FIRST_NS = _BEGIN_NS + _LEAD_NS
 """Master time, ns, of the first frame of a log that is made of tables."""
 _SESSION, _LONGEST_S = 1, 86_400.0
 
@@ -193,8 +195,7 @@ def _near(times_ns: Times, frames_ns: Times) -> Times:
     place = np.searchsorted(frames_ns, times_ns)
     until = frames_ns[np.minimum(place, len(frames_ns) - 1)] - times_ns
     since = times_ns - frames_ns[np.maximum(place - 1, 0)]
-    near = 10 * _EXCHANGE_NS
-    return np.asarray(times_ns[(np.abs(until) <= near) | (np.abs(since) <= near)])
+    return np.asarray(times_ns[(np.abs(until) <= _LEAD_NS) | (np.abs(since) <= _LEAD_NS)])
 
 
 def _exchange(node: RigNode, sequence: int, t_ns: int) -> list[Record]:

@@ -28,12 +28,12 @@ from rhot_app.errors import RecordingError, note_loss
 from rhot_app.project import Rig, parse_rig
 from rhot_node.files import JSON_BYTES_MAX, KIB, MIB, decode_json, open_input
 from rhot_node.terminal import add_examples
-from rhot_node.wire.fields import TIME_MAX_NS
+from rhot_node.wire.fields import TIME_MAX_NS, UDP_MAX
 
 MAGIC: Final = b"RHOTLOG\0"
 VERSION: Final = 2
 HEADER_MAX: Final = JSON_BYTES_MAX
-PAYLOAD_MAX: Final = 65535  # the longest UDP datagram
+PAYLOAD_MAX: Final = UDP_MAX
 
 _BLOCK = 4096  # of a disk: what one bad block destroys; each copy of the header fills whole ones
 _BUFFER = 64 * KIB

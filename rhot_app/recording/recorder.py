@@ -19,7 +19,7 @@ from typing import Any
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import END, PAYLOAD_MAX, Record, RecordKind, encode_header, encode_record
-from rhot_node.files import sync_folder
+from rhot_node.files import free_bytes, sync_folder
 from rhot_node.threads import Worker
 
 # -- remaining disk time -----------------------------------------------------------------------------------------------
@@ -28,12 +28,6 @@ WINDOW_S = 10.0
 """The rate is that of the last seconds: nodes may be started and stopped while a log is written."""
 
 _LEAST_S = 2.0  # of growth before it is a rate
-
-
-def free_bytes(folder: Path) -> int:
-    """What an ordinary user may still write in `folder`; raises OSError."""
-    facts = os.statvfs(folder)
-    return facts.f_bavail * facts.f_frsize
 
 
 class DiskWatch:

@@ -23,9 +23,8 @@ from rhot_app.errors import RecordingError, RhotError
 from rhot_app.progress import Progress, silent, within
 from rhot_app.project import Rig, RigNode
 from rhot_app.recording.raw_log import LogReader
-from rhot_app.recording.recorder import free_bytes
 from rhot_node.errors import NodeError, printable
-from rhot_node.files import MIB, decode_message, replacing
+from rhot_node.files import MIB, decode_message, free_bytes, replacing
 from rhot_node.keys import KeyPair, connect_with
 from rhot_node.network.context import Context
 from rhot_node.video.avi import read_stamps

@@ -18,7 +18,8 @@ from rhot_app.progress import Progress, silent
 from rhot_node.errors import WireError
 from rhot_node.network.presence import SERVICE, Presence, is_loopback, own_interfaces, presence_of
 from rhot_node.wire.codec import decode, encode
-from rhot_node.wire.messages import BROADCAST_PORT, U32_MAX, Find, Here, NodeState
+from rhot_node.wire.fields import RECEIVE_MAX
+from rhot_node.wire.messages import BROADCAST_PORT, U32_MAX, U64_MAX, Find, Here, NodeState
 
 if TYPE_CHECKING:
     from zeroconf import ServiceStateChange, Zeroconf
@@ -28,8 +29,7 @@ if TYPE_CHECKING:
 # Anybody can answer anything. What comes back is good for showing and for trying an address, nothing else.
 
 _EVERYBODY = "255.255.255.255"
-_DATAGRAM_MAX = 1024
-_BURST = 256  # answers taken at once
+BURST = 256  # answers taken at once
 
 log = logging.getLogger(__name__)
 
@@ -50,7 +50,7 @@ class FindSocket:
         """`port`: where nodes listen for broadcasts. `this_machine_only`: no network is asked."""
         self._port = port
         self._this_machine_only = this_machine_only
-        self._nonce = secrets.randbits(64)  # so that only who has heard the question can answer it
+        self._nonce = secrets.randbelow(U64_MAX)  # so that only who has heard the question can answer it
         self._sequence = 0
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
@@ -79,9 +79,9 @@ class FindSocket:
     def answers(self) -> list[Sighting]:
         """The answers that have come; what is none is passed over."""
         found = []
-        for _ in range(_BURST):
+        for _ in range(BURST):
             try:
-                data, sender = self._socket.recvfrom(_DATAGRAM_MAX)
+                data, sender = self._socket.recvfrom(RECEIVE_MAX)
                 message = decode(data)
             except WireError as exc:
                 log.debug("an answer that is none: %s", exc)

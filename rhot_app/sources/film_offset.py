@@ -42,6 +42,7 @@ RIVAL: Final = 0.8
 """Of the peak's height: a second peak as high as that makes the answer one of two, as in a song's beat."""
 
 _SAMPLE: Final = 12.0**-0.5  # SD of a number that is rounded to one
+_TINY: Final = float(np.finfo(np.float64).tiny)
 _SOUND_HZ: Final = 8000
 _SMOOTH: Final = 11  # ms, the loudness is smoothed over: a clap rises as fast
 _FLOOR: Final = 1e-3  # of the mean power: what is softer than that is silence
@@ -101,9 +102,9 @@ def correlate(first: Array, second: Array, least: int) -> tuple[Array, Array]:
     ones = np.ones(len(first)), np.ones(len(second))
     shared = np.rint(moved(*ones)[lags])
     power = moved(first**2, ones[1])[lags], moved(ones[0], second**2)[lags]
-    floor = 1e-9 * max(float(np.max(one)) for one in power) + 1e-300
+    floor = 1e-9 * max(float(np.max(one)) for one in power) + _TINY
     match = moved(first, second)[lags] / np.sqrt(np.maximum(power[0], floor) * np.maximum(power[1], floor))
-    own = [one[:least] / max(one[0], 1e-300) for one in (moved(first, first), moved(second, second))]
+    own = [one[:least] / max(one[0], _TINY) for one in (moved(first, first), moved(second, second))]
     inflation = max(1.0, float(1.0 + 2.0 * np.sum(own[0][1:] * own[1][1:])))
     return lags.astype(np.float64), match * np.sqrt(shared / inflation)
 
@@ -194,7 +195,7 @@ def flash_s(path: Path, progress: Progress = silent) -> FilmOffset:
     best = int(np.argmax(rise))
     near = np.abs(np.arange(len(rise)) - best) <= 2  # a light goes on within a frame or two
     noise = 1.4826 * float(np.median(np.abs(rise - np.median(rise))))
-    needed = NormalDist().inv_cdf(1.0 - CHANCE / len(rise)) * max(noise, 1.0 / 255.0)
+    needed = NormalDist().inv_cdf(1.0 - CHANCE / len(rise)) * max(noise, 1.0 / np.iinfo(np.uint8).max)
     if rise[best] < needed:
         raise RecordingError(f"{path}: no light goes on in it: its largest rise of brightness is {rise[best]:.2f} of "
                              f"255, {needed:.2f} are needed. Give the offset by hand, or by sound.")

@@ -26,6 +26,7 @@ from rhot_app.sources.clock import ClockEstimate
 from rhot_app.sources.replay import LogValidator
 from rhot_node.capture.paced import IMAGE_SUFFIXES
 from rhot_node.capture.yuv import HEADER_NAME, read_header, read_images
+from rhot_node.config import CameraSettings
 from rhot_node.detect.image import to_bgr
 from rhot_node.errors import CameraError, PictureError, VideoError
 from rhot_node.files import open_input, require_file, why
@@ -39,8 +40,8 @@ Times = NDArray[np.int64]
 FPS = 1.0, 1000.0
 """frames/s that a video can have; what a file says beyond them is not a rate but missing."""
 
-STILL_FPS: Final = 30.0
-STILL_FRAMES: Final = 60
+STILL_FPS: Final = CameraSettings().fps
+STILL_FRAMES: Final = round(2.0 * STILL_FPS)
 """What one picture is shown for: two seconds, in which a hand is found, measured and settles."""
 
 _CLOCK_EVERY_NS = 1_000_000_000

@@ -14,15 +14,12 @@ from zmq.utils.monitor import recv_monitor_message
 
 from rhot_app.errors import SourceError
 from rhot_app.project import RigNode
-from rhot_app.sources.node_link import NodeLink
+from rhot_app.sources.node_link import RESTART_NS, NodeLink
 from rhot_node.errors import printable
 from rhot_node.files import decode_message
 from rhot_node.keys import HexKey, KeyPair, connect_with
 from rhot_node.logs import LogLimit
 from rhot_node.network.context import Context
-
-ASK_NS = 250_000_000
-"""A node is not asked more often than this."""
 
 _RECONNECT_MS = 100
 _REFUSED = zmq.EVENT_HANDSHAKE_FAILED_AUTH | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
@@ -67,7 +64,7 @@ class KeyExchange:
         """Take the keys that have come; ask the nodes whose turn it is."""
         for peer in self._peers:
             self._look(peer)
-            if now_ns - peer.asked_ns >= ASK_NS and peer.link.wants_key(now_ns):
+            if now_ns - peer.asked_ns >= RESTART_NS and peer.link.wants_key(now_ns):
                 peer.asked_ns = now_ns
                 question = msgspec.json.encode({"request": "link", "name": peer.link.key_name})
                 try:

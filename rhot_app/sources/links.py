@@ -27,6 +27,7 @@ from rhot_node.errors import WireError, printable
 from rhot_node.keys import KeyPair
 from rhot_node.threads import Worker
 from rhot_node.wire.codec import encode, node_of
+from rhot_node.wire.fields import RECEIVE_MAX
 from rhot_node.wire.messages import ClockReply, Message, Start, StartEntry, Stop
 
 REQUEST_NS = 100_000_000
@@ -39,7 +40,6 @@ RECENT = 40
 """Requests and replies per node that are kept for a recording that begins later: two seconds."""
 
 _RESOLVE_S = 2.0  # between tries to find the address of a node that is named, not numbered
-_DATAGRAM_MAX = 2048
 
 log = logging.getLogger(__name__)
 
@@ -158,7 +158,7 @@ class NodeLinks:
         self._socket.close()
 
     def _receive(self, flags: int) -> None:
-        data, ancillary, _, sender = self._socket.recvmsg(_DATAGRAM_MAX, ANCILLARY_SIZE, flags)
+        data, ancillary, _, sender = self._socket.recvmsg(RECEIVE_MAX, ANCILLARY_SIZE, flags)
         t_receive_ns, _ = self._kernel_time.receive_time_ns(ancillary)
         try:
             link = self._links.get(node_of(data))

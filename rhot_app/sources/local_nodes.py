@@ -148,7 +148,7 @@ def _read_line(stream: IO[bytes] | None, deadline_s: float) -> bytes | None:
         while not line.endswith(b"\n"):
             if not selector.select(max(0.0, deadline_s - time.monotonic())):
                 return None
-            chunk = os.read(handle, 4096)
+            chunk = os.read(handle, select.PIPE_BUF)
             if not chunk:
                 return None
             line += chunk

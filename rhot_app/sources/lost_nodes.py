@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import msgspec
 
 from rhot_app.project import RigNode
-from rhot_app.sources.discovery import Browse, FindSocket, Found, Sighting, ZeroconfBrowser
+from rhot_app.sources.discovery import BURST, Browse, FindSocket, Found, Sighting, ZeroconfBrowser
 from rhot_app.sources.node_link import NodeLink
 from rhot_node.network.presence import is_loopback
 from rhot_node.threads import OneShotThread
@@ -26,16 +26,10 @@ LOST_NS = 2_000_000_000
 
 ASK_NS = 500_000_000
 PATIENT_NS = 3_000_000_000
-"""How often it is asked for, in the first seconds and later."""
-
-BROWSE_NS = 3_000_000_000
-"""A node that no broadcast has found for so long is looked for by zeroconf too."""
+"""How often it is asked for, in the first seconds and later; then it is looked for by zeroconf too."""
 
 PLACES_MAX = 4
-"""Places tried for one node at once; a new one takes the turn of the one that was tried longest..."""
-
-TRIED_NS = 2_000_000_000
-"""... if it was tried for so long."""
+"""Places tried for one node at once; a new one takes the turn of the one that was tried longest, if for LOST_NS."""
 
 log = logging.getLogger(__name__)
 
@@ -54,7 +48,7 @@ class _Search:
             return
         if len(self.places) >= PLACES_MAX:
             longest = next(iter(self.places))
-            if now_ns - self.places[longest] < TRIED_NS:
+            if now_ns - self.places[longest] < LOST_NS:
                 return
             del self.places[longest]
         self.places[place] = now_ns
@@ -74,7 +68,7 @@ class LostNodes:
         self._searches: dict[int, _Search] = {}
         self._questions: FindSocket | None = None
         self._browser: _Browser | None = None
-        self._announced: deque[Sighting] = deque(maxlen=256)  # filled by the browser's thread
+        self._announced: deque[Sighting] = deque(maxlen=BURST)  # filled by the browser's thread
 
     def step(self, now_ns: int) -> None:
         """Ask for the nodes that are lost, take in where they were seen, and end the search for those that answer."""
@@ -113,7 +107,7 @@ class LostNodes:
                 searched_ns = now_ns - search.began_ns
                 search.due_ns = now_ns + (ASK_NS if searched_ns < PATIENT_NS else PATIENT_NS)
                 self._questions.ask(node_id)
-                if searched_ns >= BROWSE_NS and self._browser is None and not self._here_only:
+                if searched_ns >= PATIENT_NS and self._browser is None and not self._here_only:
                     self._browser = _Browser(self._browse, self._announced.append)
         for sighting in self._questions.answers():
             self._take(sighting, now_ns)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from rhot_app.barehand.observations import SliceRequest
 from rhot_app.project import Rig
 from rhot_app.sources.clock import NodeClockModel
+from rhot_app.sources.searches import REMEMBERED
 from rhot_app.sources.validation import DatagramValidator, refuse_without_key, tagged_by
 from rhot_node.wire.codec import Seal, encode
 from rhot_node.wire.messages import U32_MAX, ClockReply, ClockRequest, Message, NodeState
@@ -24,7 +25,6 @@ UNANSWERED_NS = 300_000_000
 CLOCK_REPLY = "clock_reply"
 """What `NodeLink.refused_replies` are called where datagrams are counted by reason."""
 
-PENDING_MAX = 64  # requests that may still be answered
 
 
 class NodeLink:
@@ -89,7 +89,7 @@ class NodeLink:
     def sent(self, request: ClockRequest) -> None:
         """Remember a request, so that only its own answer is believed."""
         self._pending[request.sequence] = request.t1_master_ns
-        while len(self._pending) > PENDING_MAX:
+        while len(self._pending) > REMEMBERED:
             del self._pending[next(iter(self._pending))]
 
     def slices(self, request: SliceRequest) -> list[bytes]:

@@ -51,9 +51,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _address(args: argparse.Namespace, rig: Rig | None, named: RigNode | None) -> NodeAddress:
     from rhot_app.sources.pairing import NodeAddress, read_address
-    from rhot_node.wire.messages import PAIRING_PORT
-    if args.port is not None and not 1 <= args.port <= 65535:
-        raise PairingError(f"--port is a number from 1 to 65535, not {args.port}.")
+    from rhot_node.wire.messages import PAIRING_PORT, PORT_MAX
+    if args.port is not None and not 1 <= args.port <= PORT_MAX:
+        raise PairingError(f"--port is a number from 1 to {PORT_MAX}, not {args.port}.")
     if named is not None:
         return NodeAddress(named.address, args.port if args.port is not None else named.pairing_port)
     host, port = read_address(args.node)

@@ -22,7 +22,7 @@ from rhot_node.files import PRINTABLE, decode_message
 from rhot_node.keys import Name
 from rhot_node.network.context import Context
 from rhot_node.network.pairing import NO_CODE, NONCE_LENGTH, Transcript, proof, proves, read_code
-from rhot_node.wire.messages import PAIRING_PORT, U32_MAX
+from rhot_node.wire.messages import PAIRING_PORT, PORT_MAX, U32_MAX
 
 TIMEOUT_S = 2.0
 _ANSWER_MAX = 4096  # bytes
@@ -47,8 +47,8 @@ def read_address(text: str) -> tuple[str, int | None]:
     host, colon, port = text.rpartition(":")
     if not colon or ":" in host:
         return text, None
-    if not host or not (port.isascii() and port.isdecimal() and 1 <= int(port) <= 65535):
-        raise PairingError(f"{text!r} is not ADDRESS:PORT with a port from 1 to 65535.")
+    if not host or not (port.isascii() and port.isdecimal() and 1 <= int(port) <= PORT_MAX):
+        raise PairingError(f"{text!r} is not ADDRESS:PORT with a port from 1 to {PORT_MAX}.")
     return host, int(port)
 
 

@@ -22,6 +22,7 @@ from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.clock import ANCILLARY_SIZE, KernelTime, LinuxOption, ask_for_times
 from rhot_node.files import MIB
 from rhot_node.threads import Worker
+from rhot_node.wire.fields import RECEIVE_MAX
 
 # -- thread priority ---------------------------------------------------------------------------------------------------
 
@@ -68,8 +69,6 @@ twentieth of a millisecond. When datagrams pile up they are older, and all are t
 
 NEWEST = 8
 """Of one burst at most so many are handed on: when flooded, count everything, track the newest."""
-
-DATAGRAM_MAX = 4096  # bytes; 64 markers need 2.1 kB, and a longer datagram is refused for its length
 
 _WAIT = struct.pack("@ll", 0, 200_000)  # a blocked read returns after 0.2 s to see whether it shall end
 
@@ -172,7 +171,7 @@ class NodeReceiver:
         count, flags = 0, 0
         with contextlib.suppress(BlockingIOError):
             while count < BURST:
-                data, ancillary, _, _ = self._socket.recvmsg(DATAGRAM_MAX, ANCILLARY_SIZE, flags)
+                data, ancillary, _, _ = self._socket.recvmsg(RECEIVE_MAX, ANCILLARY_SIZE, flags)
                 claim_interpreter()
                 t_receive_ns, now_ns = self._kernel_time.receive_time_ns(ancillary)
                 count, flags = count + 1, socket.MSG_DONTWAIT

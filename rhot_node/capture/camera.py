@@ -14,6 +14,9 @@ from rhot_node.files import MIB, read_input
 FIRST_FRAME_S: Final = 5.0
 """s that a camera may take from being opened to its first frame. Chosen."""
 
+READ_S: Final = 0.05
+"""s that a loop waits for a frame before it looks at everything else."""
+
 SILENCE_S: Final = 3.0
 """s without a frame after which a camera is gone. Chosen, longer than the longest exposure of `CameraSettings`."""
 
@@ -69,6 +72,11 @@ class Reporting(Protocol):
     def report(self) -> dict[str, Any]:
         """What it really does, as JSON values for the control channel. Any thread may ask."""
         ...
+
+
+def i420_bytes(width: int, height: int) -> int:
+    """Of a packed frame: a byte of luma a pixel, and two of chroma for four pixels."""
+    return width * height + width * height // 2
 
 
 class EndOfRecording(Exception):  # noqa: N818 - an end, not an error

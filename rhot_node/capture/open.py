@@ -120,7 +120,7 @@ def _split_options(text: str, spec: str, *known: str) -> tuple[str, dict[str, st
     return name, options
 
 
-# -- cameras that hang upside down, or whose program mirrors their pictures ---------------------------------------------
+# -- cameras that hang upside down, or whose program mirrors their pictures --------------------------------------------
 
 _BOTH_AXES, _AROUND_X, _AROUND_Y = -1, 0, 1  # of cv2.flip
 

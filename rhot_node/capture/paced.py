@@ -11,7 +11,7 @@ import numpy as np
 
 from rhot_node.capture.camera import NS_PER_S, DelayedStart, EndOfRecording, Frame, available_delay_ns, wait_until
 from rhot_node.clock import NodeClock
-from rhot_node.config import CameraSettings
+from rhot_node.config import FPS, CameraSettings
 from rhot_node.detect.image import Plane, YuvImage, from_bgr
 from rhot_node.errors import CameraError, PictureError
 from rhot_node.pictures import open_video, read_picture
@@ -79,7 +79,7 @@ class VideoFile:
         self._path = path
         self._capture = self._open()
         fps = self._capture.get(cv2.CAP_PROP_FPS)
-        self.fps: float | None = fps if 0.1 < fps < 1000 else None
+        self.fps: float | None = fps if FPS[0] < fps < FPS[1] else None
         self._frames = self._capture.get(cv2.CAP_PROP_FRAME_COUNT)
         self._read = 0  # frames that were read
         self._last: Plane | None = None  # the last frame, when there is none behind it

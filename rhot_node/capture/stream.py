@@ -18,7 +18,7 @@ from struct import Struct
 import msgspec
 import numpy as np
 
-from rhot_node.capture.camera import FIRST_FRAME_S, SILENCE_S, Frame
+from rhot_node.capture.camera import FIRST_FRAME_S, READ_S, SILENCE_S, Frame, i420_bytes
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import from_i420
@@ -50,7 +50,7 @@ class StreamHeader:
     @property
     def frame_bytes(self) -> int:
         """Bytes of the packed I420 frame that follows."""
-        return self.width * self.height * 3 // 2
+        return i420_bytes(self.width, self.height)
 
 
 def pack_header(header: StreamHeader) -> bytes:
@@ -201,4 +201,4 @@ def _connect(path: Path, deadline_s: float) -> socket.socket:
             if time.monotonic() >= deadline_s:
                 reason = exc.strerror or str(exc)
                 raise CameraError(f"{path}: no twin listens here ({reason}). Start the simulator first.") from exc
-            time.sleep(0.05)
+            time.sleep(READ_S)

@@ -19,8 +19,17 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from rhot_node.capture.camera import NS_PER_S, DelayedStart, EndOfRecording, Frame, available_delay_ns, wait_until
+from rhot_node.capture.camera import (
+    NS_PER_S,
+    DelayedStart,
+    EndOfRecording,
+    Frame,
+    available_delay_ns,
+    i420_bytes,
+    wait_until,
+)
 from rhot_node.clock import NodeClock
+from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, YuvImage, from_i420
 from rhot_node.errors import CameraError
 from rhot_node.files import open_input, read_document, require_file, write_document
@@ -52,13 +61,13 @@ class YuvHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def frame_bytes(self) -> int:
         """Bytes of one packed I420 frame."""
-        return self.width * self.height * 3 // 2
+        return i420_bytes(self.width, self.height)
 
     @property
     def period_ns(self) -> int:
-        """Typical time from frame to frame, ns; 1/30 s for a single frame."""
+        """Typical time from frame to frame, ns; that of a camera's settings for a single frame."""
         if len(self.times_ns) < 2:
-            return NS_PER_S // 30
+            return round(NS_PER_S / CameraSettings().fps)
         return int(np.median(np.diff(self.times_ns)))
 
 

@@ -108,7 +108,7 @@ def check_webcams(devices: Sequence[Device], open_with: OpenCamera = open_camera
             found.append(Check("webcam", "unknown", f"{device.path}: {device.problem}"))
             continue
         mode = device.mode
-        settings = CameraSettings(width=mode.width, height=mode.height, fps=mode.fps, exposure_us=0.5e6 / mode.fps)
+        settings = CameraSettings(width=mode.width, height=mode.height, fps=mode.fps, exposure_us=0.5 * 1e6 / mode.fps)
         try:
             camera = open_with(device.path, settings, NodeClock())
             try:

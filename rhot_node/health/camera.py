@@ -12,9 +12,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_node.capture.camera import FIRST_FRAME_S, Camera, Reporting
+from rhot_node.capture.camera import FIRST_FRAME_S, READ_S, Camera, Reporting
 from rhot_node.errors import CameraError
-from rhot_node.health.checks import BLACK_PICTURE, Check, is_black
+from rhot_node.health.checks import BLACK_PICTURE, STEP_PX, Check, is_black
 
 WINDOW_NS: Final = 2_000_000_000
 """ns over which the rate is measured."""
@@ -28,9 +28,7 @@ DARK_LUMA: Final = 63.0
 AUTOMATIC: Final = {"automatic exposure off": "exposure", "automatic white balance off": "white balance"}
 """Settings that a camera may refuse, and what it then goes on changing by itself."""
 
-_READ_S = 0.1  # longest wait for a frame
-_STEP_PX = 8  # from pixel to pixel whose luma is averaged
-_SILENT_READS = round(FIRST_FRAME_S / _READ_S)
+_SILENT_READS = round(FIRST_FRAME_S / READ_S)
 
 
 class RateMeter:
@@ -58,7 +56,7 @@ class RateMeter:
 
 def brightness(luma: NDArray[np.uint8]) -> float:
     """Mean grey level of a picture (H, W)."""
-    return float(np.mean(luma[::_STEP_PX, ::_STEP_PX]))
+    return float(np.mean(luma[::STEP_PX, ::STEP_PX]))
 
 
 def check_rate(rate_hz: float | None, asked_hz: float | None, luma: float, *, exposure_us: float | None = None,
@@ -108,7 +106,7 @@ def watch_camera(camera: Camera, asked_hz: float) -> list[Check]:
     """Read an open camera for as long as its rate takes to measure; what is wrong with it. Raises CameraError."""
     meter, first_ns, silent = RateMeter(), None, 0
     while True:
-        frame = camera.read(_READ_S)
+        frame = camera.read(READ_S)
         if frame is None:
             silent += 1
             if silent > _SILENT_READS:

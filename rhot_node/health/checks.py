@@ -63,12 +63,12 @@ NOW = Throttled.UNDER_VOLTAGE | Throttled.CAPPED | Throttled.THROTTLED | Throttl
 BLACK_LUMA = 32  # grey levels: twice the black of video range (ITU-R BT.601: 16)
 BLACK_SHARE = 99.0  # per cent of the pixels; a lamp's reflection on a lens cap is smaller than the rest
 BLACK_PICTURE = Check("black", "warning", "Its camera's picture is black.", "Is the lens covered?")
-_BLACK_STEP_PX = 16
+STEP_PX = 8  # from pixel to pixel of a picture that is judged
 
 
 def is_black(luma: NDArray[np.uint8]) -> bool:
     """Whether a picture (H, W) shows nothing at all: its lens is covered, or there is no light."""
-    return bool(np.percentile(luma[::_BLACK_STEP_PX, ::_BLACK_STEP_PX], BLACK_SHARE) < BLACK_LUMA)
+    return bool(np.percentile(luma[::STEP_PX, ::STEP_PX], BLACK_SHARE) < BLACK_LUMA)
 
 
 def check_power(flags: Throttled | None) -> Check:

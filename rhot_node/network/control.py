@@ -16,7 +16,7 @@ import msgspec
 import zmq
 
 from rhot_node.config import NodeSettings
-from rhot_node.errors import LinkError, printable
+from rhot_node.errors import NAME_LIMIT, LinkError, printable
 from rhot_node.files import MIB
 from rhot_node.keys import NodeTrust, serve_with
 from rhot_node.logs import LogLimit
@@ -182,7 +182,6 @@ class ControlServer:
 _ENDPOINT = "inproc://zeromq.zap.01"
 _DOMAIN = b"rhot-node"
 _VERSION = b"1.0"
-_KEY_LENGTH = 32
 
 
 class Gate:
@@ -206,10 +205,10 @@ class Gate:
         """Decide about one handshake that waits."""
         _, request_id, domain, address, _, mechanism, *credentials = self.socket.recv_multipart()
         key = credentials[0].hex() if mechanism == b"CURVE" and credentials else ""
-        admitted = domain == _DOMAIN and len(key) == 2 * _KEY_LENGTH and self.trust.admits(key)
+        admitted = domain == _DOMAIN and self.trust.admits(key)
         if not admitted:
             self.refused += 1
-            self._tell(printable(address.decode(errors="replace"), 64), key)
+            self._tell(printable(address.decode(errors="replace"), NAME_LIMIT), key)
         status = (b"200", b"OK", key.encode()) if admitted else (b"400", b"not paired with this node", b"")
         self.socket.send_multipart([_VERSION, request_id, *status, b""])
 

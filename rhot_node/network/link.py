@@ -19,6 +19,7 @@ from rhot_node.network.presence import Presence
 from rhot_node.network.session import LinkKeys, Sessions, Stream
 from rhot_node.threads import Worker
 from rhot_node.wire.codec import Seal, asks_who_is_there, decode, encode
+from rhot_node.wire.fields import RECEIVE_MAX
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
@@ -33,7 +34,6 @@ from rhot_node.wire.messages import (
 
 log = logging.getLogger(__name__)
 
-DATAGRAM_MAX = 8192  # bytes; the longest start message has 4108
 ANSWERS_PER_S = 20  # to strangers who ask who is there
 BURST = 64  # datagrams taken from one socket before looking at the other one and at the end
 
@@ -94,7 +94,7 @@ class UdpLink:
             sock, kernel_time = self._sockets[number]
             for _ in range(BURST):
                 try:
-                    data, ancillary, _, sender = sock.recvmsg(DATAGRAM_MAX, ANCILLARY_SIZE, socket.MSG_DONTWAIT)
+                    data, ancillary, _, sender = sock.recvmsg(RECEIVE_MAX, ANCILLARY_SIZE, socket.MSG_DONTWAIT)
                 except BlockingIOError:
                     break
                 except OSError as exc:

@@ -24,6 +24,7 @@ from rhot_node.foreground_store import ForegroundStore
 from rhot_node.network.pictures import PictureBox, StillFormat, encode_still
 from rhot_node.network.session import LinkKeys, Sessions
 from rhot_node.video.recorder import READ_MAX, VideoName, VideoRecorder
+from rhot_node.wire.messages import U64_MAX
 
 log = logging.getLogger(__name__)
 
@@ -319,7 +320,7 @@ class Responder:
                 "number": picture.number, "t_node_ns": picture.t_node_ns}, still.data
 
     def _start(self, request: StartRequest, master: str) -> dict[str, Any]:
-        if request.session >= 1 << 64:
+        if request.session > U64_MAX:
             raise NodeError(f"session {request.session} does not fit 64 bits.")
         try:
             host = str(ipaddress.IPv4Address(request.host))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import KEY_LENGTH, Seal, decode_verified, is_tagged
-from rhot_node.wire.messages import Message
+from rhot_node.wire.messages import U32_MAX, Message
 from rhot_node.wire.sequence import SequenceVerdict, SequenceWindow
 
 log = logging.getLogger(__name__)
@@ -115,8 +115,6 @@ class Sessions:
 LINKS_MAX = 8
 """Links kept; the one that was silent longest goes first. Each costs a wrong datagram one more verification."""
 
-_ANY_JUMP = 1 << 32  # a tagged number may be any distance ahead: the master counted on while the network was down
-
 
 class Link:
     """One link: its key, whose it is, and which numbers it has used. Messages are taken by one thread."""
@@ -132,7 +130,8 @@ class Link:
 
     def is_new(self, message: Message) -> bool:
         """Whether the message comes for the first time; it never does again."""
-        window = self._windows.setdefault(type(message), SequenceWindow(longest_jump=_ANY_JUMP))
+        # it may be any distance ahead: the master counted on while the network was down
+        window = self._windows.setdefault(type(message), SequenceWindow(longest_jump=U32_MAX))
         verdict = window.judge(message.sequence)
         if verdict is not SequenceVerdict.FRESH and verdict is not SequenceVerdict.LATE:
             return False

@@ -25,7 +25,7 @@ from msgspec import Meta
 from rhot_node.capture.camera import Frame
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import NodeError, VideoError
-from rhot_node.files import KIB, MIB, open_input, read_document, write_document
+from rhot_node.files import KIB, MIB, free_bytes, open_input, read_document, write_document
 from rhot_node.threads import OneShotThread
 from rhot_node.video.avi import BYTES_MAX, Stamp, append_picture, begin_video, encode_picture, finish_video
 from rhot_node.wire.messages import U32_MAX
@@ -71,12 +71,6 @@ class VideoInfo(msgspec.Struct, frozen=True):
 def video_folder(settings: Path) -> Path:
     """Where the videos of the node with this settings file lie."""
     return settings.with_name(f"{settings.stem}.videos")
-
-
-def free_bytes(folder: Path) -> int:
-    """What an ordinary user may still write in `folder`; raises OSError."""
-    facts = os.statvfs(folder)
-    return facts.f_bavail * facts.f_frsize
 
 
 class VideoRecorder:
@@ -262,7 +256,8 @@ class _Take:
             while (item := self._next()) is not None:
                 image, stamp = item
                 if file is None:
-                    handle = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+                    handle = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC,
+                                     stat.S_IRUSR | stat.S_IWUSR)
                     file = stack.enter_context(os.fdopen(handle, "wb"))
                     self._image_size = image.size
                     begin_video(file, *image.size)

@@ -12,6 +12,9 @@ import msgspec
 U32_MAX = 2**32 - 1
 """Of a field of 32 bits: sequence and frame numbers begin anew behind it."""
 
+U64_MAX = 2**64 - 1
+PORT_MAX = 65535
+
 BROADCAST_PORT, UDP_PORT, CONTROL_PORT, PREVIEW_PORT, PAIRING_PORT = 47799, 47800, 47801, 47802, 47803
 """A node's ports unless its settings say otherwise (docs/node.md)."""
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import pytest
 from patience import PATIENCE_S
 
-from rhot_node.network import announce
+from rhot_node.network import presence as announce
 from rhot_node.network.presence import (
     SERVICE,
     Announcer,

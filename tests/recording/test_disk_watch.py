@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rhot_app.recording.recorder import WINDOW_S, DiskWatch, free_bytes
+from rhot_app.recording.recorder import WINDOW_S, DiskWatch
+from rhot_node.files import free_bytes
 
 
 def test_the_rate_is_that_of_the_last_seconds() -> None:

@@ -22,7 +22,7 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import Intrinsics, Rig, RigNode, TrackerSettings, load_rig
 from rhot_app.rig_history import accept
 from rhot_app.sources.local_nodes import NodePorts
-from rhot_node.config import CameraSettings, NodeSettings
+from rhot_node.config import FPS, CameraSettings, NodeSettings
 from rhot_node.files import PRINTABLE, read_document, resource_path, write_document
 from rhot_node.landmarks.install import installed_folder
 from rhot_node.markers import load_markers
@@ -59,7 +59,7 @@ class LocalCamera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     spec: Annotated[str, Meta(min_length=1, max_length=4096)]
     width: Annotated[int, Meta(ge=16, le=16384, multiple_of=2)]
     height: Annotated[int, Meta(ge=16, le=16384, multiple_of=2)]
-    fps: Annotated[float, Meta(ge=0.1, le=1000)]
+    fps: Annotated[float, Meta(ge=FPS[0], le=FPS[1])]
     film: bool = False
     turned: bool = False
     mirrored: bool = False
@@ -162,7 +162,7 @@ def node_settings(camera: LocalCamera, node: RigNode, rig: Rig, kept: NodeSettin
 
 def camera_controls(camera: LocalCamera | CameraSource) -> CameraSettings:
     """What a camera is told that nobody has set yet: its mode, and an exposure of half a frame."""
-    return CameraSettings(width=camera.width, height=camera.height, fps=camera.fps, exposure_us=0.5e6 / camera.fps,
+    return CameraSettings(width=camera.width, height=camera.height, fps=camera.fps, exposure_us=0.5 * 1e6 / camera.fps,
                           turned=camera.turned, mirrored=camera.mirrored)
 
 

@@ -16,7 +16,7 @@ from rhot_node.capture.v4l2 import USUAL, Device, Mode, list_devices, look_at_de
 from rhot_node.capture.webcam import NetworkCamera, shown_url
 from rhot_node.capture.yuv import HEADER_NAME, read_header
 from rhot_node.clock import NodeClock
-from rhot_node.config import CameraSettings
+from rhot_node.config import FPS, CameraSettings
 from rhot_node.errors import CameraError, PictureError
 from rhot_node.files import why
 from rhot_node.pictures import open_video, read_picture
@@ -111,7 +111,7 @@ def _recorded(path: Path) -> CameraSource:
         fps, count = float(capture.get(cv2.CAP_PROP_FPS)), float(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     finally:
         capture.release()
-    fps = fps if 0.1 <= fps <= 1000.0 else USUAL.fps
+    fps = fps if FPS[0] <= fps <= FPS[1] else USUAL.fps
     return CameraSource(str(path), path.name, _even(picture.shape[1]), _even(picture.shape[0]), fps, count / fps)
 
 

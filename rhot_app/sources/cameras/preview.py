@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.sources.cameras.camera_set import CameraSource, camera_controls
-from rhot_node.capture.camera import Camera, EndOfRecording, Reporting, Rewindable
+from rhot_node.capture.camera import FIRST_FRAME_S, READ_S, Camera, EndOfRecording, Reporting, Rewindable
 from rhot_node.capture.open import open_camera
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import CameraError
 from rhot_node.health.camera import RateMeter, brightness, camera_troubles
-from rhot_node.health.checks import Check, is_black
+from rhot_node.health.checks import STEP_PX, Check, is_black
 from rhot_node.threads import OneShotThread
 
 Picture = NDArray[np.uint8]
@@ -29,8 +29,6 @@ PICTURE_S: Final = 1.0 / 15.0
 ONE_COLOUR: Final = 1.5
 """Grey levels: standard deviation of luma and chroma below which a picture shows nothing. A sensor's noise has more."""
 
-_READ_S = 0.1
-_STEP_PX = 8
 
 
 class CameraPreview:
@@ -70,7 +68,7 @@ class CameraPreview:
         """Let go of the source soon; `wait` says when."""
         self._ending.set()
 
-    def wait(self, timeout_s: float = 5.0) -> bool:
+    def wait(self, timeout_s: float = FIRST_FRAME_S) -> bool:
         """Whether the source was let go of in time."""
         self._task.join(timeout_s)
         return not self._task.running
@@ -90,7 +88,7 @@ class CameraPreview:
         try:
             while not self._ending.is_set():
                 try:
-                    frame = camera.read(_READ_S)
+                    frame = camera.read(READ_S)
                 except EndOfRecording:
                     if isinstance(camera, Rewindable):
                         camera.rewind()
@@ -115,7 +113,7 @@ def fault_of(image: YuvImage) -> str:
     """What a picture alone says against its camera; "" for nothing."""
     if is_black(image.y):
         return "The picture is black. Is the lens covered, or a shutter closed?"
-    spread = max(float(np.std(plane[::_STEP_PX, ::_STEP_PX])) for plane in (image.y, image.u, image.v))
+    spread = max(float(np.std(plane[::STEP_PX, ::STEP_PX])) for plane in (image.y, image.u, image.v))
     if spread < ONE_COLOUR:
         return ("The picture has one colour only: the camera sends nothing useful. Choose another size, or plug it in "
                 "again.")

@@ -21,7 +21,8 @@ from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.pose import Validity
 from rhot_app.objects.stream import FARTHEST_M
 from rhot_app.sources.poses.source import ForeignPose, StreamNoise
-from rhot_node.errors import printable
+from rhot_node.errors import NAME_LIMIT, printable
+from rhot_node.wire.fields import TIME_MAX_NS
 
 Array = NDArray[np.float64]
 
@@ -60,7 +61,7 @@ def parse_line(line: bytes) -> PoseLine | None:
         t_s, *numbers = (float(word) for word in (words[0], *words[2:]))
     except ValueError as exc:
         raise ValueError("a word that is no number") from exc
-    if not all(map(math.isfinite, (t_s, *numbers))) or abs(t_s) > 1e10:
+    if not all(map(math.isfinite, (t_s, *numbers))) or abs(t_s) > 1e-9 * TIME_MAX_NS:
         raise ValueError("a number that is not finite")
     if max(map(abs, numbers[:3])) > FARTHEST_M:
         raise ValueError("a place beyond 1 km; metres are needed")
@@ -193,7 +194,7 @@ class LinePoses:
         if read.device == self.device:
             return read
         self.others += 1
-        self._other = printable(read.device, 40)
+        self._other = printable(read.device, NAME_LIMIT)
         return None
 
     def _refuse(self, line: bytes, reason: str) -> None:

@@ -17,12 +17,14 @@ from rhot_app.errors import SourceError
 from rhot_app.sources.poses.lines import LinePoses
 from rhot_app.sources.poses.source import FilePoses, PoseSource
 from rhot_node.errors import printable
+from rhot_node.files import KIB
+from rhot_node.wire.messages import PORT_MAX
 
 LIBSURVIVE: tuple[str, ...] = ("survive-cli", "--record-stdout", "1", "--record-rawlight", "0", "--record-imu", "0",
                                "--record-angle", "0")
 """Prints poses without the measurements that they were made of."""
 
-_READ_BYTES = 1 << 16
+_READ_BYTES = 64 * KIB
 _READS = 16  # of one call: what comes faster than a mebibyte a call waits for the next
 _END_S = 2.0
 _CONNECT_S = 3.0
@@ -178,8 +180,8 @@ def command_of(text: str) -> list[str]:
 def endpoint_of(text: str, host: str) -> tuple[str, int]:
     """Host and port of ``HOST:PORT`` or ``PORT``; `host` where none is named. Raises SourceError."""
     named, _, port = text.rpartition(":")
-    if not port.isdecimal() or not 0 < int(port) < 65536:
-        raise SourceError(f"{printable(text)!r} is no address. Write HOST:PORT or PORT, a port from 1 to 65535.")
+    if not port.isdecimal() or not 1 <= int(port) <= PORT_MAX:
+        raise SourceError(f"{printable(text)!r} is no address. Write HOST:PORT or PORT, a port from 1 to {PORT_MAX}.")
     return named or host, int(port)
 
 

@@ -15,8 +15,6 @@ from rhot_node.terminal import add_examples
 if TYPE_CHECKING:
     from rhot_app.sources.poses.source import ForeignPose, PoseSource
 
-SECONDS_MAX = 86400.0
-_POLL_S = 0.004  # a Vive tracker has 4 to 8 ms between poses
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,8 +39,6 @@ def run(args: argparse.Namespace) -> int:
     from rhot_node.compiled import announce_compilation
     from rhot_node.files import require_replaceable
 
-    if not 0.0 < args.seconds <= SECONDS_MAX:
-        raise SourceError(f"--seconds is a number above 0 and up to {SECONDS_MAX:.0f}, not {args.seconds:g}.")
     if args.out is not None:
         if not args.out.parent.is_dir():
             raise SourceError(f"{args.out}: there is no folder {args.out.parent}. Make it first, or name another.")
@@ -72,12 +68,13 @@ def run(args: argparse.Namespace) -> int:
 def listen(source: PoseSource, seconds: float) -> list[ForeignPose]:
     """The poses of the next `seconds`, or until the source ends."""
     from rhot_app.progress import ProgressLine
+    from rhot_app.sources.poses.followed import POLL_S
 
     line, found = ProgressLine("listening"), list(source.poll())
     began = time.monotonic()
     while not source.ended and (elapsed := time.monotonic() - began) < seconds:
         line.report(source.notice or "listening", elapsed / seconds)
-        time.sleep(_POLL_S)
+        time.sleep(POLL_S)
         found += source.poll()
     return found
 

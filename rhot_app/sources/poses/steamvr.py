@@ -14,7 +14,7 @@ from rhot_app.errors import SourceError
 from rhot_app.geometry.transforms import best_rotation, rigid
 from rhot_app.objects.pose import Validity
 from rhot_app.sources.poses.source import UNKNOWN_COVARIANCE, UNKNOWN_POSE, ForeignPose, StreamNoise
-from rhot_node.errors import printable
+from rhot_node.errors import NAME_LIMIT, printable
 
 Array = NDArray[np.float64]
 
@@ -131,12 +131,12 @@ class SteamVrPoses:
             return ""
         if not self._trackers:
             return "SteamVR has no tracker. Switch one on, and pair it in SteamVR."
-        there = ", ".join(f"{printable(serial, 40)} ({printable(role, 40)})" if role else printable(serial, 40)
-                          for serial, role in self._trackers.values())
+        there = ", ".join(f"{printable(serial, NAME_LIMIT)} ({printable(role, NAME_LIMIT)})" if role else
+                          printable(serial, NAME_LIMIT) for serial, role in self._trackers.values())
         if not self._chosen:
             return f"SteamVR has {len(self._trackers)} trackers: {there}. Choose one by its serial number or role."
-        return (f"SteamVR has no tracker {printable(self._chosen, 40)!r}, or several. Choose one by its serial number "
-                f"or role: {there}.")
+        return (f"SteamVR has no tracker {printable(self._chosen, NAME_LIMIT)!r}, or several. Choose one by its serial "
+                f"number or role: {there}.")
 
     def _text(self, index: int, which: Any) -> str:
         try:
