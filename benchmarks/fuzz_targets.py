@@ -11,7 +11,8 @@ import numpy as np
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.project import Rig
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
-from rhot_app.sources.node_link import PENDING_MAX, NodeLink
+from rhot_app.sources.node_link import NodeLink
+from rhot_app.sources.searches import REMEMBERED
 from rhot_app.sources.validation import OLDEST_FRAME_NS
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.clock import NodeClock
@@ -249,7 +250,7 @@ class Replies:
             self._refused[exc.reason] = self._refused.get(exc.reason, 0) + 1
             return False
         taken = isinstance(reply, ClockReply) and self._link.take_reply(reply, NOW_NS)
-        if taken and len(self._link._pending) > PENDING_MAX:
+        if taken and len(self._link._pending) > REMEMBERED:
             raise WronglyTakenError("questions pile up")
         if not taken:
             self._refused["unasked"] = self._refused.get("unasked", 0) + 1

@@ -16,7 +16,7 @@ from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources import lost_nodes
 from rhot_app.sources.discovery import Found, Sighting
 from rhot_app.sources.links import UdpNodes
-from rhot_app.sources.lost_nodes import BROWSE_NS, LOST_NS, PLACES_MAX, TRIED_NS, LostNodes
+from rhot_app.sources.lost_nodes import LOST_NS, PATIENT_NS, PLACES_MAX, LostNodes
 from rhot_app.sources.node_link import NodeLink
 
 SOON_NS = 300_000_000
@@ -127,7 +127,7 @@ def test_a_rig_of_this_machine_alone_asks_no_network(monkeypatch: pytest.MonkeyP
     for second in range(12):
         clock.lost.step(second * 10**9)
     assert clock.lost._questions is not None and clock.lost._questions._broadcasts() == ["127.255.255.255"]
-    assert clock.opened == 0 and BROWSE_NS < 8 * 10**9
+    assert clock.opened == 0 and PATIENT_NS < 8 * 10**9
 
 
 def test_few_places_are_tried_and_each_gets_its_turn(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -140,13 +140,13 @@ def test_few_places_are_tried_and_each_gets_its_turn(monkeypatch: pytest.MonkeyP
         clock.see(f"10.0.0.{last}", now_ns)
         clock.see(f"10.0.0.{last}", now_ns)
     assert clock.places() == [f"10.0.0.{last}" for last in range(20, 20 + PLACES_MAX)]
-    clock.see("10.0.0.50", now_ns + TRIED_NS)
+    clock.see("10.0.0.50", now_ns + LOST_NS)
     assert clock.places() == ["10.0.0.21", "10.0.0.22", "10.0.0.23", "10.0.0.50"]
     clock.lost._announced.append(Sighting(presence(clock.link.node.node_id + 1), "10.0.0.60"))
-    clock.lost.step(now_ns + 2 * TRIED_NS)
+    clock.lost.step(now_ns + 2 * LOST_NS)
     assert "10.0.0.60" not in clock.places(), "another node's"
     assert clock.lost.at(clock.link, ("10.0.0.50", clock.link.node.udp_port)) is not None
     assert clock.lost.at(clock.link, ("10.0.0.50", 9)) is None
-    clock.link.last_reply_ns = now_ns + 2 * TRIED_NS
-    clock.lost.step(now_ns + 2 * TRIED_NS)
+    clock.link.last_reply_ns = now_ns + 2 * LOST_NS
+    clock.lost.step(now_ns + 2 * LOST_NS)
     assert clock.places() == []
