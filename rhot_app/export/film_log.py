@@ -6,14 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
-
 from rhot_app.errors import RecordingError
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Intrinsics, load_rig
-from rhot_app.sources.frame_sets import on_one_clock, open_videos, picture_files, picture_size
-from rhot_node.errors import PictureError
-from rhot_node.pictures import open_video
+from rhot_app.sources.frame_sets import on_one_clock, open_videos
+from rhot_app.sources.recorded_pictures import recorded_pictures
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,19 +24,13 @@ class ChosenFilm:
 
 def describe_film(path: Path) -> str:
     """What a film is, e.g. "640 x 480 px, 30 images/s, 12.0 s". Raises RecordingError when it is none."""
-    width, height = picture_size(path)
-    size = f"{width} x {height} px"
-    if pictures := picture_files(path):
-        return f"{size}, {len(pictures)} picture{'s' if len(pictures) > 1 else ''}"
-    if path.is_dir():
-        return size
-    try:
-        capture = open_video(path)
-    except PictureError as exc:
-        raise RecordingError(str(exc)) from exc
-    rate, count = capture.get(cv2.CAP_PROP_FPS), capture.get(cv2.CAP_PROP_FRAME_COUNT)
-    capture.release()
-    return f"{size}, {rate:.4g} images/s, {count / rate:.1f} s" if rate > 0.0 and count > 0.0 else size
+    source = recorded_pictures(path)
+    size = f"{source.size[0]} x {source.size[1]} px"
+    if source.files:
+        return f"{size}, {source.count} picture{'s' if source.count > 1 else ''}"
+    if source.fps > 0.0 and source.count:
+        return f"{size}, {source.fps:.4g} images/s, {source.count / source.fps:.1f} s"
+    return size
 
 
 def log_films(rig_file: Path | None, films: Sequence[ChosenFilm], log: Path, *,

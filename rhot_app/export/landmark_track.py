@@ -38,7 +38,8 @@ from rhot_app.recording.raw_log import FILMS, LogReader, filmed_at
 from rhot_app.rig_history import accept_hand
 from rhot_app.sources.film_offset import filmed
 from rhot_app.sources.films import NamedFilm
-from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out, picture_size
+from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out
+from rhot_app.sources.recorded_pictures import recorded_pictures
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
 from rhot_app.tracking.rig_arrays import rigs_of_hands
@@ -106,7 +107,7 @@ def assumed_rig(videos: list[str]) -> Rig:
                              "rhot calibrate stereo makes one from films of a board, rhot calibrate import from "
                              "another program's calibration. One video alone is tracked without." if videos else
                              "give a video, or a rig with --rig and a video of each camera.")
-    lens = Intrinsics.assumed(*picture_size(input_file(videos[0])))
+    lens = Intrinsics.assumed(*recorded_pictures(input_file(videos[0])).size)
     return Rig("one assumed camera", (RigNode(1, "camera", lens),))
 
 
@@ -249,7 +250,7 @@ def _names(videos: Sequence[CameraVideo], films: Sequence[HandFilm], first_s: fl
 def _taken(videos: Sequence[CameraVideo], films: Sequence[HandFilm], first_s: float) -> dict[str, Any]:
     """When the films were taken, by the first one that says it; nothing where none does."""
     for video, film in zip(videos, films, strict=True):
-        when = None if video.stamped or video.pictures or video.path.is_dir() else filmed(video.path)
+        when = None if video.stamped or video.source.files or video.path.is_dir() else filmed(video.path)
         if when is not None:
             return filmed_at(when, FIRST_NS + round(1e9 * (float(film.times_s[0]) - first_s)))
     return {}

@@ -11,30 +11,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-import cv2
 import msgspec
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import FILMS, LogReader
 from rhot_app.recording.video import video_path
 from rhot_app.sources.frame_sets import CameraVideo, on_master_clock, open_video
-from rhot_node.errors import PictureError
-from rhot_node.files import open_input
-from rhot_node.pictures import decode_picture, read_picture
-from rhot_node.pictures import open_video as decoder
-from rhot_node.video.avi import pictures_of
-
-Image = NDArray[np.uint8]
 
 _PERIODS: Final = 2.0
 """Farther from a picture than this many of its periods there is none: frames were lost."""
-
-_READ_ON: Final = 30
-"""Frames that are passed over one by one; a decoder that is sent farther begins at the key frame before."""
 
 
 class NamedFilm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -96,57 +84,3 @@ def _named(value: object, log: Path) -> Mapping[str, NamedFilm]:
         return msgspec.convert(value or {}, dict[str, NamedFilm])
     except msgspec.ValidationError as exc:
         raise RecordingError(f"{log}: its header names films in a form that cannot be read ({exc}).") from exc
-
-
-class FilmReader:
-    """Pictures of one video in any order; quick where they follow each other."""
-
-    def __init__(self, video: CameraVideo) -> None:
-        """Raises RecordingError when the file cannot be opened."""
-        self._video = video
-        self._places: list[tuple[int, int]] = []
-        self._capture: cv2.VideoCapture | None = None
-        self._next = 0
-        try:
-            if video.stamped:
-                with open_input(video.path) as file:
-                    self._places = [(picture.offset, picture.size) for picture in pictures_of(file)]
-            elif not video.pictures:
-                self._capture = decoder(video.path)
-        except (OSError, PictureError) as exc:
-            raise self._lost(exc) from exc
-
-    def picture(self, number: int) -> Image | None:
-        """(H, W, 3) RGB; None where it is damaged. Raises RecordingError when the file is gone."""
-        try:
-            found = self._decoded(number)
-        except PictureError:
-            return None
-        except OSError as exc:
-            raise self._lost(exc) from exc
-        return None if found is None else np.ascontiguousarray(found[..., ::-1])
-
-    def _decoded(self, number: int) -> Image | None:
-        if self._video.pictures:
-            return read_picture(self._video.pictures[number])
-        if self._capture is None:
-            offset, size = self._places[number]
-            with open_input(self._video.path) as file:
-                file.seek(offset)
-                return decode_picture(file.read(size))
-        if not 0 <= number - self._next <= _READ_ON:
-            self._capture.set(cv2.CAP_PROP_POS_FRAMES, number)
-            self._next = number
-        while self._next < number and self._capture.grab():
-            self._next += 1
-        read, picture = self._capture.read()
-        self._next += 1
-        return np.asarray(picture, np.uint8) if read else None
-
-    def _lost(self, exc: Exception) -> RecordingError:
-        return RecordingError(f"{self._video.path}: cannot be shown ({exc}). Is it still there?")
-
-    def close(self) -> None:
-        """Let go of the file. May be called twice."""
-        if self._capture is not None:
-            self._capture.release()

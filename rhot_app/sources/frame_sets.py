@@ -2,7 +2,7 @@
 
 In ordinary videos the time of a frame follows from its number; the twin's recordings of raw frames state it. The nodes'
 own recordings state it too, and the log beside them takes it to the master's clock. Pictures of a folder are a video,
-and one picture is a video in which nothing moves. Frames are decoded as they are asked for; no video is kept in memory.
+and one picture is a video in which nothing moves.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,16 +22,9 @@ from rhot_app.project import Intrinsics, Rig, RigNode
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import video_path
 from rhot_app.sources.clock import ClockEstimate
+from rhot_app.sources.recorded_pictures import FilmReader, RecordedPictures, recorded_pictures
 from rhot_app.sources.replay import LogValidator
-from rhot_node.capture.paced import IMAGE_SUFFIXES
-from rhot_node.capture.yuv import HEADER_NAME, read_header, read_images
 from rhot_node.config import CameraSettings
-from rhot_node.detect.image import to_bgr
-from rhot_node.errors import CameraError, PictureError, VideoError
-from rhot_node.files import open_input, require_file, why
-from rhot_node.pictures import decode_picture, read_picture
-from rhot_node.pictures import open_video as decoder
-from rhot_node.video.avi import Stamp, pictures_of, read_stamps
 
 Image = NDArray[np.uint8]
 Times = NDArray[np.int64]
@@ -49,21 +41,28 @@ _CLOCK_EVERY_NS = 1_000_000_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraVideo:
-    """One camera's video. `times_ns` (N,): mid-exposure of the middle row of every frame. `stamped`: the node wrote
-    these times, by its own clock until `on_master_clock`; else they are of a clock that all videos have. `pictures`:
-    the picture files of its frames, where it is no one file."""
+    """One camera's video. `times_ns` (N,): mid-exposure of the middle row of every frame."""
 
     camera: str
-    path: Path
+    source: RecordedPictures
     lens: Intrinsics
     times_ns: Times
-    stamped: bool
-    pictures: tuple[Path, ...] = ()
+
+    @property
+    def path(self) -> Path:
+        """The file or folder."""
+        return self.source.path
+
+    @property
+    def stamped(self) -> bool:
+        """Whether the node wrote the times, by its own clock until `on_master_clock`; else they are of a clock that all
+        videos have."""
+        return bool(self.source.stamps)
 
     @property
     def still(self) -> bool:
         """Whether all frames are one picture."""
-        return len(set(self.pictures)) == 1
+        return len(self.source.files) == 1
 
     @property
     def period_ns(self) -> int:
@@ -73,53 +72,19 @@ class CameraVideo:
     def frames(self, wanted: NDArray[np.bool_] | None = None) -> Iterator[tuple[int, Image]]:
         """(time ns, picture (H, W, 3) RGB) of every frame, or of those that are `wanted` (N,). Raises RecordingError
         where a frame has another size; a video that ends too early is noted as a loss."""
-        chosen = np.ones(len(self.times_ns), np.bool_) if wanted is None else wanted
-        decode = (self._picture_files if self.pictures else self._raw_pictures if self.path.is_dir()
-                  else self._stamped_pictures if self.stamped else self._pictures)
-        read = 0
-        for k, picture in decode(chosen):
-            read = k + 1
-            if picture is not None:
-                _check_size(self.path, self.camera, (picture.shape[1], picture.shape[0]), self.lens)
-                yield int(self.times_ns[k]), np.ascontiguousarray(picture[..., ::-1])
-        missing = len(self.times_ns) - read
+        chosen = np.arange(len(self.times_ns)) if wanted is None else np.flatnonzero(wanted)
+        with contextlib.closing(FilmReader(self.source, in_order=True)) as reader:
+            for k in chosen.tolist():
+                picture = reader.picture(k)
+                if picture is not None:
+                    _check_size(self.path, self.camera, (picture.shape[1], picture.shape[0]), self.lens)
+                    yield int(self.times_ns[k]), picture
+                elif reader.ended:
+                    break
+            missing = len(self.times_ns) - reader.passed if reader.ended else 0
         if missing * self.period_ns > 1_000_000_000:  # containers may miscount by a frame or a few
             note_loss(str(self.path), f"{self.path}: {missing} of its {len(self.times_ns)} frames cannot be read; is "
                                       "the file complete?")
-
-    def _pictures(self, chosen: NDArray[np.bool_]) -> Iterator[tuple[int, Image | None]]:
-        with _opened(self.path) as capture:
-            for k, keep in enumerate(chosen):
-                if not capture.grab():
-                    return
-                picture = capture.retrieve()[1] if keep else None
-                yield k, None if picture is None else np.asarray(picture, np.uint8)
-
-    def _picture_files(self, chosen: NDArray[np.bool_]) -> Iterator[tuple[int, Image | None]]:
-        read: tuple[Path, Image] | None = None
-        for k, path in enumerate(self.pictures):
-            if chosen[k] and (read is None or read[0] != path):
-                try:
-                    read = path, read_picture(path)
-                except PictureError as exc:
-                    raise RecordingError(str(exc)) from exc
-            yield k, read[1] if chosen[k] and read is not None else None
-
-    def _raw_pictures(self, chosen: NDArray[np.bool_]) -> Iterator[tuple[int, Image | None]]:
-        for k, image in enumerate(read_images(self.path)):
-            yield k, to_bgr(image) if chosen[k] else None
-
-    def _stamped_pictures(self, chosen: NDArray[np.bool_]) -> Iterator[tuple[int, Image | None]]:
-        with open_input(self.path) as file:
-            for k, stored in enumerate(pictures_of(file)):
-                if k >= len(chosen):
-                    return
-                picture = None
-                if chosen[k]:
-                    file.seek(stored.offset)
-                    with contextlib.suppress(PictureError):
-                        picture = decode_picture(file.read(stored.size))
-                yield k, picture
 
     def some(self, wanted: NDArray[np.bool_], most: int) -> list[Image]:
         """At most `most` of the pictures `wanted` (N,), evenly spread."""
@@ -131,41 +96,35 @@ class CameraVideo:
 
 
 def open_video(node: RigNode, path: Path, fps: float | None = None) -> CameraVideo:
-    """The video of a camera of the rig: a file, a picture, or a folder of pictures or of raw frames (``rhot-yuv``).
-    `fps`: of an ordinary video, instead of the rate that its file says, and of the pictures of a folder.
+    """The video of a camera of the rig. `fps`: of an ordinary video, instead of the rate that its file says, and of the
+    pictures of a folder.
 
     Raises RecordingError: no video, a picture of another size than the lens's, or no frame rate.
     """
-    if pictures := picture_files(path):
-        return _open_pictures(node, path, pictures, fps)
-    if path.is_dir():
-        return _open_raw(node, path, fps)
-    try:
-        require_file(path)
-        stamps = read_stamps(path) if path.suffix.lower() == ".avi" else ()
-    except VideoError:
-        stamps = ()  # an ordinary AVI file
-    except FileNotFoundError as exc:
-        raise RecordingError(f"{path}: no such file.") from exc
-    except (OSError, ValueError) as exc:
-        raise RecordingError(f"{path}: cannot be read ({why(exc)}).") from exc
-    with _opened(path) as capture:
-        read, picture = capture.read()
-        if not read:
-            raise RecordingError(f"{path}: no frame of it can be decoded. Is it a video, and complete?")
-        _check_size(path, node.name, (picture.shape[1], picture.shape[0]), node.intrinsics)
-        count, said = int(capture.get(cv2.CAP_PROP_FRAME_COUNT)), float(capture.get(cv2.CAP_PROP_FPS))
-    if stamps:
-        if fps is not None:
-            raise RecordingError(f"{path}: a node recorded it with the time of every frame; leave --fps out.")
-        return CameraVideo(node.name, path, node.intrinsics, _middle_row_times(stamps, node), True)
-    rate = said if fps is None else fps
+    source = recorded_pictures(path)
+    _check_size(path, node.name, source.size, node.intrinsics)
+    return CameraVideo(node.name, source, node.intrinsics, _times_ns(source, node, fps))
+
+
+def _times_ns(source: RecordedPictures, node: RigNode, fps: float | None) -> Times:
+    """(N,) as in `CameraVideo`, with the rig's calibrated correction of the camera. Raises RecordingError."""
+    path, count, rate = source.path, source.count, fps or source.fps
+    if fps is not None and (source.stamps or source.header is not None):
+        raise RecordingError(f"{path}: it was recorded with the time of every frame; leave --fps out.")
+    correction, half = round(1e9 * node.time_offset_s), 0.5 * (node.intrinsics.height - 1)
+    if source.stamps:
+        return np.array([one.t_node_ns + round(half * one.row_time_ns) + correction for one in source.stamps], np.int64)
+    if source.header is not None:
+        return np.array(source.header.times_ns, np.int64) + round(half * source.header.row_time_ns) + correction
+    if source.files and not path.is_dir():
+        count, rate = STILL_FRAMES, fps or STILL_FPS
+    elif source.files and fps is None:
+        raise RecordingError(f"{path}: pictures do not say how many of them were taken a second; give it with --fps.")
     if not FPS[0] <= rate <= FPS[1]:
         raise RecordingError(f"{path}: it says no frame rate; give it with --fps.")
     if count < 1:
         raise RecordingError(f"{path}: it does not say how many frames it has. Write it anew with a video program.")
-    times = np.round(1e9 / rate * np.arange(count)).astype(np.int64)
-    return CameraVideo(node.name, path, node.intrinsics, times, False)
+    return np.round(1e9 / rate * np.arange(count)).astype(np.int64)
 
 
 def open_videos(rig: Rig, paths: dict[str, str], fps: float | None) -> list[CameraVideo]:
@@ -177,93 +136,11 @@ def open_videos(rig: Rig, paths: dict[str, str], fps: float | None) -> list[Came
     return [open_video(node, Path(paths[node.name]), fps) for node in rig.nodes if node.name in paths]
 
 
-def picture_size(path: Path) -> tuple[int, int]:
-    """Width and height, px, of a video's pictures. Raises RecordingError."""
-    try:
-        if pictures := picture_files(path):
-            height, width = read_picture(pictures[0]).shape[:2]
-            return width, height
-        if (path / HEADER_NAME).exists():
-            header = read_header(path)
-            return header.width, header.height
-        if path.is_dir():
-            raise RecordingError(f"{path}: this folder has neither pictures nor a recording of raw frames.")
-    except (CameraError, PictureError) as exc:
-        raise RecordingError(str(exc)) from exc
-    with _opened(path) as capture:
-        width, height = (int(capture.get(what)) for what in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
-    if not (width > 0 and height > 0):
-        raise RecordingError(f"{path}: no frame of it can be decoded. Is it a video, and complete?")
-    return width, height
-
-
-def picture_files(path: Path) -> tuple[Path, ...]:
-    """The pictures that a path names: itself, or those of a folder in the order of their names; none for a video and
-    for a recording of raw frames."""
-    if not path.is_dir():
-        return (path,) if path.suffix.lower() in IMAGE_SUFFIXES else ()
-    if (path / HEADER_NAME).exists():
-        return ()
-    return tuple(sorted(one for one in path.iterdir() if one.suffix.lower() in IMAGE_SUFFIXES))
-
-
-def _open_pictures(node: RigNode, path: Path, pictures: tuple[Path, ...], fps: float | None) -> CameraVideo:
-    """One picture for two seconds, or those of a folder. Raises RecordingError."""
-    try:
-        height, width = read_picture(pictures[0]).shape[:2]
-    except PictureError as exc:
-        raise RecordingError(str(exc)) from exc
-    _check_size(pictures[0], node.name, (width, height), node.intrinsics)
-    if path.is_dir() and fps is None:
-        raise RecordingError(f"{path}: pictures do not say how many of them were taken a second; give it with --fps.")
-    if not path.is_dir():
-        pictures = pictures * STILL_FRAMES
-    times = np.round(1e9 / (fps or STILL_FPS) * np.arange(len(pictures))).astype(np.int64)
-    return CameraVideo(node.name, path, node.intrinsics, times, False, pictures)
-
-
-def _open_raw(node: RigNode, folder: Path, fps: float | None) -> CameraVideo:
-    """A recording of raw frames, as ``rhot simulate`` writes. Raises RecordingError."""
-    if not (folder / HEADER_NAME).exists():
-        raise RecordingError(f"{folder}: this folder has no {HEADER_NAME}, so it is no recording of `rhot simulate`. "
-                             "Name a video, or one of the folders left and right of such a recording.")
-    if fps is not None:
-        raise RecordingError(f"{folder}: it has the time of every frame; leave --fps out.")
-    try:
-        header = read_header(folder)
-        next(read_images(folder))
-    except CameraError as exc:
-        raise RecordingError(str(exc)) from exc
-    _check_size(folder, node.name, (header.width, header.height), node.intrinsics)
-    later = round(0.5 * (header.height - 1) * header.row_time_ns) + round(1e9 * node.time_offset_s)
-    return CameraVideo(node.name, folder, node.intrinsics, np.array(header.times_ns, np.int64) + later, False)
-
-
-@contextlib.contextmanager
-def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
-    """A decoder of the file. What is no video it cannot open; it then reads nothing. Raises RecordingError."""
-    try:
-        capture = decoder(path)
-    except PictureError as exc:
-        raise RecordingError(str(exc)) from exc
-    try:
-        yield capture
-    finally:
-        capture.release()
-
-
 def _check_size(path: Path, camera: str, size: tuple[int, int], lens: Intrinsics) -> None:
     if size != (lens.width, lens.height):
         raise RecordingError(f"{path}: its pictures are {size[0]} x {size[1]} px, but the lens of camera {camera} "
                              f"was calibrated at {lens.width} x {lens.height} px. Record at that size, or calibrate at "
                              "this one.")
-
-
-def _middle_row_times(stamps: Sequence[Stamp], node: RigNode) -> Times:
-    """(N,) ns, node clock, with the rig's calibrated correction of the camera."""
-    correction = round(1e9 * node.time_offset_s)
-    half = 0.5 * (node.intrinsics.height - 1)
-    return np.array([one.t_node_ns + round(half * one.row_time_ns) + correction for one in stamps], np.int64)
 
 
 # -- One clock for all ------------------------------------------------------------------------------------------------

@@ -16,7 +16,8 @@ from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
 from rhot_app.recording.raw_log import FILMS, LogReader, encode_log
 from rhot_app.recording.video import video_path
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.sources.films import FilmReader, recorded_films
+from rhot_app.sources.films import recorded_films
+from rhot_app.sources.recorded_pictures import FilmReader
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.tracker import CameraObservations
 
@@ -53,7 +54,7 @@ def test_every_frame_finds_its_own_picture(log: Path, frames: tuple[Path, list[l
     for number, frame in enumerate(frames[1][0]):
         assert left.number_at(frame.t_row0_master_ns) == number
         assert abs(int(left.video.times_ns[number]) - frame.t_row0_master_ns) < 100_000, "well below a frame's period"
-    reader = FilmReader(left.video)
+    reader = FilmReader(left.video.source)
     for number in (7, LEVELS + 3, 0, 1):
         assert level_of(reader.picture(number)) == number % LEVELS
     lost = frames[1][1][3]
@@ -97,7 +98,7 @@ def test_an_ordinary_film_that_the_header_names(log: Path, tmp_path: Path) -> No
     made.write_bytes(b"".join(encode_log(rig, named, records)))
     [one] = recorded_films(made, rig)  # beside the log, though the folder of its name is gone
     assert one.camera == 1 and one.number_at(first_ns + 40_000_000 * 7 + 1_000_000) == 7
-    reader = FilmReader(one.video)
+    reader = FilmReader(one.video.source)
     for number in (3, 4, 9, 2, 39, 0):
         shown = reader.picture(number)
         assert shown is not None and int(np.argmax(shown.mean(axis=(0, 2)))) // 16 == number

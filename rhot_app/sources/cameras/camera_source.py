@@ -7,19 +7,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
-import cv2
-
-from rhot_app.errors import SourceError
+from rhot_app.errors import RecordingError, SourceError
 from rhot_app.sources.cameras.camera_set import CameraSource
-from rhot_app.sources.frame_sets import picture_files
+from rhot_app.sources.recorded_pictures import recorded_pictures
 from rhot_node.capture.v4l2 import USUAL, Device, Mode, list_devices, look_at_device
 from rhot_node.capture.webcam import NetworkCamera, shown_url
-from rhot_node.capture.yuv import HEADER_NAME, read_header
 from rhot_node.clock import NodeClock
 from rhot_node.config import FPS, CameraSettings
-from rhot_node.errors import CameraError, PictureError
+from rhot_node.errors import CameraError
 from rhot_node.files import why
-from rhot_node.pictures import open_video, read_picture
 
 MOST: Final = 16
 """Cameras of a rig."""
@@ -58,7 +54,7 @@ def check_source(text: str, look: Callable[[Path], Device | None] = look_at_devi
         return _recorded(path.resolve())
     except (OSError, ValueError) as exc:
         raise SourceError(f"{text}: cannot be read ({why(exc)}).") from exc
-    except (CameraError, PictureError) as exc:
+    except RecordingError as exc:
         raise SourceError(str(exc)) from exc
 
 
@@ -88,31 +84,18 @@ def _network_camera(url: str) -> CameraSource:
 
 
 def _recorded(path: Path) -> CameraSource:
-    """A film, a picture, or a folder of pictures or of raw frames. Raises SourceError, CameraError, PictureError."""
+    """A film, a picture, or a folder of pictures or of raw frames. Raises SourceError, RecordingError."""
     if "?" in path.name:
         raise SourceError(f"{path}: a film's name has no question mark here; rename it.")
-    if path.is_dir() and (path / HEADER_NAME).exists():
-        header = read_header(path)
-        seconds = 1e-9 * (header.times_ns[-1] - header.times_ns[0]) if len(header.times_ns) > 1 else 0.0
-        fps = (len(header.times_ns) - 1) / seconds if seconds > 0.0 else USUAL.fps
-        return CameraSource(f"yuv:{path}", path.name, header.width, header.height, fps, seconds)
-    pictures = picture_files(path)
-    if path.is_dir() and not pictures:
-        raise SourceError(f"{path}: this folder has no pictures. Name a folder of pictures, or a film in it.")
-    if pictures:
-        height, width = read_picture(pictures[0]).shape[:2]
-        return CameraSource(str(path), path.name, _even(width), _even(height), USUAL.fps, len(pictures) / USUAL.fps)
-    capture = open_video(path)
-    try:
-        read, picture = capture.read() if capture.isOpened() else (False, None)
-        if not read or picture is None:
-            raise SourceError(f"{path}: is no film that can be decoded. Is it complete? A video program converts it to "
-                              "MP4.")
-        fps, count = float(capture.get(cv2.CAP_PROP_FPS)), float(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-    finally:
-        capture.release()
-    fps = fps if FPS[0] <= fps <= FPS[1] else USUAL.fps
-    return CameraSource(str(path), path.name, _even(picture.shape[1]), _even(picture.shape[0]), fps, count / fps)
+    source = recorded_pictures(path)
+    width, height = source.size
+    if source.header is not None:
+        times = source.header.times_ns
+        seconds = 1e-9 * (times[-1] - times[0])
+        fps = (len(times) - 1) / seconds if seconds > 0.0 else USUAL.fps
+        return CameraSource(f"yuv:{path}", path.name, width, height, fps, seconds)
+    fps = source.fps if FPS[0] <= source.fps <= FPS[1] else USUAL.fps
+    return CameraSource(str(path), path.name, _even(width), _even(height), fps, source.count / fps)
 
 
 def _even(pixels: int) -> int:

@@ -8,7 +8,8 @@ from PySide6.QtWidgets import QWidget
 from rhot_app.errors import RecordingError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import Rig
-from rhot_app.sources.films import FilmReader, RecordedFilm
+from rhot_app.sources.films import RecordedFilm
+from rhot_app.sources.recorded_pictures import FilmReader
 from rhot_app.state import HandState
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.camera_panel import CameraPanel, Skeleton
@@ -65,7 +66,7 @@ class FilmPanel(CameraPanel):
         try:
             if number is not None:
                 if name not in self._readers:
-                    self._readers[name] = FilmReader(film.video)
+                    self._readers[name] = FilmReader(film.video.source)
                 picture = self._readers[name].picture(number)
         except RecordingError as exc:
             self.failure = str(exc)
