@@ -14,6 +14,7 @@ from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.searches import REMEMBERED
 from rhot_app.sources.validation import OLDEST_FRAME_NS
+from rhot_app.tracking.kinds.edges import REMEMBERED
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings

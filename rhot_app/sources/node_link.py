@@ -8,8 +8,8 @@ from __future__ import annotations
 from rhot_app.barehand.observations import SliceRequest
 from rhot_app.project import Rig
 from rhot_app.sources.clock import NodeClockModel
-from rhot_app.sources.searches import REMEMBERED
 from rhot_app.sources.validation import DatagramValidator, refuse_without_key, tagged_by
+from rhot_app.tracking.kinds.edges import REMEMBERED
 from rhot_node.wire.codec import Seal, encode
 from rhot_node.wire.messages import U32_MAX, ClockReply, ClockRequest, Message, NodeState
 
