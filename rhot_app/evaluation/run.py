@@ -23,7 +23,7 @@ from rhot_app.simulator.film.shot import make_shot, read_shot
 from rhot_app.simulator.film.truth import load_truth
 from rhot_app.simulator.nodes.proxy import Impairment, UdpProxy
 from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
-from rhot_app.sources.local_nodes import LocalNodes, NodePorts
+from rhot_app.sources.local_nodes import NodePorts, NodeSupervisor
 from rhot_app.state import HandState
 from rhot_node.files import write_atomically
 
@@ -59,8 +59,8 @@ def evaluation_run(frames: Path, scene: Scene, seconds: float, work: Path, *, lo
     settings = [node_settings(scene, index, detector=detector, trust=trust) for index in range(len(cameras))]
     engine_directory = work / "engine"
     with contextlib.ExitStack() as stack:
-        nodes = stack.enter_context(LocalNodes(work / "nodes", settings, cameras))
-        ports = tuple(nodes.ports)
+        nodes = stack.enter_context(contextlib.closing(NodeSupervisor(work / "nodes", settings, cameras)))
+        ports = tuple(nodes.wait_ready())
         if loss > 0.0:
             ports = tuple(_lossy(stack, index, port, loss, scene.seed) for index, port in enumerate(ports))
         rig = build_rig(scene, ports)

@@ -11,6 +11,7 @@ import os
 import select
 import selectors
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -155,38 +156,9 @@ def _read_line(stream: IO[bytes] | None, deadline_s: float) -> bytes | None:
     return line
 
 
-class LocalNodes:
-    """Daemons that are started together and ended together. A context manager."""
-
-    def __init__(self, directory: Path, settings: Sequence[NodeSettings], cameras: Sequence[str]) -> None:
-        """Start one daemon per settings and camera spec and wait until all are ready.
-
-        Raises SourceError when one cannot; the others are then ended.
-        """
-        directory.mkdir(parents=True, exist_ok=True)
-        self.nodes: list[LocalNode] = []
-        try:
-            self.nodes.extend(LocalNode(directory, one, camera) for one, camera in zip(settings, cameras, strict=True))
-            deadline = time.monotonic() + READY_TIMEOUT_S
-            self.ports = [node.wait_ready(deadline) for node in self.nodes]
-        except BaseException:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """End every daemon. May be called twice."""
-        for node in self.nodes:
-            node.close()
-
-    def __enter__(self) -> LocalNodes:
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        self.close()
-
-
 # -- supervision -------------------------------------------------------------------------------------------------------
 
+POLL_S = 0.05
 _RESTART_PAUSE_S = 0.5
 _LONGEST_PAUSE_S = 8.0
 """Between two starts of a daemon that ends before it is ready, as while its camera is unplugged; the pause doubles."""
@@ -198,6 +170,7 @@ class NodeSupervisor:
     def __init__(self, directory: Path, settings: Sequence[NodeSettings], cameras: Sequence[str], *,
                  loop: bool = False) -> None:
         """Start one daemon per settings and camera spec. Raises TrustError, OSError."""
+        directory.mkdir(mode=stat.S_IRWXU, parents=True, exist_ok=True)
         self._directory, self._settings, self._cameras, self._loop = directory, list(settings), list(cameras), loop
         self._ports: list[NodePorts] = []
         self._due_s: dict[int, float] = {}  # of daemons that are to be started again
@@ -218,6 +191,14 @@ class NodeSupervisor:
                 return None
             self._ports.append(node.wait_ready(deadline_s))
         return self._ports
+
+    def wait_ready(self, meanwhile: Callable[[], object] = lambda: time.sleep(POLL_S)) -> list[NodePorts]:
+        """The daemons' ports, once all have said them; `meanwhile` is done again and again. Raises SourceError when one
+        cannot start."""
+        deadline_s = time.monotonic() + READY_TIMEOUT_S
+        while (ports := self.ports(deadline_s)) is None:
+            meanwhile()
+        return ports
 
     def step(self) -> list[int]:
         """Start again what has died, a moment later; returns the numbers of the daemons that were."""

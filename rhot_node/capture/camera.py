@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Protocol, runtime_checkable
 
+from rhot_node.clock import NodeClock
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import CameraError
 from rhot_node.files import MIB, read_input
@@ -147,6 +148,46 @@ class DelayedStart:
             return False
         self.repeated = number + 1
         return True
+
+
+class PlayedCamera:
+    """A recording as a camera, by the host's monotonic time from T0 on, which `start_file` may say (`DelayedStart`). Each
+    kind gives `_first`, the first image, and `_play`, what follows."""
+
+    def __init__(self, clock: NodeClock, size: tuple[int, int], exposure_ns: int, row_time_ns: int, period_ns: int,
+                 start_file: Path | None, first_ns: int = 0) -> None:
+        """`first_ns`: the first frame's time after T0."""
+        self._clock, self._size = clock, size
+        self._exposure_ns, self._row_time_ns, self._period_ns = exposure_ns, row_time_ns, period_ns
+        self._delay_ns = available_delay_ns(exposure_ns, row_time_ns, size[1])
+        self._start = DelayedStart(start_file, period_ns, self._delay_ns, first_ns) if start_file else None
+        self._t0_ns: int | None = None
+        self._base = 0  # number of frame 0
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height), px."""
+        return self._size
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """The next frame at its time. Raises EndOfRecording; CameraError for a bad start file or a broken recording."""
+        now_ns = time.monotonic_ns()
+        deadline_ns = now_ns + round(timeout_s * NS_PER_S)
+        if self._start is not None:
+            if still := self._start.repetition():
+                return self._frame(self._first(), *still) if self._start.wait(*still, deadline_ns) else None
+            self._t0_ns, self._base, self._start = self._start.t0_ns, self._start.repeated, None
+        return self._play(now_ns, deadline_ns)
+
+    def _first(self) -> YuvImage:
+        raise NotImplementedError
+
+    def _play(self, now_ns: int, deadline_ns: int) -> Frame | None:
+        raise NotImplementedError
+
+    def _frame(self, image: YuvImage, number: int, t_mid_ns: int) -> Frame:
+        return Frame(image, number, self._clock.from_host_ns(t_mid_ns),
+                     self._clock.from_host_ns(t_mid_ns + self._delay_ns), self._exposure_ns, self._row_time_ns)
 
 
 def read_start_file(path: Path) -> int | None:

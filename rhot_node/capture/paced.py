@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Protocol
 
 import cv2
 import numpy as np
 
-from rhot_node.capture.camera import NS_PER_S, DelayedStart, EndOfRecording, Frame, available_delay_ns, wait_until
+from rhot_node.capture.camera import NS_PER_S, EndOfRecording, Frame, PlayedCamera, wait_until
 from rhot_node.clock import NodeClock
 from rhot_node.config import FPS, CameraSettings
 from rhot_node.detect.image import Plane, YuvImage, from_bgr
@@ -125,7 +124,7 @@ class VideoFile:
         return capture
 
 
-class PacedCamera:
+class PacedCamera(PlayedCamera):
     """A file as a camera. Frame k is exposed at T0 + k / rate, T0 being the first read or the instant in `start_file`
     (`DelayedStart`); a reader that comes late gets the newest frame. As fast as possible (`rate_max`), every frame is
     delivered and has just been exposed."""
@@ -133,43 +132,13 @@ class PacedCamera:
     def __init__(self, source: ImageSource, where: str, settings: CameraSettings, clock: NodeClock, *,
                  rate_max: bool = False, start_file: Path | None = None) -> None:
         """Decode the first image to learn the size; raises CameraError when there is none."""
-        self._source = source
-        self._where = where
-        self._clock = clock
-        self._rate_max = rate_max
-        self._exposure_ns = settings.exposure_ns
-        self._row_time_ns = settings.row_time_ns
-        self._period_ns = round(NS_PER_S / (source.fps or settings.fps))
-        self._t0_ns: int | None = None
+        self._source, self._where, self._rate_max = source, where, rate_max
         self._number = 0  # of the frame at which the source stands
-        self._base = 0  # number of frame 0
         if not source.advance():
             raise CameraError(f"{where}: it has no frames.")
         self._pending: YuvImage | None = from_bgr(source.image())
-        self._size = self._pending.size
-        self._delay_ns = available_delay_ns(self._exposure_ns, self._row_time_ns, self._size[1])
-        self._start = DelayedStart(start_file, self._period_ns, self._delay_ns) if start_file else None
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(width, height), px."""
-        return self._size
-
-    def read(self, timeout_s: float) -> Frame | None:
-        """The next frame at its time. Raises EndOfRecording, or CameraError when a file is broken."""
-        now_ns = time.monotonic_ns()
-        deadline_ns = now_ns + round(timeout_s * NS_PER_S)
-        if self._start is not None:
-            if still := self._start.repetition():
-                return self._frame(self._upcoming(0), *still) if self._start.wait(*still, deadline_ns) else None
-            self._t0_ns, self._base, self._start = self._start.t0_ns, self._start.repeated, None
-        if self._rate_max:
-            return self._deliver(self._upcoming(0), now_ns - self._delay_ns)
-        if self._t0_ns is None:
-            self._t0_ns = now_ns - self._delay_ns
-        image = self._upcoming((now_ns - self._delay_ns - self._t0_ns) // self._period_ns)
-        t_mid_ns = self._t0_ns + self._number * self._period_ns
-        return self._deliver(image, t_mid_ns) if wait_until(t_mid_ns + self._delay_ns, deadline_ns) else None
+        super().__init__(clock, self._pending.size, settings.exposure_ns, settings.row_time_ns,
+                         round(NS_PER_S / (source.fps or settings.fps)), start_file)
 
     def rewind(self) -> None:
         """Play again from the first frame; numbers and times go on."""
@@ -179,6 +148,18 @@ class PacedCamera:
     def close(self) -> None:
         """Close the file."""
         self._source.close()
+
+    def _first(self) -> YuvImage:
+        return self._upcoming(0)
+
+    def _play(self, now_ns: int, deadline_ns: int) -> Frame | None:
+        if self._rate_max:
+            return self._deliver(self._upcoming(0), now_ns - self._delay_ns)
+        if self._t0_ns is None:
+            self._t0_ns = now_ns - self._delay_ns
+        image = self._upcoming((now_ns - self._delay_ns - self._t0_ns) // self._period_ns)
+        t_mid_ns = self._t0_ns + self._number * self._period_ns
+        return self._deliver(image, t_mid_ns) if wait_until(t_mid_ns + self._delay_ns, deadline_ns) else None
 
     def _upcoming(self, newest: int) -> YuvImage:
         """Decode the next image, or image `newest` when that is later; it stays until it is delivered."""
@@ -200,13 +181,3 @@ class PacedCamera:
     def _deliver(self, image: YuvImage, t_mid_ns: int) -> Frame:
         self._pending = None
         return self._frame(image, self._base + self._number, t_mid_ns)
-
-    def _frame(self, image: YuvImage, number: int, t_mid_ns: int) -> Frame:
-        return Frame(
-            image=image,
-            number=number,
-            t_node_ns=self._clock.from_host_ns(t_mid_ns),
-            t_available_node_ns=self._clock.from_host_ns(t_mid_ns + self._delay_ns),
-            exposure_ns=self._exposure_ns,
-            row_time_ns=self._row_time_ns,
-        )

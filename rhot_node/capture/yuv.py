@@ -19,15 +19,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from rhot_node.capture.camera import (
-    NS_PER_S,
-    DelayedStart,
-    EndOfRecording,
-    Frame,
-    available_delay_ns,
-    i420_bytes,
-    wait_until,
-)
+from rhot_node.capture.camera import NS_PER_S, EndOfRecording, Frame, PlayedCamera, i420_bytes, wait_until
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, YuvImage, from_i420
@@ -117,7 +109,7 @@ class YuvWriter:
             self.abandon()
 
 
-class YuvRecording:
+class YuvRecording(PlayedCamera):
     """A recording as a camera: frame k is available at T0 + times[k] + exposure/2 + readout, host monotonic time.
 
     T0 is the time of opening, or the instant in `start_file` (`DelayedStart`). A reader that comes late gets the newest
@@ -126,30 +118,13 @@ class YuvRecording:
 
     def __init__(self, folder: Path, clock: NodeClock, start_file: Path | None = None) -> None:
         """Open `folder`; raises CameraError naming what is wrong with which file."""
-        self._header = read_header(folder)
-        self._map = _map_frames(folder / FRAMES_NAME, self._header)
-        self._frames = np.frombuffer(self._map, dtype=np.uint8).reshape(-1, self._header.frame_bytes)
-        self._clock = clock
-        self._t0_ns: int | None = None if start_file else time.monotonic_ns()
-        self._delay_ns = available_delay_ns(self._header.exposure_ns, self._header.row_time_ns, self._header.height)
-        self._start = DelayedStart(start_file, self._header.period_ns, self._delay_ns,
-                                   self._header.times_ns[0]) if start_file else None
+        self._header = header = read_header(folder)
+        self._map = _map_frames(folder / FRAMES_NAME, header)
+        self._frames = np.frombuffer(self._map, dtype=np.uint8).reshape(-1, header.frame_bytes)
         self._next = 0  # index of the next frame of the recording
-        self._base = 0  # number of frame 0
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(width, height), px."""
-        return self._header.width, self._header.height
-
-    def read(self, timeout_s: float) -> Frame | None:
-        """The next frame, waiting for its time. Raises EndOfRecording, or CameraError for a bad start file."""
-        deadline_ns = time.monotonic_ns() + round(timeout_s * NS_PER_S)
-        if self._start is not None:
-            if still := self._start.repetition():
-                return self._frame(0, *still) if self._start.wait(*still, deadline_ns) else None
-            self._t0_ns, self._base, self._start = self._start.t0_ns, self._start.repeated, None
-        return self._read_playing(self._t0_ns or 0, deadline_ns)
+        super().__init__(clock, (header.width, header.height), header.exposure_ns, header.row_time_ns,
+                         header.period_ns, start_file, header.times_ns[0])
+        self._t0_ns = None if start_file else time.monotonic_ns()
 
     def rewind(self) -> None:
         """Play again, without a pause after the last frame."""
@@ -166,28 +141,23 @@ class YuvRecording:
         with contextlib.suppress(BufferError):
             self._map.close()
 
-    def _read_playing(self, t0_ns: int, deadline_ns: int) -> Frame | None:
-        times = self._header.times_ns
+    def _first(self) -> YuvImage:
+        return self._image(0)
+
+    def _play(self, now_ns: int, deadline_ns: int) -> Frame | None:
+        times, t0_ns = self._header.times_ns, self._t0_ns or 0
         if self._next >= len(times):
             raise EndOfRecording
-        newest = bisect_right(times, time.monotonic_ns() - t0_ns - self._delay_ns) - 1
+        newest = bisect_right(times, now_ns - t0_ns - self._delay_ns) - 1
         index = max(self._next, newest)
         t_mid = t0_ns + times[index]
         if not wait_until(t_mid + self._delay_ns, deadline_ns):
             return None
         self._next = index + 1
-        return self._frame(index, self._base + index, t_mid)
+        return self._frame(self._image(index), self._base + index, t_mid)
 
-    def _frame(self, index: int, number: int, t_mid_ns: int) -> Frame:
-        header = self._header
-        return Frame(
-            image=from_i420(self._frames[index], header.width, header.height),
-            number=number,
-            t_node_ns=self._clock.from_host_ns(t_mid_ns),
-            t_available_node_ns=self._clock.from_host_ns(t_mid_ns + self._delay_ns),
-            exposure_ns=header.exposure_ns,
-            row_time_ns=header.row_time_ns,
-        )
+    def _image(self, index: int) -> YuvImage:
+        return from_i420(self._frames[index], *self._size)
 
 
 def read_header(folder: Path) -> YuvHeader:

@@ -151,11 +151,10 @@ class ForegroundMaskRequest(_Request, frozen=True, tag="foreground_mask"):
     this very picture as JPEG."""
 
 
-ForegroundRequest = (LearnBackgroundRequest | LearnSkinRequest | SaveForegroundRequest | RevertForegroundRequest
-                     | ForgetForegroundRequest | ForegroundMaskRequest)
-VideoRequest = VideoStartRequest | VideoStopRequest | VideoListRequest | VideoReadRequest | VideoDeleteRequest
 Request = (StateRequest | CountersRequest | SettingsRequest | SetSettingsRequest | StillRequest | StartRequest
-           | LinkRequest | StopRequest | SpareLandmarksRequest | ForegroundRequest | VideoRequest)
+           | LinkRequest | StopRequest | SpareLandmarksRequest | VideoStartRequest | VideoStopRequest
+           | VideoListRequest | VideoReadRequest | VideoDeleteRequest | LearnBackgroundRequest | LearnSkinRequest
+           | SaveForegroundRequest | RevertForegroundRequest | ForgetForegroundRequest | ForegroundMaskRequest)
 
 _decoder = msgspec.json.Decoder(Request)
 
@@ -189,10 +188,9 @@ class Responder:
     """Answers requests. `state` and `counters` report on the daemon from any thread."""
 
     def __init__(self, store: SettingsStore, sessions: Sessions, pictures: PictureBox, clock: NodeClock,
-                 state: Report, counters: Report, keys: LinkKeys | None, videos: VideoRecorder | None = None,
-                 foreground: ForegroundStore | None = None, spare: Callable[[], None] = lambda: None) -> None:
-        """`keys` None: the node is open, and no datagram is tagged. `videos` None: it records none.
-        `foreground` None: it learns neither background nor skin. `spare`: stops the search for landmarks a while."""
+                 state: Report, counters: Report, keys: LinkKeys | None, videos: VideoRecorder,
+                 foreground: ForegroundStore, spare: Callable[[], None] = lambda: None) -> None:
+        """`keys` None: the node is open, and no datagram is tagged. `spare`: stops the search for landmarks a while."""
         self._spare = spare
         self._store = store
         self._sessions = sessions
@@ -210,7 +208,8 @@ class Responder:
         try:
             if len(parts) != 1:
                 raise NodeError(f"a request is one JSON document in one message part, not {len(parts)} parts.")
-            reply, attachment = self._perform(decode_message(parts[0], _decoder), master)
+            said, attachment = self._perform(decode_message(parts[0], _decoder), master)
+            reply = {"ok": True, **said}
         except (msgspec.DecodeError, NodeError) as exc:
             reply, attachment = {"ok": False, "error": str(exc)}, b""
         except OSError as exc:
@@ -223,13 +222,14 @@ class Responder:
         return [encoded, attachment] if attachment else [encoded]
 
     def _perform(self, request: Request, master: str) -> tuple[dict[str, Any], bytes]:
+        """What is answered besides that it was done, and what is attached to it."""
         match request:
             case StateRequest():
-                return {"ok": True, **self._state()}, b""
+                return self._state(), b""
             case CountersRequest():
-                return {"ok": True, "counters": self._counters()}, b""
+                return {"counters": self._counters()}, b""
             case SettingsRequest():
-                return {"ok": True, "settings": self._store.current}, b""
+                return {"settings": self._store.current}, b""
             case SetSettingsRequest():
                 return self._set_settings(request), b""
             case StillRequest():
@@ -239,85 +239,62 @@ class Responder:
             case LinkRequest():
                 return self._link(request, master), b""
             case StopRequest():
-                return {"ok": True, "stopped": self._sessions.stop(request.session)}, b""
+                return {"stopped": self._sessions.stop(request.session)}, b""
             case SpareLandmarksRequest():
                 self._spare()
-                return {"ok": True}, b""
-            case (LearnBackgroundRequest() | LearnSkinRequest() | SaveForegroundRequest() | RevertForegroundRequest()
-                  | ForgetForegroundRequest() | ForegroundMaskRequest()):
-                return self._learn(request)
-            case _:
-                return self._video(request)
+            case VideoStartRequest():
+                return {"video": self._videos.start(request.name)}, b""
+            case VideoStopRequest():
+                return {"stopped": self._videos.stop(request.name)}, b""
+            case VideoListRequest():
+                return {"videos": self._videos.videos()}, b""
+            case VideoReadRequest():
+                data = self._videos.read(request.name, request.offset, request.length)
+                return {"offset": request.offset, "length": len(data)}, data
+            case VideoDeleteRequest():
+                self._videos.delete(request.name)
+            case LearnBackgroundRequest():
+                self._foreground.learn_background(self._pictures, request.seconds, save=request.save)
+            case LearnSkinRequest():
+                return {"found": self._foreground.learn_skin(self._pictures, save=request.save)}, b""
+            case SaveForegroundRequest():
+                self._foreground.save()
+            case RevertForegroundRequest():
+                self._foreground.revert(earlier=request.earlier)
+            case ForgetForegroundRequest():
+                self._foreground.forget()
+            case ForegroundMaskRequest():
+                mask, picture = self._foreground.mask(self._pictures)
+                return {"format": "png", "width": mask.width, "height": mask.height, "mask_bytes": len(mask.data),
+                        "number": picture.number, "t_node_ns": picture.t_node_ns
+                        }, mask.data + encode_still(picture, "jpeg").data
+        return {}, b""
 
     def revoke(self, admits: Callable[[str], bool]) -> None:
         """The masters have changed: forget the keys of those that are not admitted any more, and stop streaming."""
         if self._keys is not None:
             self._keys.forget(admits)
             self._sessions.stop(0)
-            if self._videos is not None:
-                self._videos.stop()
-
-    def _learn(self, request: ForegroundRequest) -> tuple[dict[str, Any], bytes]:
-        store = self._foreground
-        if store is None:
-            raise NodeError("this node learns neither background nor skin.")
-        match request:
-            case LearnBackgroundRequest():
-                store.learn_background(self._pictures, request.seconds, save=request.save)
-                return {"ok": True}, b""
-            case LearnSkinRequest():
-                return {"ok": True, "found": store.learn_skin(self._pictures, save=request.save)}, b""
-            case SaveForegroundRequest():
-                store.save()
-                return {"ok": True}, b""
-            case RevertForegroundRequest():
-                store.revert(earlier=request.earlier)
-                return {"ok": True}, b""
-            case ForgetForegroundRequest():
-                store.forget()
-                return {"ok": True}, b""
-            case ForegroundMaskRequest():
-                mask, picture = store.mask(self._pictures)
-                return {"ok": True, "format": "png", "width": mask.width, "height": mask.height,
-                        "mask_bytes": len(mask.data), "number": picture.number, "t_node_ns": picture.t_node_ns
-                        }, mask.data + encode_still(picture, "jpeg").data
-
-    def _video(self, request: VideoRequest) -> tuple[dict[str, Any], bytes]:
-        videos = self._videos
-        if videos is None:
-            raise NodeError("this node records no videos.")
-        match request:
-            case VideoStartRequest():
-                return {"ok": True, "video": videos.start(request.name)}, b""
-            case VideoStopRequest():
-                return {"ok": True, "stopped": videos.stop(request.name)}, b""
-            case VideoListRequest():
-                return {"ok": True, "videos": videos.videos()}, b""
-            case VideoReadRequest():
-                data = videos.read(request.name, request.offset, request.length)
-                return {"ok": True, "offset": request.offset, "length": len(data)}, data
-            case VideoDeleteRequest():
-                videos.delete(request.name)
-                return {"ok": True}, b""
+            self._videos.stop()
 
     def _set_settings(self, request: SetSettingsRequest) -> dict[str, Any]:
         if request.settings.get("trust", self._store.current.trust) != self._store.current.trust:
             raise SettingsError("trust is changed only in the settings file, on the node itself.")
-        return {"ok": True, "restart": self._store.change(request.settings, save=request.save)}
+        return {"restart": self._store.change(request.settings, save=request.save)}
 
     def _link(self, request: LinkRequest, master: str) -> dict[str, Any]:
         if self._keys is None:
             raise NodeError("this node is open to everybody; its datagrams have no key.")
         link = self._keys.grant(master, request.name)
-        return {"ok": True, "name": link.name, "key": link.key.hex()}
+        return {"name": link.name, "key": link.key.hex()}
 
     def _take_still(self, kind: StillFormat) -> tuple[dict[str, Any], bytes]:
         picture = self._pictures.next_still(STILL_S)
         if picture is None:
             raise NodeError(f"no frame came within {STILL_S:.0f} s; ask for the state to see what the camera does.")
         still = encode_still(picture, kind)
-        return {"ok": True, "format": kind, "width": still.width, "height": still.height,
-                "number": picture.number, "t_node_ns": picture.t_node_ns}, still.data
+        return {"format": kind, "width": still.width, "height": still.height, "number": picture.number,
+                "t_node_ns": picture.t_node_ns}, still.data
 
     def _start(self, request: StartRequest, master: str) -> dict[str, Any]:
         if request.session > U64_MAX:
@@ -334,4 +311,4 @@ class Responder:
                                        seal=None if link is None else link.seal)
         if verdict == "stale":
             raise NodeError(f"session {request.session} is over; every start needs a new session number.")
-        return {"ok": True, "verdict": verdict}
+        return {"verdict": verdict}

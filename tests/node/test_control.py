@@ -26,6 +26,7 @@ from rhot_node.network.pairing import OfferFile, Reception
 from rhot_node.network.pictures import PictureBox
 from rhot_node.network.requests import Responder
 from rhot_node.network.session import Sessions
+from rhot_node.video.recorder import VideoRecorder
 
 RNG = np.random.default_rng(3)
 
@@ -45,7 +46,7 @@ class Served:
         self.server = ControlServer(self.store.current, None)
         self.server.start(Responder(self.store, self.sessions, self.server.pictures, NodeClock(),
                                     lambda: {"state": "ready"}, lambda: {"frames": 12}, None,
-                                    foreground=self.foreground),
+                                    VideoRecorder(folder / "videos"), self.foreground),
                           Reception(None, OfferFile(folder / "offer.json"), lambda: {"name": "left"}))
         self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self.client = self.context.socket(zmq.REQ)

@@ -21,6 +21,7 @@ from rhot_node.clock import NodeClock
 from rhot_node.daemon import NodeDaemon
 from rhot_node.detect.image import YuvImage, to_bgr
 from rhot_node.errors import VideoError
+from rhot_node.foreground_store import ForegroundStore
 from rhot_node.network.pictures import PictureBox
 from rhot_node.network.requests import Responder, SettingsStore
 from rhot_node.network.session import LinkKeys, Sessions
@@ -187,7 +188,8 @@ def test_a_camera_that_changes_its_size_ends_the_video(make: MakeRecorder) -> No
 @pytest.fixture
 def ask(make: MakeRecorder, tmp_path: Path) -> Callable[..., dict[str, Any]]:
     store = SettingsStore(tmp_path / "node.json", node_settings())
-    responder = Responder(store, Sessions(), PictureBox(4.0), NodeClock(), dict, dict, None, make())
+    responder = Responder(store, Sessions(), PictureBox(4.0), NodeClock(), dict, dict, None, make(),
+                          ForegroundStore(None))
 
     def ask_node(**request: Any) -> dict[str, Any]:
         head, *data = responder.answer([json.dumps(request).encode()], "")
@@ -225,7 +227,8 @@ def test_requests_are_answered_or_refused_in_a_sentence(ask: Callable[..., dict[
 def test_a_node_that_forgets_its_masters_ends_its_video(make: MakeRecorder, tmp_path: Path) -> None:
     recorder = make()
     store = SettingsStore(tmp_path / "node.json", node_settings())
-    responder = Responder(store, Sessions(), PictureBox(4.0), NodeClock(), dict, dict, LinkKeys(), recorder)
+    responder = Responder(store, Sessions(), PictureBox(4.0), NodeClock(), dict, dict, LinkKeys(), recorder,
+                          ForegroundStore(None))
     responder.answer([b'{"request": "video_start", "name": "a"}'], "")
     responder.revoke(lambda public_key: False)
     wait_until_done(recorder, "a")

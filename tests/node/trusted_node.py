@@ -11,11 +11,13 @@ from node_fakes import OF_ANY_PORT, saved_settings
 from patience import PATIENCE_S
 
 from rhot_node.clock import NodeClock
+from rhot_node.foreground_store import ForegroundStore
 from rhot_node.keys import KeyPair, Master, NodeTrust, connect_with, new_key_pair
 from rhot_node.network.control import ControlServer
 from rhot_node.network.pairing import OfferFile, Reception
 from rhot_node.network.requests import Responder
 from rhot_node.network.session import LinkKeys, Sessions
+from rhot_node.video.recorder import VideoRecorder
 
 ABOUT = {"node_id": 3, "name": "left", "state": "ready"}
 
@@ -46,7 +48,8 @@ class TrustedNode:
         self.sessions = Sessions()
         self.server = ControlServer(store.current, self.trust)
         self.responder = Responder(store, self.sessions, self.server.pictures, NodeClock(),
-                                   lambda: {"state": "ready"}, dict, self.keys)
+                                   lambda: {"state": "ready"}, dict, self.keys, VideoRecorder(folder / "videos"),
+                                   ForegroundStore(None))
         self.server.start(self.responder, Reception(self.trust, self.offers, lambda: ABOUT))
         self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
 

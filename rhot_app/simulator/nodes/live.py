@@ -30,7 +30,7 @@ from rhot_app.simulator.nodes.remote import SERVER_NAME, Request, decode_request
 from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
 from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_arguments, scene_of, show_of
 from rhot_app.simulator.scene.scene_description import Show
-from rhot_app.sources.local_nodes import READY_TIMEOUT_S, NodeSupervisor, add_serve_arguments, serve
+from rhot_app.sources.local_nodes import NodeSupervisor, add_serve_arguments, serve
 from rhot_node.errors import NodeError
 from rhot_node.logs import cut_log
 from rhot_node.network.context import Context
@@ -112,10 +112,8 @@ def run(scene: Scene, show: Show, directory: Path, rig_path: Path, over: Callabl
         supervisor = stack.enter_context(contextlib.closing(NodeSupervisor(
             directory, [node_settings(scene, index) for index in range(len(scene.names))],
             [f"stream:{socket_path(directory, name)}" for name in scene.names])))
-        deadline = time.monotonic() + READY_TIMEOUT_S
-        while (ports := supervisor.ports(deadline)) is None:
-            cameras.step()
-        rig = build_rig(scene, tuple(ports), write_held(stage.setting.scene_object, rig_path.parent))
+        ports = tuple(supervisor.wait_ready(cameras.step))
+        rig = build_rig(scene, ports, write_held(stage.setting.scene_object, rig_path.parent))
         save_rig(rig_path, with_start_pose(rig, stage.setting.scene_object))
         door.start()
         print(json.dumps({"event": "ready", "rig": str(rig_path), "pid": os.getpid()}), flush=True)

@@ -11,7 +11,6 @@ import argparse
 import contextlib
 import json
 import os
-import stat
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -20,13 +19,12 @@ from pathlib import Path
 from rhot_app.errors import SourceError
 from rhot_app.project import load_rig, save_rig
 from rhot_app.sources.cameras.camera_set import CameraSet, camera_set_of, node_settings, nodes_folder, with_ports
-from rhot_app.sources.local_nodes import READY_TIMEOUT_S, NodeSupervisor, add_serve_arguments, serve, settings_path
+from rhot_app.sources.local_nodes import POLL_S, NodeSupervisor, add_serve_arguments, serve, settings_path
 from rhot_node.config import NodeSettings, load_settings
 from rhot_node.errors import SettingsError
 from rhot_node.files import write_atomically
 from rhot_node.logs import cut_log
 
-_POLL_S = 0.05
 _BEGIN_NS = 300_000_000
 """From the moment that all films are open until they begin."""
 
@@ -68,23 +66,19 @@ def run(rig_path: Path, log_path: Path | None, over: Callable[[], bool]) -> None
     cameras, rig, folder = camera_set_of(rig_path), load_rig(rig_path), nodes_folder(rig_path)
     if cameras is None or len(cameras.cameras) != len(rig.nodes):
         raise SourceError(f"{rig_path}: its list of cameras is missing. Choose the cameras again.")
-    folder.mkdir(mode=stat.S_IRWXU, exist_ok=True)
     films = Films(cameras, folder / "start")
     settings = [node_settings(camera, node, rig, _kept_settings(folder, node.name))
                 for camera, node in zip(cameras.cameras, rig.nodes, strict=True)]
     (folder / "start").unlink(missing_ok=True)
     with contextlib.closing(NodeSupervisor(folder, settings, films.specs, loop=True)) as supervisor:
-        deadline_s = time.monotonic() + READY_TIMEOUT_S
-        while (ports := supervisor.ports(deadline_s)) is None:
-            time.sleep(_POLL_S)
-        save_rig(rig_path, with_ports(rig, ports))
+        save_rig(rig_path, with_ports(rig, supervisor.wait_ready()))
         films.begin()
         print(json.dumps({"event": "ready", "rig": str(rig_path), "pid": os.getpid()}), flush=True)
         while not over():
             films.follow(supervisor)
             if log_path is not None:
                 cut_log(log_path)
-            time.sleep(_POLL_S)
+            time.sleep(POLL_S)
 
 
 def _kept_settings(folder: Path, name: str) -> NodeSettings | None:
