@@ -7,12 +7,12 @@ from typing import Protocol
 
 import msgspec
 import numpy as np
+from rhot_app.sources.searches import REMEMBERED
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.project import Rig
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.node_link import NodeLink
-from rhot_app.sources.searches import REMEMBERED
 from rhot_app.sources.validation import OLDEST_FRAME_NS
 from rhot_app.tracking.kinds.edges import REMEMBERED
 from rhot_app.tracking.tracker import CameraObservations
