@@ -151,8 +151,8 @@ class DelayedStart:
 
 
 class PlayedCamera:
-    """A recording as a camera, by the host's monotonic time from T0 on, which `start_file` may say (`DelayedStart`). Each
-    kind gives `_first`, the first image, and `_play`, what follows."""
+    """A recording as a camera, by the host's monotonic time from T0 on, which `start_file` may say (`DelayedStart`). A
+    kind of recordings gives `_first`, the first image, and `_play`, what follows."""
 
     def __init__(self, clock: NodeClock, size: tuple[int, int], exposure_ns: int, row_time_ns: int, period_ns: int,
                  start_file: Path | None, first_ns: int = 0) -> None:
