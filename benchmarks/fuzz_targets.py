@@ -7,7 +7,6 @@ from typing import Protocol
 
 import msgspec
 import numpy as np
-from rhot_app.sources.searches import REMEMBERED
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.project import Rig
