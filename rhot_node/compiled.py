@@ -120,9 +120,10 @@ def _bases() -> Iterator[Path]:
         yield Path(sys.prefix) / "rhot-cache"
     own = Path(tempfile.gettempdir()) / f"rhot-cache-{os.getuid()}"
     with contextlib.suppress(OSError):
-        own.mkdir(mode=0o700, exist_ok=True)
+        own.mkdir(mode=stat.S_IRWXU, exist_ok=True)
         status = own.lstat()
-        if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o022:
+        if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not (
+                status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)):
             yield own  # else others could replace code that runs as this user
 
 

@@ -7,6 +7,7 @@ memory: OpenCV decodes twenty formats, and some by code with known errors (CVE-2
 
 from __future__ import annotations
 
+import enum
 import os
 import struct
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from rhot_node.errors import PictureError
 from rhot_node.files import open_input, read_input, why
+from rhot_node.wire.messages import U32_MAX
 
 Picture = NDArray[np.uint8]
 
@@ -36,12 +38,48 @@ os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # likewise; OpenCV hands 
 
 _SEGMENTS_MAX: Final = 4096  # before the size of a JPEG picture
 _FORGIVEN: Final = 0.25  # of a JPEG's bytes after its end mark: cameras append thumbnails and notes
-_PNG, _JPEG, _JPEG_END = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\xff\xd9"
+_BITS_MAX, _SAMPLES_MAX = 16, 4  # of a TIFF: what OpenCV reads well
+
+
+class _Mark(enum.IntEnum):
+    """Second bytes of JPEG's markers that are looked at (ITU-T T.81, table B.1)."""
+
+    FIRST_FRAME = 0xC0
+    HUFFMAN_TABLES = 0xC4
+    RESERVED = 0xC8
+    CONDITIONING = 0xCC
+    LAST_FRAME = 0xCF
+    FILL = 0xFF
+
+
+class _Tag(enum.IntEnum):
+    """Of TIFF 6.0."""
+
+    WIDTH = 256
+    HEIGHT = 257
+    BITS = 258
+    ORIENTATION = 274
+    SAMPLES = 277
+    ROWS = 278
+    TILE_WIDTH = 322
+    TILE_HEIGHT = 323
+
+
+class _Type(enum.IntEnum):
+    """Of a TIFF entry's values."""
+
+    SHORT = 3
+    LONG = 4
+
+
+_PNG, _JPEG, _JPEG_BEGIN, _JPEG_END = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\xff\xd8", b"\xff\xd9"
+_PNG_HEADER = struct.Struct(">I4sII")
+_SEGMENT, _FRAME = struct.Struct(">BBH"), struct.Struct(">BBHBHH")
+_NO_FRAMES = _Mark.HUFFMAN_TABLES, _Mark.RESERVED, _Mark.CONDITIONING
+_WEBP_SIDE = 0x3FFF  # 14 bits of a side
+_VP8X, _VP8L, _VP8 = struct.Struct("<20x4x3s3s"), struct.Struct("<20xBI"), struct.Struct("<20x3x3xHH")
 _TIFF_ORDER = {b"II*\0": "<", b"MM\0*": ">"}
-_WIDTH, _HEIGHT, _BITS, _ORIENTATION, _SAMPLES, _ROWS, _TILE_WIDTH, _TILE_HEIGHT = (
-    256, 257, 258, 274, 277, 278, 322, 323)  # tags of TIFF 6.0
-_SHORT, _LONG = 3, 4
-_WHOLE: Final = 2**32 - 1  # rows of a strip that is the picture
+_TIFF_LAYOUT = {_Type.SHORT: "H", _Type.LONG: "I"}
 
 
 def read_picture(path: Path, *, grey: bool = False) -> Picture:
@@ -124,8 +162,8 @@ def _require_pixels(width: int, height: int) -> None:
 
 
 def _png(data: bytes) -> tuple[int, int]:
-    length, name, width, height = struct.unpack_from(">I4sII", data, len(_PNG))
-    if (length, name) != (13, b"IHDR"):
+    _, name, width, height = _PNG_HEADER.unpack_from(data, len(_PNG))
+    if name != b"IHDR":
         raise PictureError("is cut off or damaged")
     return width, height
 
@@ -134,15 +172,15 @@ def _jpeg(data: bytes) -> tuple[int, int]:
     """By the frame's header: ITU-T T.81, B.2.2. A picture without its end would be filled up with grey."""
     if data.rfind(_JPEG_END) < (1.0 - _FORGIVEN) * len(data):
         raise PictureError("is cut off or damaged: its end is missing")
-    at = 2
+    at = len(_JPEG_BEGIN)
     for _ in range(_SEGMENTS_MAX):
-        mark, kind, length = struct.unpack_from(">BBH", data, at)
-        if mark != 0xFF:
+        begin, kind, length = _SEGMENT.unpack_from(data, at)
+        if begin != _Mark.FILL:
             break
-        if kind == 0xFF:  # a fill byte
+        if kind == _Mark.FILL:
             at += 1
-        elif 0xC0 <= kind <= 0xCF and kind not in (0xC4, 0xC8, 0xCC):
-            height, width = struct.unpack_from(">HH", data, at + 5)
+        elif _Mark.FIRST_FRAME <= kind <= _Mark.LAST_FRAME and kind not in _NO_FRAMES:
+            *_, height, width = _FRAME.unpack_from(data, at)
             return width, height
         else:
             at += 2 + length
@@ -153,13 +191,13 @@ def _webp(data: bytes) -> tuple[int, int]:
     """By its first chunk: RFC 9649."""
     name = data[12:16]
     if name == b"VP8X":
-        first, second = (int.from_bytes(data[at:at + 3], "little") for at in (24, 27))
-        return first + 1, second + 1
+        width, height = (1 + int.from_bytes(side, "little") for side in _VP8X.unpack_from(data))
+        return width, height
     if name == b"VP8L":
-        bits = struct.unpack_from("<I", data, 21)[0]
-        return (bits & 0x3FFF) + 1, (bits >> 14 & 0x3FFF) + 1
-    width, height = struct.unpack_from("<HH", data, 26)
-    return width & 0x3FFF, height & 0x3FFF
+        _, bits = _VP8L.unpack_from(data)
+        return (bits & _WEBP_SIDE) + 1, (bits >> _WEBP_SIDE.bit_length() & _WEBP_SIDE) + 1
+    width, height = _VP8.unpack_from(data)
+    return width & _WEBP_SIDE, height & _WEBP_SIDE
 
 
 def _tiff(data: bytes) -> tuple[int, int, bytes]:
@@ -168,26 +206,31 @@ def _tiff(data: bytes) -> tuple[int, int, bytes]:
     found: dict[int, int] = {}
     turned = bytearray(data)
     for at, tag, kind, value in _tiff_entries(data, order):
-        if tag == _ORIENTATION:
-            struct.pack_into(f"{order}HHIHH", turned, at, _ORIENTATION, _SHORT, 1, 1, 0)
-        elif kind in (_SHORT, _LONG):
+        if tag == _Tag.ORIENTATION:
+            struct.pack_into(f"{order}HHIHH", turned, at, tag, _Type.SHORT, 1, 1, 0)
+        elif kind in _TIFF_LAYOUT:
             found[tag] = max(value, found.get(tag, 0))
-    width, height = found.get(_WIDTH, 0), found.get(_HEIGHT, 0)
-    rows = found.get(_ROWS, _WHOLE)
+    width, height = found.get(_Tag.WIDTH, 0), found.get(_Tag.HEIGHT, 0)
+    rows = found.get(_Tag.ROWS, U32_MAX)
     _require_pixels(width, height)
-    _require_pixels(found.get(_TILE_WIDTH, width), found.get(_TILE_HEIGHT, height if rows == _WHOLE else rows))
-    if found.get(_BITS, 1) > 16 or found.get(_SAMPLES, 1) > 4:
-        raise PictureError("is a TIFF of more than 16 bits in 4 channels, which is not read")
+    _require_pixels(found.get(_Tag.TILE_WIDTH, width),
+                    found.get(_Tag.TILE_HEIGHT, height if rows == U32_MAX else rows))  # the strip is the picture
+    if found.get(_Tag.BITS, 1) > _BITS_MAX or found.get(_Tag.SAMPLES, 1) > _SAMPLES_MAX:
+        raise PictureError(f"is a TIFF of more than {_BITS_MAX} bits in {_SAMPLES_MAX} channels, which is not read")
     return width, height, bytes(turned)
 
 
 def _tiff_entries(data: bytes, order: str) -> Iterator[tuple[int, int, int, int]]:
     """(place, tag, type, first value) of the first directory's entries."""
-    begin = struct.unpack_from(f"{order}I", data, 4)[0]
-    for k in range(struct.unpack_from(f"{order}H", data, begin)[0]):
-        at = begin + 2 + 12 * k
-        tag, kind, count = struct.unpack_from(f"{order}HHI", data, at)
-        letter, size = ("H", 2) if kind == _SHORT else ("I", 4)
-        place = at + 8 if count * size <= 4 else struct.unpack_from(f"{order}I", data, at + 8)[0]
-        value = struct.unpack_from(f"{order}{letter}", data, place)[0] if kind in (_SHORT, _LONG) else 0
+    begin = struct.unpack_from(f"{order}4xI", data)[0]
+    number, entry = struct.Struct(f"{order}H"), struct.Struct(f"{order}HHI4s")
+    at = begin + number.size
+    for _ in range(number.unpack_from(data, begin)[0]):
+        tag, kind, count, own = entry.unpack_from(data, at)
+        value = 0
+        if kind in _TIFF_LAYOUT:
+            layout = struct.Struct(f"{order}{_TIFF_LAYOUT[kind]}")
+            value = (layout.unpack_from(own) if count * layout.size <= len(own) else
+                     layout.unpack_from(data, struct.unpack(f"{order}I", own)[0]))[0]
         yield at, tag, kind, value
+        at += entry.size
