@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, sized_table
 from rhot_app.estimation.layout import pose_matrix
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
-from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE, TANGENT
+from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, point_covariances
+from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE
 from rhot_app.state import Knowledge
 
 Array = NDArray[np.float64]
@@ -56,18 +56,12 @@ def place_joints(state, covariance, dh, bone, points, covariances, motion):
     jacobian_arrays(table, world, frames, points, jacobian)
     add_lengths(table, bone, world, frames, points, jacobian[:, :, POSE:])
     own = np.empty(POSE + 2 + lengths, np.int64)
+    own[:POSE] = np.arange(POSE)
     own[POSE], own[POSE + 1] = MOTION + HAND_SIZE, MOTION + FINGER_SIZE
     own[POSE + 2:] = MOTION + LENGTH + np.arange(lengths)
-    for order in range(3):
-        own[TANGENT.pose] = order * POSE + np.arange(POSE)
-        count = len(own) if order == 0 else POSE
-        block = np.empty((count, count))
-        for i in range(count):
-            for j in range(count):
-                block[i, j] = covariance[own[i], own[j]]
-        for p in range(points.shape[0] if order == 0 else 21):
-            one = np.dot(np.ascontiguousarray(jacobian[p, :, :count]), np.dot(block, jacobian[p, :, :count].T.copy()))
-            if order == 0:
-                covariances[p] = one
-            else:
-                motion[order - 1, p] = np.sqrt(max(one[0, 0] + one[1, 1] + one[2, 2], 0.0))
+    point_covariances(jacobian, own, covariance, covariances)
+    scratch = np.empty((motion.shape[1], 3, 3))
+    for order in range(2):
+        point_covariances(jacobian[:len(scratch)], np.arange(POSE) + POSE * (order + 1), covariance, scratch)
+        for p in range(len(scratch)):
+            motion[order, p] = np.sqrt(max(np.trace(scratch[p]), 0.0))

@@ -146,3 +146,28 @@ def move(world: Array, angles: Array, step: Array, out_world: Array, out_angles:
         out_world[3, j] = world[3, j]
     for i in range(angles.shape[0]):
         out_angles[i] = angles[i] + step[TWIST + i]
+
+
+@njit(cache=True)
+def point_covariances(jacobian: Array, columns: NDArray[np.int64], covariance: Array, out: Array) -> None:
+    """C_p = J_p P J_p^T: fills `out` (N, 3, 3) for N points.
+
+    `jacobian` (N, 3, K): of the points by K numbers, most of which do not move a point; `columns` (K,): where these
+    numbers are in the `covariance` P.
+    """
+    used, product = np.empty(columns.shape[0], np.int64), np.empty(3)
+    for p in range(jacobian.shape[0]):
+        count = 0
+        for k in range(columns.shape[0]):
+            if jacobian[p, 0, k] != 0.0 or jacobian[p, 1, k] != 0.0 or jacobian[p, 2, k] != 0.0:
+                used[count] = k
+                count += 1
+        out[p] = 0.0
+        for a in used[:count]:
+            product[:] = 0.0
+            for b in used[:count]:
+                for i in range(3):
+                    product[i] += covariance[columns[a], columns[b]] * jacobian[p, i, b]
+            for i in range(3):
+                for j in range(3):
+                    out[p, i, j] += jacobian[p, i, a] * product[j]

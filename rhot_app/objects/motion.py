@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.layout import SE3, Layout, pose_matrix
 from rhot_app.estimation.residual import UNIT, Kernel, Rows, student
 from rhot_app.estimation.se3 import PoseState, difference, exponential, pose_difference, retract
 from rhot_app.geometry.camera import CameraModel, project_point
@@ -21,8 +22,13 @@ from rhot_app.geometry.camera import CameraModel, project_point
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-TWIST, SIZE, STATE, VELOCITY = 6, 12, 18, 12
-"""Numbers of a pose's tangent space, of a state's, and of a state; where its velocity begins."""
+_LAYOUT = Layout(pose=SE3, velocity=6)
+POSE, VELOCITY = _LAYOUT.state("pose"), _LAYOUT.state("velocity")
+POSE_ERROR, VELOCITY_ERROR = _LAYOUT.tangent("pose"), _LAYOUT.tangent("velocity")
+"""Where pose and velocity lie in a state and in its tangent space."""
+
+SIZE, TWIST = _LAYOUT.tangent_size, POSE_ERROR.stop
+"""Numbers of a state's tangent space, and of a pose's."""
 
 REST_ACCELERATION = 0.3, 5.0
 """m/s^2 and rad/s^2 rms: accelerations of a held object at rest (`python benchmarks/object_motion.py`)."""
@@ -59,11 +65,6 @@ def state_of(world_from_object: Array) -> Array:
     return np.concatenate([world_from_object[:3].ravel(), np.zeros(6)])
 
 
-def pose_of(state: Array) -> Array:
-    """(4, 4) world_from_object of a state."""
-    return np.vstack([state[:VELOCITY].reshape(3, 4), np.eye(4)[3]])
-
-
 class ObjectProcess(PoseState):
     """Implements `estimation.residual.Process`: white acceleration that is the stronger, the faster the object moves.
 
@@ -79,25 +80,27 @@ class ObjectProcess(PoseState):
         move = self.transition(state, dt_s)
         noise = np.zeros((SIZE, SIZE))
         for first, rest, start in zip((0, 3), REST_ACCELERATION, START_SPEED, strict=True):
-            speed = state[VELOCITY + first:VELOCITY + first + 3]
-            spread = np.trace(covariance[TWIST + first:TWIST + first + 3, TWIST + first:TWIST + first + 3])
+            own = slice(first, first + 3)
+            speed = state[VELOCITY][own]
+            spread = np.trace(covariance[VELOCITY_ERROR, VELOCITY_ERROR][own, own])
             square = rest**2 + RATE**2 * (speed @ speed + min(spread, 3.0 * start**2))
             density = 2.0 / RATE * square / 3.0
             for axis in range(first, first + 3):
                 noise[axis, axis] = density * dt_s**3 / 3.0
                 noise[axis, axis + TWIST] = noise[axis + TWIST, axis] = density * dt_s**2 / 2.0
                 noise[axis + TWIST, axis + TWIST] = density * dt_s
-        moved = retract(state, np.concatenate([dt_s * state[VELOCITY:], np.zeros(TWIST)]))
+        moved = retract(state, np.concatenate([dt_s * state[VELOCITY], np.zeros(TWIST)]))
         return moved, move @ covariance @ move.T + noise
 
     def transition(self, state: Array, dt_s: float) -> Array:
         """(12, 12) Jacobian of `predict`'s state by `state`."""
         turn, left = np.empty((3, 3)), np.empty((3, 3))
-        exponential(dt_s * state[15], dt_s * state[16], dt_s * state[17], turn, left)
+        x, y, z = dt_s * state[VELOCITY][3:]
+        exponential(x, y, z, turn, left)
         move = np.eye(SIZE)
-        move[0:3, 6:9] = dt_s * np.eye(3)
-        move[3:6, 3:6] = turn
-        move[3:6, 9:12] = dt_s * left
+        move[POSE_ERROR, VELOCITY_ERROR] = dt_s * np.eye(6)
+        move[POSE_ERROR, POSE_ERROR][3:, 3:] = turn
+        move[POSE_ERROR, VELOCITY_ERROR][3:, 3:] = dt_s * left
         return move
 
 
@@ -141,7 +144,7 @@ class VelocityPrior:
     def linearise(self, state: Array) -> Rows:
         """Six rows, by standard deviations."""
         scale = 1.0 / np.repeat(START_SPEED, 3)
-        return Rows(-scale * state[VELOCITY:], np.hstack([np.zeros((TWIST, TWIST)), np.diag(scale)]), UNIT,
+        return Rows(-scale * state[VELOCITY], np.hstack([np.zeros((TWIST, TWIST)), np.diag(scale)]), UNIT,
                     first=np.zeros(1, np.int64))
 
 
@@ -174,7 +177,7 @@ class PoseResidual:
         The rotation's error is log(R_measured R^T); its Jacobian by the state is the inverse right one, 1 to first
         order in an error that a gate keeps small.
         """
-        error = np.array(pose_difference(self.world_from_object, state[:VELOCITY].reshape(3, 4)))
+        error = np.array(pose_difference(self.world_from_object, pose_matrix(state)))
         return Rows(error, np.eye(TWIST, SIZE), self.covariance, first=np.zeros(1, np.int64))
 
 
@@ -184,14 +187,15 @@ def _project(state: Array, points: Array, late_s: Array, pose: Array, intrinsics
     """Fill `pixels` (K, 2) and `jacobian` (K, 2, 12) of points seen `late_s` (K,) after the state's instant."""
     turn, left, by_world, by_place = np.empty((3, 3)), np.empty((3, 3)), np.empty((2, 3)), np.empty((3, 12))
     arm, here, y = np.empty(3), np.empty(3), np.empty(3)
+    world, velocity = pose_matrix(state), state[VELOCITY]
     for n in range(points.shape[0]):
         late = late_s[n]
-        exponential(late * state[15], late * state[16], late * state[17], turn, left)
+        exponential(late * velocity[3], late * velocity[4], late * velocity[5], turn, left)
         for i in range(3):
-            y[i] = state[4 * i] * points[n, 0] + state[4 * i + 1] * points[n, 1] + state[4 * i + 2] * points[n, 2]
+            y[i] = world[i, 0] * points[n, 0] + world[i, 1] * points[n, 1] + world[i, 2] * points[n, 2]
         for i in range(3):
             arm[i] = turn[i, 0] * y[0] + turn[i, 1] * y[1] + turn[i, 2] * y[2]
-            here[i] = state[4 * i + 3] + late * state[VELOCITY + i] + arm[i]
+            here[i] = world[i, 3] + late * velocity[i] + arm[i]
         if not project_point(here[0], here[1], here[2], pose, intrinsics, pixels[n], by_world):
             pixels[n, :] = math.nan
             jacobian[n, :, :] = math.nan

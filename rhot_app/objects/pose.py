@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.least_squares import Dense, minimise
 from rhot_app.estimation.residual import Residual, Rows
 from rhot_app.estimation.se3 import difference, exp_so3, retract
@@ -26,7 +27,6 @@ from rhot_app.objects.motion import (
     CameraArrays,
     PointResidual,
     VelocityPrior,
-    pose_of,
     state_of,
 )
 from rhot_app.objects.object_file import spans_plane
@@ -69,7 +69,7 @@ class Mode:
     @property
     def world_from_object(self) -> Array:
         """(4, 4)."""
-        return pose_of(self.state)
+        return pose_matrix(self.state)
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +191,7 @@ def _triangulated_starts(points: ObjectPoints, cameras: CameraArrays, views: Seq
 def reversed_state(points: ObjectPoints, cameras: CameraArrays, view: ObjectView, state: Array) -> Array:
     """The state whose points in a view, if they lie in a plane, look nearly the same: the plane turned by half a turn
     about its normal, then about the line of sight (Necker's reversal)."""
-    world_from_object, seen = pose_of(state), points.points[view.rows]
+    world_from_object, seen = pose_matrix(state), points.points[view.rows]
     middle = seen.mean(axis=0)
     normal = np.linalg.svd(seen - middle)[2][2]
     line_of_sight = world_from_object[:3, :3] @ middle + world_from_object[:3, 3] - cameras.centres[view.camera]
@@ -199,7 +199,7 @@ def reversed_state(points: ObjectPoints, cameras: CameraArrays, view: ObjectView
     rotation = half_turns[0] @ world_from_object[:3, :3] @ half_turns[1]
     translation = world_from_object[:3, :3] @ middle + world_from_object[:3, 3] - rotation @ middle
     out = state_of(rigid(rotation, translation))
-    out[VELOCITY:VELOCITY + 3], out[VELOCITY + 3:] = state[VELOCITY:VELOCITY + 3], half_turns[0] @ state[VELOCITY + 3:]
+    out[VELOCITY][:3], out[VELOCITY][3:] = state[VELOCITY][:3], half_turns[0] @ state[VELOCITY][3:]
     return out
 
 

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics, Part
 from rhot_app.estimation.filter import FilteredState, Knot
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.residual import Residual
 from rhot_app.estimation.se3 import difference
 from rhot_app.estimation.track import PREDICTED_NS, Life, TrackFilter
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.objects.motion import SIZE, TWIST, VELOCITY, CameraArrays, ObjectProcess, StatePrior, pose_of
+from rhot_app.objects.motion import SIZE, TWIST, VELOCITY, CameraArrays, ObjectProcess, StatePrior
 from rhot_app.objects.object_file import ObjectModel, require_distinct
 from rhot_app.objects.observations import FiducialFrame, MarkerPoints, ObjectPoints, ObjectView
 from rhot_app.objects.pose import (
@@ -115,7 +116,7 @@ class PointMeasurement:
         whitened = residual.whitening @ jacobian
         error = (residual.whitening @ (residual.pixels - pixels)[:, :, None])[:, :, 0]
         total = whitened @ covariance @ whitened.swapaxes(1, 2) + np.eye(2)
-        accepted = faces_camera(self._points, self._cameras, self._view, pose_of(state)) & np.isfinite(error[:, 0])
+        accepted = faces_camera(self._points, self._cameras, self._view, pose_matrix(state)) & np.isfinite(error[:, 0])
         distances = np.full(len(error), np.inf)
         distances[accepted] = np.einsum("ki,ki->k", error[accepted],
                                         np.linalg.solve(total[accepted], error[accepted][:, :, None])[:, :, 0])
@@ -197,8 +198,8 @@ class ObjectTrack:
             validity = Validity.AMBIGUOUS
         elif self._life.predicted(t_ns):
             validity = Validity.PREDICTED
-        return ObjectState(self.name, best.filter.time_ns(t_s), validity, pose_of(state),
-                           covariance[:TWIST, :TWIST], state[VELOCITY:])
+        return ObjectState(self.name, best.filter.time_ns(t_s), validity, pose_matrix(state),
+                           covariance[:TWIST, :TWIST], state[VELOCITY])
 
     def estimate(self) -> tuple[int, FilteredState] | None:
         """Master time, ns, and the most probable hypothesis after the newest measurement, labelled by its filter; None

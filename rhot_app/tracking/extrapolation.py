@@ -17,7 +17,7 @@ from rhot_app.estimation.track import LOST_NS
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.skeleton import JOINT_SLICES
-from rhot_app.objects.motion import SIZE, TWIST, ObjectProcess, pose_of
+from rhot_app.objects.motion import SIZE, TWIST, ObjectProcess
 from rhot_app.objects.state import ObjectState
 from rhot_app.project import Rig
 from rhot_app.state import HandState
@@ -115,7 +115,7 @@ def _later(one: ObjectState, dt_s: float) -> ObjectState:
     covariance[:TWIST, :TWIST] = one.covariance
     state, grown = ObjectProcess().predict(np.concatenate([one.world_from_object[:3].ravel(), one.velocity]),
                                            covariance, dt_s)
-    return replace(one, t_master_ns=one.t_master_ns + round(1e9 * dt_s), world_from_object=pose_of(state),
+    return replace(one, t_master_ns=one.t_master_ns + round(1e9 * dt_s), world_from_object=pose_matrix(state),
                    covariance=grown[:TWIST, :TWIST])
 
 

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.estimation.filter import AHEAD_S, FilteredState, smooth
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.track import LOST_NS, PREDICTED_NS
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.objects.contact import ContactMonitor, FingertipPads, fingertip_pads
-from rhot_app.objects.motion import TWIST, VELOCITY, pose_of
+from rhot_app.objects.motion import TWIST, VELOCITY
 from rhot_app.objects.observations import MarkerPoints, MeasuredPose, ObjectFrame
 from rhot_app.objects.shape import shape_of
 from rhot_app.objects.state import ObjectState, Validity, unknown_object
@@ -192,7 +193,7 @@ class _History:
             return unknown_object(self.name, t_ns, Validity.LOST)
         state, covariance = here.process.predict(here.state, here.covariance, t_s - here.t_s)
         return ObjectState(self.name, t_ns, Validity.PREDICTED if late_ns > PREDICTED_NS else Validity.TRACKED,
-                           pose_of(state), covariance[:TWIST, :TWIST], state[VELOCITY:])
+                           pose_matrix(state), covariance[:TWIST, :TWIST], state[VELOCITY])
 
     def _smooth(self, t_s: float) -> None:
         """Smooth what there is, one run of one hypothesis after the other."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_app.estimation.layout import pose_matrix
 from rhot_app.geometry.camera import project_with_slope
-from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays
+from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, point_covariances
 from rhot_app.hand.landmarks import DISAGREEMENT_M
 from rhot_app.hand.motion.hand_state import POSE, STATE, TANGENT
 from rhot_app.hand.skeleton import FINGER_OF_ANGLE, FINGER_OF_JOINT, TIP_ROLES, WRIST_ROLE
@@ -20,10 +21,10 @@ from rhot_app.state import (
     INFERRED_RAD,
     MEASURED_M,
     MEASURED_RAD,
-    UNESTIMATED,
     Condition,
     HandState,
     Knowledge,
+    no_hand,
 )
 from rhot_app.tracking import locate
 from rhot_app.tracking.association import GATE
@@ -207,8 +208,7 @@ class EstimatorStates:
             acceleration_sd=deviation[TANGENT.acceleration], joint_velocity_sd=motion_sd[0],
             joint_acceleration_sd=motion_sd[1], hand_scale=self._scale,
             hand_scale_sd=self._scale_sd,
-            latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
-                       "filter": solved - begun, "solve": time.perf_counter() - solved})
+            latency_s=_latency(newest, solved - begun, time.perf_counter() - solved))
 
     def _doubt_distance(self, camera: int, points: Array, covariances: Array, state: Array, covariance: Array) -> None:
         """Add what `camera` cannot show: hand and distance may be larger or smaller together, about its centre."""
@@ -235,21 +235,16 @@ class EstimatorStates:
 
     def none(self, sequence: int, condition: Condition, newest: CameraObservations, begun: float) -> HandState:
         """No hand: what the cameras see is all there is."""
-        rig, markers = self._rig, len(self._rig.marker_ids)
-        unknown = int(Knowledge.UNKNOWN)
-        return HandState(
-            sequence=sequence, t_master_ns=newest.t_row0_master_ns, t_receive_ns=newest.t_receive_ns,
-            condition=condition, marker_ids=rig.marker_ids, marker_positions=np.full((markers, 3), np.nan),
-            marker_raw_positions=np.full((markers, 3), np.nan), marker_covariances=np.full((markers, 3, 3), np.nan),
-            marker_knowledge=np.full(markers, unknown, np.uint8), camera_names=rig.camera_names,
-            camera_pixels=self._observations.pixels.copy(), camera_flags=self._observations.flags.copy(),
-            joint_positions=np.full((21, 3), np.nan), joint_knowledge=np.full(21, unknown, np.uint8),
-            fingertip_positions=np.full((5, 3), np.nan), angles=np.full(21, np.nan),
-            angle_knowledge=np.full(21, unknown, np.uint8), world_from_palm=np.full((4, 4), np.nan),
-            palm_knowledge=Knowledge.UNKNOWN, epipolar_error_px=np.full(markers, np.nan),
-            **UNESTIMATED | {"hand_scale": self._scale, "hand_scale_sd": self._scale_sd},
-            latency_s={"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
-                       "filter": time.perf_counter() - begun, "solve": 0.0})
+        return replace(
+            no_hand(newest.t_row0_master_ns, condition, self._rig.camera_names, markers=self._rig.marker_ids),
+            sequence=sequence, t_receive_ns=newest.t_receive_ns, camera_pixels=self._observations.pixels.copy(),
+            camera_flags=self._observations.flags.copy(), hand_scale=self._scale, hand_scale_sd=self._scale_sd,
+            latency_s=_latency(newest, time.perf_counter() - begun))
+
+
+def _latency(newest: CameraObservations, filter_s: float, solve_s: float = 0.0) -> dict[str, float]:
+    return {"detect": newest.detect_s, "network": newest.network_s, "pair": 0.0, "triangulate": 0.0,
+            "filter": filter_s, "solve": solve_s}
 
 
 @njit(cache=True)
@@ -307,31 +302,12 @@ def _place(state, covariance, dh, half_axes, poses, intrinsics, observed, late_s
     world = pose_matrix(state)
     forward_arrays(dh, world, state[STATE.angles], frames, points)
     jacobian_arrays(dh, world, frames, points, jacobian)
-    columns, product = np.empty(POSE, np.int64), np.empty((POSE, 3))
-    for p in range(count):
-        used = 0
-        for j in range(POSE):
-            if jacobian[p, 0, j] != 0.0 or jacobian[p, 1, j] != 0.0 or jacobian[p, 2, j] != 0.0:
-                columns[used] = j
-                used += 1
-        for a in range(used):
-            for i in range(3):
-                product[a, i] = 0.0
-                for b in range(used):
-                    product[a, i] += covariance[columns[a], columns[b]] * jacobian[p, i, columns[b]]
-        for i in range(3):
-            for j in range(3):
-                covariances[p, i, j] = 0.0
-                for a in range(used):
-                    covariances[p, i, j] += jacobian[p, i, columns[a]] * product[a, j]
-        for order in range(2 if p < _FIRST_TIP else 0):
-            variance, first = 0.0, POSE * (order + 1)
-            for a in range(used):
-                for b in range(used):
-                    together = covariance[first + columns[a], first + columns[b]]
-                    for i in range(3):
-                        variance += jacobian[p, i, columns[a]] * together * jacobian[p, i, columns[b]]
-            motion_sd[order, p] = math.sqrt(max(variance, 0.0))
+    own, scratch = np.arange(POSE), np.empty((_FIRST_TIP, 3, 3))
+    point_covariances(jacobian, own, covariance, covariances)
+    for order in range(2):
+        point_covariances(jacobian[:_FIRST_TIP], own + POSE * (order + 1), covariance, scratch)
+        for p in range(_FIRST_TIP):
+            motion_sd[order, p] = _sd(scratch[p])
     place, then, seen, slope = np.empty(3), np.empty(3), np.empty(2), np.empty((2, 3))
     velocity, acceleration, biases = state[STATE.velocity], state[STATE.acceleration], state[STATE.lasting]
     for camera in range(poses.shape[0]):
