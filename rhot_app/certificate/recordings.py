@@ -23,9 +23,9 @@ from rhot_app.project import Rig, with_tracker
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import LATENCY_STAGES
-from rhot_app.tracking.locate import choose_views, locate_all
+from rhot_app.tracking.locate import locate_paired, rig_table
 from rhot_app.tracking.pairing import Paired, Pairing
-from rhot_app.tracking.rig_arrays import RigArrays, compile_rig, locate_by_disparity
+from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.files import read_document, write_document
@@ -172,11 +172,11 @@ def read_recording(path: Path, rig: Rig, progress: Progress = silent) -> Certifi
     if not frames:
         raise CertificateError(f"{path}: no frame in it can be used with the rig {rig.name!r}. Give the rig that it "
                                "was recorded with, or record again.")
-    arrays = compile_rig(rig)
+    table = rig_table(compile_rig(rig))
     times = np.array([one.t_ns for one in paired], dtype=np.int64)
     positions: Array = np.full((len(paired), len(rig.markers.ids), 3), np.nan)
     for row, one in enumerate(paired):
-        _locate(one, arrays, positions[row])
+        positions[row] = locate_paired(one, table)[0].positions
     frames.sort(key=lambda frame: frame.t_receive_ns)
     cameras = np.array([frame.camera for frame in frames])
     pixels = np.array([frame.pixels for frame in frames])
@@ -216,19 +216,6 @@ def _frames(path: Path, rig: Rig, progress: Progress) -> tuple[list[CameraObserv
     except RecordingError as exc:
         raise CertificateError(str(exc)) from exc
     return frames, paired
-
-
-def _locate(one: Paired, rig: RigArrays, positions: Array) -> None:
-    """Fill (M, 3) m, as the tracker's first stage does before it asks whether it is a hand."""
-    count = len(positions)
-    used, unclear = np.empty(one.flags.shape, np.bool_), np.empty(count, np.bool_)
-    choose_views(one.flags, one.live, used, unclear)
-    covariances, errors = np.empty((count, 3, 3)), np.empty(count)
-    if len(rig.law):
-        locate_by_disparity(one.pixels, one.covariances, used, rig.law, positions, covariances, errors)
-    else:
-        locate_all(one.pixels, one.covariances, used, rig.intrinsics, rig.cameras, rig.shapes, positions,
-                   covariances, errors)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,39 +4,32 @@ A node reports several objects of a marker's colour. While a marker is tracked, 
 that the position of the rest of the hand predicts it. Without a known hand nothing is predicted. Candidates of two
 cameras are then chosen whose rays meet (the epipolar constraint) at points within the hand's reach of each other.
 
-`assign` solves the assignment for any predicted pixels with covariances. `MarkerAssociation` predicts for a tracker.
+`assign` solves the assignment for any predicted pixels with covariances, `MarkerAssociation` that of a frame.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from rhot_app.estimation.quantiles import chi_squared
 from rhot_app.geometry.camera import pixels_per_metre, project_with_slope, undistort_points
 from rhot_app.tracking.locate import GATE_FLOOR_PX
 from rhot_app.tracking.rig_arrays import RigArrays
-from rhot_app.tracking.tracker import CameraObservations
-from rhot_app.tracking.trust import ACCELERATION_LIMIT, FORGET_S, VELOCITY_TIME_S
+from rhot_app.tracking.tracker import CameraObservations, Candidates
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-GATE = 13.816
-"""Squared Mahalanobis distance: the 0.999 quantile of chi-squared with 2 degrees of freedom."""
+GATE = float(chi_squared(0.999, 2))
+"""Squared Mahalanobis distance of a pixel that one observation in a thousand exceeds."""
 
 AMBIGUITY_MARGIN = 4.0
 """Difference of squared Mahalanobis distances: a likelihood ratio of e^2. Candidates closer than that are ambiguous."""
-
-ACCELERATION_SD = ACCELERATION_LIMIT / np.sqrt(GATE)
-"""m/s^2: process noise with which a hand at the acceleration limit lies on the gate."""
-
-POSITION_SD_M = 2e-3
-"""m: standard deviation of a tracked marker's last position, for the noise and latency of the tracker."""
 
 FRAME_SKEW_MAX_NS = 100_000_000
 """ns: frames of two cameras that are further apart in time are not compared by their rays."""
@@ -75,22 +68,8 @@ def assign(predicted: Array, predicted_covariances: Array, pixels: Array, covari
     return chosen, costs
 
 
-class _CandidateList(NamedTuple):
-    """All candidates of one frame, N rows: first the best one of every marker that has any, then the others.
-
-    `markers` (N,): indices in the rig. `pixels` (N, 2) px, `covariances` (N, 2, 2) px^2, `diameters` (N,) px.
-    """
-
-    markers: Indices
-    pixels: Array
-    covariances: Array
-    diameters: Array
-    qualities: Array
-    flags: NDArray[np.uint16]
-
-
 class MarkerAssociation:
-    """Chooses one candidate for each marker in every frame. Its tracker calls `update` with the markers' positions."""
+    """Chooses one candidate for each marker in every frame."""
 
     def __init__(self, rig: RigArrays) -> None:
         self._rig = rig
@@ -101,32 +80,17 @@ class MarkerAssociation:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all positions and frames."""
+        """Forget all frames."""
         cameras, markers = len(self._rig.cameras), len(self._rig.marker_ids)
-        self._positions, self._velocities = np.full((markers, 3), np.nan), np.zeros((markers, 3))
-        self._covariances = np.zeros((markers, 3, 3))
-        self._located_ns = np.zeros(markers, dtype=np.int64)  # master time of `_positions`
         self._chosen = np.full((cameras, markers, 2), np.nan)  # px, where each camera saw it last
         self._frames: list[CameraObservations | None] = [None] * cameras  # newest of each camera, all candidates
 
-    def update(self, t_ns: int, positions: Array, covariances: Array | None = None) -> None:
-        """Take in the markers' positions (M, 3) m, world frame, at master time `t_ns`; NaN where not known.
-
-        `covariances` (M, 3, 3) m^2 of the positions; None: POSITION_SD_M on every axis.
-        """
-        known = np.isfinite(positions[:, 0])
-        dt_s = 1e-9 * (t_ns - self._located_ns)
-        steady = known & np.isfinite(self._positions[:, 0]) & (dt_s > 0.0) & (dt_s < FORGET_S)
-        self._velocities[known & ~steady] = 0.0
-        speeds = (positions[steady] - self._positions[steady]) / dt_s[steady, None]
-        weights = dt_s[steady, None] / (dt_s[steady, None] + VELOCITY_TIME_S)
-        self._velocities[steady] += weights * (speeds - self._velocities[steady])
-        self._positions[known], self._located_ns[known] = positions[known], t_ns
-        floor = POSITION_SD_M**2 * np.eye(3)
-        self._covariances[known] = floor if covariances is None else covariances[known] + floor
-
-    def select(self, frame: CameraObservations) -> CameraObservations:
+    def select(self, frame: CameraObservations, points: Array | None = None, variances: Array | None = None
+               ) -> CameraObservations:
         """The frame with the likeliest candidate of each marker. A marker without a candidate in its gate is lost.
+
+        `points` (M, 3) m: where the markers are predicted at the frame's time, NaN or None where nothing is, with
+        `variances` (M,) m^2 on every axis.
 
         AMBIGUOUS is set where another candidate is about as likely (AMBIGUITY_MARGIN). ACQUIRED is set where another
         candidate is nearer to the pixel chosen in the camera's last frame. A frame without further candidates is
@@ -138,7 +102,7 @@ class MarkerAssociation:
             self._chosen[frame.camera][found] = frame.pixels[found]
             return frame
         listed = _list_candidates(frame)
-        predicted, covariances = self._predict(frame)
+        predicted, covariances = self._predict(frame.camera, points, variances)
         chosen, rivals = self._choose(listed, predicted, covariances)
         undetermined = np.isnan(predicted[:, 0]) | (rivals >= 0)  # the prediction does not tell
         if undetermined.any():
@@ -148,26 +112,23 @@ class MarkerAssociation:
         chosen[alone] = [int(np.flatnonzero(listed.markers == m)[0]) for m in np.flatnonzero(alone)]
         return self._selected(frame, listed, chosen, rivals)
 
-    def _predict(self, frame: CameraObservations) -> tuple[Array, Array]:
-        """Predicted pixels (M, 2), NaN where nothing is, and their covariances (M, 2, 2) px^2."""
-        rig, camera = self._rig, frame.camera
-        middle_ns = frame.row_time_ns * rig.intrinsics[camera, 3]  # when the row of the principal point is exposed
-        dt_s = 1e-9 * (frame.t_row0_master_ns + middle_ns - self._located_ns)
-        points = self._positions + self._velocities * dt_s[:, None]
-        spread = self._covariances + ((0.5 * ACCELERATION_SD * dt_s**2) ** 2)[:, None, None] * np.eye(3)
-        tracked = np.isfinite(points[:, 0]) & (np.abs(dt_s) < FORGET_S)
-        newest = tracked & self._on_hand & (self._located_ns == np.max(
-            self._located_ns, initial=0, where=tracked & self._on_hand))
-        # A marker that is not tracked, or whose own prediction is less certain than this, is somewhere on the hand.
-        certain = tracked & (np.trace(spread, axis1=1, axis2=2) < 3.0 * self._hand_sd_m**2)
-        by_hand = self._on_hand & newest.any() & ~certain
-        points[~tracked] = np.nan
-        points[by_hand] = points[newest].mean(axis=0) if newest.any() else np.nan
-        spread[by_hand] = (self._hand_sd_m**2)[by_hand, None, None] * np.eye(3)
-        pixels, slope = project_with_slope(points, rig.cameras[camera], rig.intrinsics[camera])
-        return pixels, slope @ spread @ slope.transpose(0, 2, 1)
+    def _predict(self, camera: int, points: Array | None, variances: Array | None) -> tuple[Array, Array]:
+        """Predicted pixels (M, 2), NaN where nothing is, and their covariances (M, 2, 2) px^2.
 
-    def _choose(self, listed: _CandidateList, predicted: Array, covariances: Array) -> tuple[Indices, Indices]:
+        A marker that is not predicted, or less certainly, is somewhere on the hand, about the others' mean.
+        """
+        rig, hand_variances = self._rig, self._hand_sd_m**2
+        if points is None or variances is None:
+            points, variances = np.full((len(rig.marker_ids), 3), np.nan), hand_variances
+        certain = np.isfinite(points[:, 0]) & (variances < hand_variances)
+        if (certain & self._on_hand).any():
+            by_hand = self._on_hand & ~certain
+            points = np.where(by_hand[:, None], points[certain & self._on_hand].mean(axis=0), points)
+            variances = np.where(by_hand, hand_variances, variances)
+        pixels, slope = project_with_slope(points, rig.cameras[camera], rig.intrinsics[camera])
+        return pixels, variances[:, None, None] * slope @ slope.transpose(0, 2, 1)
+
+    def _choose(self, listed: Candidates, predicted: Array, covariances: Array) -> tuple[Indices, Indices]:
         """The candidate of each marker (M,), and another one that is about as likely; -1 for none.
 
         `predicted` (M, 2) px, NaN for none, with `covariances` (M, 2, 2) px^2.
@@ -185,7 +146,7 @@ class MarkerAssociation:
         near = (others[every, rivals] < GATE) & (others[every, rivals] - paid < AMBIGUITY_MARGIN) & (chosen >= 0)
         return chosen, np.where(near, rivals, -1)
 
-    def _choose_by_rays(self, frame: CameraObservations, listed: _CandidateList) -> tuple[Indices, Indices]:
+    def _choose_by_rays(self, frame: CameraObservations, listed: Candidates) -> tuple[Indices, Indices]:
         """The candidate of each marker (M,) by the rays of two cameras, and another one where the rays do not tell; -1
         for none.
 
@@ -214,7 +175,7 @@ class MarkerAssociation:
                     best[m] = row
         return best, undecided
 
-    def _intersections(self, frame: CameraObservations, listed: _CandidateList, rays: Array,
+    def _intersections(self, frame: CameraObservations, listed: Candidates, rays: Array,
                        other: CameraObservations) -> tuple[Indices, Array]:
         """Points (H, 3) m, world frame, where the rays of candidates of the same marker meet in two cameras, and (H,)
         the rows of the candidates in `listed`. `rays` (N, 2): normalised coordinates of `listed`."""
@@ -250,7 +211,7 @@ class MarkerAssociation:
         order = np.argsort(-apart[anchor])
         return np.asarray(order[near[anchor, order]])
 
-    def _selected(self, frame: CameraObservations, listed: _CandidateList, chosen: Indices,
+    def _selected(self, frame: CameraObservations, listed: Candidates, chosen: Indices,
                   rivals: Indices) -> CameraObservations:
         """The frame with the chosen candidates (M,), -1 for lost, and their flags; they are kept for the next frame.
 
@@ -276,12 +237,12 @@ class MarkerAssociation:
                        qualities=np.where(found, listed.qualities[rows], 0.0))
 
 
-def _list_candidates(frame: CameraObservations) -> _CandidateList:
+def _list_candidates(frame: CameraObservations) -> Candidates:
     """Every candidate of a frame but the lost ones."""
     found = np.flatnonzero(np.isfinite(frame.pixels[:, 0]) & ((frame.flags & _LOST) == 0))
     columns = [getattr(frame, name)[found] for name in _COLUMNS]
     if frame.further is None:
-        return _CandidateList(found, *columns)
+        return Candidates(found, *columns)
     further = [getattr(frame.further, name) for name in _COLUMNS]
-    return _CandidateList(np.concatenate([found, frame.further.markers]),
+    return Candidates(np.concatenate([found, frame.further.markers]),
                    *(np.concatenate(both) for both in zip(columns, further, strict=True)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -13,7 +14,7 @@ from rhot_app.diagnostics import Diagnostics
 from rhot_app.estimation.track import LOST_NS
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.kinematics import forward_arrays
+from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.places import with_markers
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, FINGER_OF_ANGLE, JOINT_SLICES, JOINTS, HandPose
@@ -23,12 +24,12 @@ from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, any_marker, fit_p
 from rhot_app.hand.solvers.problem import make_problem
 from rhot_app.project import IkMethod, Rig
 from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
-from rhot_app.tracking import locate, trust
 from rhot_app.tracking.association import MarkerAssociation
-from rhot_app.tracking.locate import LocateArrays
+from rhot_app.tracking.locate import Places, Views, empty_places, locate_all, rig_table, turn_band
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig, filter_settings
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker
+from rhot_app.tracking.trust import Targets, Verdicts, conclude, locate_inliers, no_tracks, no_verdicts, predict
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,7 @@ class ClassicTracker(Tracker):
         self._pixel_filter = OneEuroFilter.from_settings([s for _ in range(cameras) for s in pixel for _ in range(2)])
         self._position_filter = OneEuroFilter.from_settings([s for s in position for _ in range(3)])
         self._turned_shapes = self._rig.shapes.copy()
+        self._roles = np.array([self._rig.wrist, *self._rig.tips])
         self._sequence = 0
         self.reset()
 
@@ -62,18 +64,22 @@ class ClassicTracker(Tracker):
         self._pixel_filter.reset()
         self._position_filter.reset()
         self._association.reset()
-        self._memory = trust.empty_memory(len(self._rig.marker_ids))
-        self._confirmed = np.zeros(len(self._rig.marker_ids), np.bool_)
-        self._anchors = np.full((len(self._rig.marker_ids), 3), np.nan)
+        self._tracks = no_tracks(len(self._rig.marker_ids))
         self._epoch_ns: int | None = None
         self._last_s = 0.0
         self._measured_s: float | None = None
-        self._all_measured = False
 
     def ingest(self, frame: CameraFrame) -> None:
         """Take one frame's markers in; about 10 µs."""
         if isinstance(frame, CameraObservations) and self._tracked_with[frame.camera]:
-            self._pairing.ingest(self._association.select(frame))
+            self._pairing.ingest(self._association.select(frame, *self._predicted(frame)))
+
+    def _predicted(self, frame: CameraObservations) -> tuple[Array, Array] | tuple[()]:
+        """Where the markers are when the row of the principal point is exposed; nothing where nobody asks."""
+        if frame.further is None or self._epoch_ns is None:
+            return ()
+        row_ns = frame.row_time_ns * self._rig.intrinsics[frame.camera, 3]
+        return predict(self._tracks, 1e-9 * (frame.t_row0_master_ns + row_ns - self._epoch_ns))
 
     def newest_frames(self) -> tuple[CameraObservations | None, ...]:
         """Each camera's newest frame, None before its first."""
@@ -87,11 +93,27 @@ class ClassicTracker(Tracker):
             return None
         t_s = self._seconds(paired.t_ns)
         clock.lap("pair")
-        markers = self._locate(t_s, paired, clock)
-        self._association.update(paired.t_ns, np.where(self._confirmed[:, None], markers.raw, np.nan))
-        hand = self._solve_hand(t_s, markers)
+        raw, places, verdicts = self._locate(t_s, paired, clock)
+        targets = Targets(np.empty((6, 3)), np.empty(6, np.uint8))
+        knowledge = conclude(t_s, self._tracks, verdicts, self._roles, places, targets)
+        measured = np.count_nonzero(knowledge == _MEASURED)
+        if measured:
+            self._measured_s = t_s
+        hand = self._hand.solve(t_s, targets)
         clock.lap("solve")
-        return self._state(t_s, paired, markers, hand, clock)
+        pixels, flags = self._pairing.last_seen()
+        self._sequence += 1
+        completed = paired.completed_by
+        return HandState(
+            sequence=self._sequence - 1, t_master_ns=paired.t_ns, t_receive_ns=completed.t_receive_ns,
+            condition=self._condition(t_s, paired, measured == len(knowledge)),
+            marker_ids=self._rig.marker_ids, marker_positions=places.positions, marker_raw_positions=raw,
+            marker_covariances=places.covariances, marker_knowledge=knowledge, camera_names=self._rig.camera_names,
+            camera_pixels=pixels, camera_flags=flags, joint_positions=hand.joint_positions,
+            joint_knowledge=hand.joint_knowledge, fingertip_positions=hand.fingertip_positions, angles=hand.angles,
+            angle_knowledge=hand.angle_knowledge, world_from_palm=hand.world_from_palm,
+            palm_knowledge=hand.palm_knowledge, epipolar_error_px=places.errors, **UNESTIMATED,
+            latency_s={"detect": completed.detect_s, "network": completed.network_s, **clock.laps})
 
     def _seconds(self, t_ns: int) -> float:
         """Time since the first state, s: small enough for floats to keep nanoseconds. A step back starts anew."""
@@ -102,93 +124,49 @@ class ClassicTracker(Tracker):
             self._hand.reset()
             self._pixel_filter.reset()
             self._position_filter.reset()
-            self._memory[:] = np.nan
-            self._confirmed[:] = False
+            self._tracks = no_tracks(len(self._rig.marker_ids))
             self._measured_s = None
         self._last_s = t_s
         return t_s
 
-    def _locate(self, t_s: float, paired: Paired, clock: _Stopwatch) -> LocateArrays:
-        """Raw positions decide which markers are accepted; their pixels are filtered and located again."""
-        rig, shapes = self._rig, self._shapes()
-        markers = LocateArrays(len(rig.cameras), len(rig.marker_ids))
-        locate.locate_raw(t_s, paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics,
-                          rig.cameras, shapes, rig.law, rig.reach, self._memory, self._confirmed,
-                          markers.used, markers.doubtful, markers.accepted, markers.restarted, markers.raw,
-                          markers.covariances, markers.errors)
+    def _locate(self, t_s: float, paired: Paired, clock: _Stopwatch) -> tuple[Array, Places, Verdicts]:
+        """Positions (M, 3) m of inliers, unfiltered; their pixels are filtered and located again, and then filtered."""
+        shape = paired.flags.shape
+        rig, verdicts = rig_table(self._rig, self._shapes()), no_verdicts(shape[1])
+        views = Views(paired.pixels, paired.covariances, np.empty(shape, np.bool_))
+        raw = empty_places(shape[1])
+        locate_inliers(t_s, paired.flags, paired.live, views, rig, self._tracks, verdicts, raw)
         clock.lap("triangulate")
         if not self._filtering:
-            markers.positions[:] = markers.raw
-            return markers
-        pixel, position = self._pixel_filter, self._position_filter
-        pixels = np.empty_like(paired.pixels)
-        locate.filter_pixels(t_s, markers.used, markers.restarted, paired.pixels, pixel.parameters, pixel.state,
-                             position.state, pixel.gap_s, pixels)
+            return raw.positions, raw._replace(positions=raw.positions.copy()), verdicts
+        if verdicts.restarted.any():
+            self._pixel_filter.reset(np.tile(np.repeat(verdicts.restarted, 2), shape[0]))
+            self._position_filter.reset(np.repeat(verdicts.restarted, 3))
+        pixels = np.where(views.used[..., None], paired.pixels, np.nan)
+        pixels = self._pixel_filter(t_s, pixels.reshape(-1)).reshape(pixels.shape)
         clock.lap("filter")
-        locate.locate_filtered(pixels, paired.covariances, markers.used, rig.intrinsics, rig.cameras,
-                               shapes, rig.law, markers.positions)
+        filtered = empty_places(shape[1])
+        locate_all(Views(pixels, paired.covariances, views.used), rig, filtered)
         clock.lap("triangulate")
-        locate.filter_positions(t_s, markers.positions, position.parameters, position.state, position.gap_s,
-                                markers.accepted)
+        positions = self._position_filter(t_s, filtered.positions.reshape(-1)).reshape(-1, 3)
+        verdicts.accepted[np.isnan(positions[:, 0])] = False
         clock.lap("filter")
-        return markers
+        return raw.positions, raw._replace(positions=positions), verdicts
 
     def _shapes(self) -> Array:
         """The markers' bodies; a band lies as the hand's last pose says."""
         pose, band = self._hand.pose, self._rig.band_half_axes
         if pose is None or band is None:
             return self._rig.shapes
-        locate.turn_band(pose.world_from_palm, band, self._turned_shapes[self._rig.wrist])
+        turn_band(pose.world_from_palm, band, self._turned_shapes[self._rig.wrist])
         return self._turned_shapes
 
-    def _solve_hand(self, t_s: float, markers: LocateArrays) -> SolvedHand:
-        """Say how each marker is known, those out of sight too, and solve the hand that wears them."""
-        rig = self._rig
-        wrist, tips, tip_knowledge = np.empty(3), np.empty((5, 3)), np.empty(5, np.uint8)
-        measured, wrist_knowledge = locate.conclude(
-            t_s, self._memory, markers.accepted, markers.doubtful, self._anchors, markers.positions,
-            markers.covariances, markers.knowledge, rig.wrist, rig.tips, wrist, tips, tip_knowledge)
-        if measured:
-            self._measured_s = t_s
-        self._all_measured = measured == len(markers.knowledge)
-        return self._hand.solve(t_s, wrist, tips, wrist_knowledge, tip_knowledge)
-
-    def _condition(self, t_s: float, paired: Paired) -> Condition:
+    def _condition(self, t_s: float, paired: Paired, all_measured: bool) -> Condition:
         if self._measured_s is None:
             return Condition.SEARCHING
         if np.count_nonzero(paired.live) < 2 or t_s - self._measured_s > LOST_S:
             return Condition.LOST
-        return Condition.TRACKING if self._all_measured else Condition.PARTIAL
-
-    def _state(self, t_s: float, paired: Paired, markers: LocateArrays, hand: SolvedHand,
-               clock: _Stopwatch) -> HandState:
-        pixels, flags = self._pairing.last_seen()
-        self._sequence += 1
-        completed = paired.completed_by
-        return HandState(
-            sequence=self._sequence - 1,
-            t_master_ns=paired.t_ns,
-            t_receive_ns=completed.t_receive_ns,
-            condition=self._condition(t_s, paired),
-            marker_ids=self._rig.marker_ids,
-            marker_positions=markers.positions,
-            marker_raw_positions=markers.raw,
-            marker_covariances=markers.covariances,
-            marker_knowledge=markers.knowledge,
-            camera_names=self._rig.camera_names,
-            camera_pixels=pixels,
-            camera_flags=flags,
-            joint_positions=hand.joint_positions,
-            joint_knowledge=hand.joint_knowledge,
-            fingertip_positions=hand.fingertip_positions,
-            angles=hand.angles,
-            angle_knowledge=hand.angle_knowledge,
-            world_from_palm=hand.world_from_palm,
-            palm_knowledge=hand.palm_knowledge,
-            epipolar_error_px=markers.errors,
-            **UNESTIMATED,
-            latency_s={"detect": completed.detect_s, "network": completed.network_s, **clock.laps},
-        )
+        return Condition.TRACKING if all_measured else Condition.PARTIAL
 
 
 class _Stopwatch:
@@ -209,7 +187,7 @@ class _Stopwatch:
 
 Codes = NDArray[np.uint8]
 
-_INFERRED, _GUESSED = int(Knowledge.INFERRED), int(Knowledge.GUESSED)
+_MEASURED, _INFERRED, _GUESSED = int(Knowledge.MEASURED), int(Knowledge.INFERRED), int(Knowledge.GUESSED)
 _JOINTS_OF = np.array([(joints.start, joints.stop) for joints in JOINT_SLICES])
 _ANGLES_OF = np.array([(angles.start, angles.stop) for angles in ANGLE_SLICES])
 
@@ -250,6 +228,8 @@ class HandSolver:
 
     def __init__(self, model: HandModel, ik: IkMethod = "fabrik") -> None:
         self._model, self._method = model, METHODS[ik]
+        self._arrays = _HandArrays(model.dh, model.limits, model.pose_prior.mean, model.pose_prior.information,
+                                   model.mirror, model.base, model.base_rotation, model.chain, model.chain_bend)
         self.pose: HandPose | None = None
         self._palm: HandPose | None = None  # the last palm fit, whose own angles start the next one
         self._solved_s = 0.0
@@ -259,14 +239,15 @@ class HandSolver:
         """Forget the pose."""
         self.pose = self._palm = self._wrist_s = None
 
-    def solve(self, t_s: float, wrist: Array, tips: Array, wrist_knowledge: int, tip_knowledge: Codes) -> SolvedHand:
-        """The hand whose wrist and finger markers are at `wrist` (3,) and `tips` (5, 3), m; NaN where unknown."""
-        wrist_seen = bool(np.isfinite(wrist[0]))
+    def solve(self, t_s: float, targets: Targets) -> SolvedHand:
+        """The hand whose wrist and finger markers are at `targets`."""
+        wrist, tips = targets.positions[0], targets.positions[1:]
+        located = np.isfinite(targets.positions[:, 0])
         lost = self._wrist_s is None or t_s - self._wrist_s > LOST_S
         # What the tips alone made of the palm meanwhile may be far off: begin anew with the wrist.
-        if self.pose is not None and (t_s - self._solved_s > LOST_S or (wrist_seen and lost)):
+        if self.pose is not None and (t_s - self._solved_s > LOST_S or (located[0] and lost)):
             self.reset()
-        if wrist_seen:
+        if located[0]:
             self._wrist_s = t_s
         palm, dt_s = self._palm, t_s - self._solved_s
         if palm is None:  # a cold start, from many poses: it takes milliseconds, once
@@ -274,72 +255,93 @@ class HandSolver:
             if fit is None:
                 return no_hand(tips)
             palm, dt_s = fit.pose, 0.0
-        placed = wrist_seen or (not lost and int(np.count_nonzero(np.isfinite(tips[:, 0]))) >= TIPS_WITHOUT_WRIST)
-        return self._follow(t_s, wrist, tips, wrist_knowledge, tip_knowledge, palm, dt_s, placed)
-
-    def _follow(self, t_s: float, wrist: Array, tips: Array, wrist_knowledge: int, tip_knowledge: Codes,
-                palm: HandPose, dt_s: float, placed: bool) -> SolvedHand:
-        """One call of compiled code: between two frames the interpreter's own code and data leave the caches."""
-        model, prior = self._model, self._model.pose_prior
+        placed = bool(located[0] or (not lost and np.count_nonzero(located) >= TIPS_WITHOUT_WRIST))
         last = palm if self.pose is None else self.pose
-        palm_world, palm_angles = palm.world_from_palm.copy(), palm.angles.copy()
-        world, angles = last.world_from_palm.copy(), last.angles.copy()
-        points = np.empty((len(JOINTS) + 5, 3))
-        joints, known = np.empty(len(JOINTS), np.uint8), np.empty(len(ANGLES), np.uint8)
-        solved = follow(model.dh, model.limits, prior.mean, prior.information, model.mirror, model.base,
-                        model.base_rotation, model.chain, model.chain_bend, wrist, tips, wrist_knowledge, tip_knowledge,
-                        dt_s, self.pose is not None, placed, palm_world, palm_angles, world, angles, points, joints,
-                        known)
-        if solved and self._method is not None:
-            located = np.isfinite(tips[:, 0])
-            bent = solve(self._method, make_problem(model, HandPose(world, last.angles), tips)).angles
-            angles[located[FINGER_OF_ANGLE]] = bent[located[FINGER_OF_ANGLE]]
-            forward_arrays(model.dh, world, angles, np.empty((model.dh.parent.shape[0], 3, 4)), points)
-        if solved:
-            self._palm, self.pose, self._solved_s = HandPose(palm_world, palm_angles), HandPose(world, angles), t_s
-        return SolvedHand(points[:len(JOINTS)], joints, points[len(JOINTS):], angles, known, world, Knowledge.GUESSED)
+        fitted, pose = _copy(palm), _copy(last)
+        points, known = np.empty((len(JOINTS) + 5, 3)), _Known(*np.empty((2, len(ANGLES)), np.uint8))
+        # One call of compiled code: between two frames the interpreter's own code and data leave the caches.
+        if follow(self._arrays, targets, dt_s, self.pose is not None, placed, _Poses(*fitted, *pose), points, known):
+            if self._method is not None:
+                bent = solve(self._method, make_problem(self._model, HandPose(pose[0], last.angles), tips)).angles
+                chosen = located[1:][FINGER_OF_ANGLE]
+                pose[1][chosen] = bent[chosen]
+                forward_arrays(self._model.dh, *pose, empty_frames(self._model.dh), points)
+            self._palm, self.pose, self._solved_s = HandPose(*fitted), HandPose(*pose), t_s
+        return SolvedHand(points[:len(JOINTS)], known.joints, points[len(JOINTS):], pose[1], known.angles, pose[0],
+                          Knowledge.GUESSED)
+
+
+class _HandArrays(NamedTuple):
+    """Of `HandModel` and its pose prior."""
+
+    dh: DhArrays
+    limits: Array
+    mean: Array
+    information: Array
+    mirror: float
+    base: Array
+    base_rotation: Array
+    chain: Array
+    chain_bend: Array
+
+
+class _Poses(NamedTuple):
+    """`palm_world` (4, 4) and `palm_angles` (21,): the palm fit; `world` and `angles`: the hand."""
+
+    palm_world: Array
+    palm_angles: Array
+    world: Array
+    angles: Array
+
+
+class _Known(NamedTuple):
+    """Knowledge of (21,) joints and (21,) angles."""
+
+    joints: Codes
+    angles: Codes
+
+
+def _copy(pose: HandPose) -> tuple[Array, Array]:
+    return pose.world_from_palm.copy(), pose.angles.copy()
 
 
 @njit(cache=True)
-def follow(dh: DhArrays, limits: Array, mean: Array, information: Array, mirror: float, base: Array,
-           base_rotation: Array, chain: Array, bends: Array, wrist: Array, tips: Array, wrist_knowledge: int,
-           tip_knowledge: Codes, dt_s: float, warm: bool, placed: bool, palm_world: Array, palm_angles: Array,
-           world: Array, angles: Array, points: Array, joint_knowledge: Codes, angle_knowledge: Codes) -> bool:
+def follow(hand: _HandArrays, targets: Targets, dt_s: float, warm: bool, placed: bool, poses: _Poses, points: Array,
+           known: _Known) -> bool:
     """Palm fit, fingers, forward kinematics and knowledge of the next hand; returns whether it was solved.
 
-    `palm_world` (4, 4) and `palm_angles` (21,): the palm fit `dt_s` seconds ago when `warm`, else this instant's,
-    which stays. `world` (4, 4) and `angles` (21,): the last pose, kept when no marker is known. All four are updated;
-    `points` (26, 3) m, `joint_knowledge` (21,) and `angle_knowledge` (21,) are filled. `placed`: the palm's place is
-    known, so that what follows from it is inferred.
+    `poses`, updated: the palm fit `dt_s` seconds ago when `warm`, else this instant's, which stays; the last pose, kept
+    when no marker is known. `points` (26, 3) m and `known` are filled. `placed`: the palm's place is known, so that
+    what follows from it is inferred.
     """
+    wrist, tips, world, angles = targets.positions[0], targets.positions[1:], poses.world, poses.angles
     solved = not warm
     if warm and any_marker(wrist, tips):
-        track_arrays(dh, limits, mean, information, wrist, tips, dt_s, palm_world, palm_angles)
+        track_arrays(hand.dh, hand.limits, hand.mean, hand.information, wrist, tips, dt_s, poses.palm_world,
+                     poses.palm_angles)
         solved = True
     if solved:
-        world[:], angles[:] = palm_world, palm_angles
-        solve_fingers_arrays(angles, world, mirror, base, base_rotation, chain, bends, limits, tips, mean,
-                             information, TOLERANCE, int(FABRIK_ITERATIONS), TARGET_SD_M, np.empty(5),
-                             np.empty(5, np.int64), np.empty(5, np.uint8))
-    forward_arrays(dh, world, angles, np.empty((dh.parent.shape[0], 3, 4)), points)
-    _know(wrist_knowledge, tip_knowledge, solved and placed, joint_knowledge, angle_knowledge)
+        world[:], angles[:] = poses.palm_world, poses.palm_angles
+        solve_fingers_arrays(angles, world, hand.mirror, hand.base, hand.base_rotation, hand.chain, hand.chain_bend,
+                             hand.limits, tips, hand.mean, hand.information, TOLERANCE, int(FABRIK_ITERATIONS),
+                             TARGET_SD_M, np.empty(5), np.empty(5, np.int64), np.empty(5, np.uint8))
+    forward_arrays(hand.dh, world, angles, np.empty((hand.dh.parent.shape[0], 3, 4)), points)
+    _know(targets.knowledge, solved and placed, known)
     return solved
 
 
 @njit(cache=True)
-def _know(wrist: int, tips: Codes, placed: bool, joints: Codes, angles: Codes) -> None:
-    """Fill the knowledge of (21,) joints and (21,) angles.
-
-    A finger whose marker was located is inferred from it through the bones, the others keep their last angles: a
+def _know(targets: Codes, placed: bool, known: _Known) -> None:
+    """A finger whose marker was located is inferred from it through the bones, the others keep their last angles: a
     guess, and so is everything when the palm is not `placed`. The palm's rotation is always a guess with one wrist
     marker, and says so itself (`palm_knowledge`).
     """
-    joints[:], angles[:] = _GUESSED, _GUESSED
+    known.joints[:], known.angles[:] = _GUESSED, _GUESSED
     if not placed:
         return
-    if wrist <= _INFERRED:
-        joints[0] = wrist
+    if targets[0] <= _INFERRED:
+        known.joints[0] = targets[0]
     for finger in range(5):
-        if tips[finger] <= _INFERRED:
-            joints[_JOINTS_OF[finger, 0]:_JOINTS_OF[finger, 1]] = _INFERRED
-            angles[_ANGLES_OF[finger, 0]:_ANGLES_OF[finger, 1]] = _INFERRED
+        if targets[1 + finger] <= _INFERRED:
+            known.joints[_JOINTS_OF[finger, 0]:_JOINTS_OF[finger, 1]] = _INFERRED
+            known.angles[_ANGLES_OF[finger, 0]:_ANGLES_OF[finger, 1]] = _INFERRED

@@ -18,6 +18,7 @@ from rhot_app.tracking.association import GATE, MarkerAssociation, assign
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations, Candidates
+from rhot_app.tracking.trust import POSITION_SD_M
 from rhot_node.wire.messages import MarkerFlag
 
 MODELS = [CameraModel.from_rig(node.intrinsics, node.pose) for node in RIG.nodes]
@@ -107,32 +108,29 @@ def test_a_thing_does_not_take_the_place_of_a_hidden_marker(kind: str) -> None:
     assert np.linalg.norm(states[-1].marker_positions[1] - REST[1]) < 2e-3
 
 
+VARIANCES = np.full(len(REST), POSITION_SD_M**2)
+
+
 def association_of_a_still_hand() -> tuple[MarkerAssociation, CameraObservations]:
-    association = MarkerAssociation(compile_rig(RIG))
-    frame = observe(RIG, WIDE, still_trajectory(REST), 0.1, Viewing())[0]
-    association.update(frame.t_row0_master_ns - 25_000_000, REST)
-    association.update(frame.t_row0_master_ns, REST)
-    return association, frame
+    return MarkerAssociation(compile_rig(RIG)), observe(RIG, WIDE, still_trajectory(REST), 0.1, Viewing())[0]
 
 
 def test_a_second_candidate_as_near_makes_the_marker_ambiguous() -> None:
     association, frame = association_of_a_still_hand()
     beside = REST[2] + np.array([0.002, 0.0, 0.0])
-    seen = association.select(with_further(frame, [2], beside[None]))
+    seen = association.select(with_further(frame, [2], beside[None]), REST, VARIANCES)
     assert [bool(flags & AMBIGUOUS) for flags in seen.flags] == [False, False, True, False, False, False]
     assert seen.further is None
 
 
 def test_going_over_to_another_candidate_begins_another_track() -> None:
     association, frame = association_of_a_still_hand()
-    here = association.select(with_further(frame, [1], THING[None]))
+    here = association.select(with_further(frame, [1], THING[None]), REST, VARIANCES)
     assert not here.flags[1] & ACQUIRED
     moved = REST.copy()
     moved[1] = THING
-    for _ in range(2):
-        association.update(frame.t_row0_master_ns + 25_000_000, moved)
     later = replace(frame, t_row0_master_ns=frame.t_row0_master_ns + 25_000_000)
-    there = association.select(with_further(later, [1], THING[None]))
+    there = association.select(with_further(later, [1], THING[None]), moved, VARIANCES)
     assert there.flags[1] & ACQUIRED
     assert np.abs(there.pixels[1] - MODELS[frame.camera].project(THING[None])[0]).max() < 1e-9
 
@@ -142,11 +140,11 @@ def test_what_no_candidate_explains_is_lost_until_it_may_be_there() -> None:
     only_things = with_further(frame, [1], THING[None], first=True)
     only_things = replace(only_things, further=replace(only_things.further, pixels=MODELS[frame.camera].project(
         THING[None] + np.array([0.1, 0.1, 0.0]))))
-    seen = association.select(only_things)
+    seen = association.select(only_things, REST, VARIANCES)
     assert seen.flags[1] == LOST and np.isnan(seen.pixels[1]).all()
     assert (seen.flags[[0, 2, 3, 4, 5]] == 0).all()
 
 
 def test_a_frame_without_further_candidates_passes_as_it_is() -> None:
     association, frame = association_of_a_still_hand()
-    assert association.select(frame) is frame
+    assert association.select(frame, REST, VARIANCES) is frame

@@ -3,26 +3,31 @@
 import numpy as np
 import pytest
 
-from rhot_app.tracking import trust
+from rhot_app.state import Knowledge
+from rhot_app.tracking.locate import Places, empty_places
+from rhot_app.tracking.trust import Targets, conclude, judge, no_tracks, no_verdicts
 
 NOISE = np.eye(3)[None] * 1e-6
 
 
 class Memory:
-    """One marker's memory."""
+    """One marker's track."""
 
     def __init__(self) -> None:
-        self.rows = trust.empty_memory(1)
+        self.tracks, self.verdicts = no_tracks(1), no_verdicts(1)
 
     def judge(self, t_s, position, covariance=NOISE):
-        believed, restarted = np.zeros(1, bool), np.zeros(1, bool)
-        trust.judge(t_s, np.array([position], float), covariance, self.rows, believed, restarted)
-        return bool(believed[0]), bool(restarted[0])
+        judge(t_s, Places(np.array([position], float), covariance, np.zeros(1)), self.tracks, self.verdicts)
+        return bool(self.verdicts.accepted[0]), bool(self.verdicts.restarted[0])
 
     def predict(self, t_s, origin=(0.0, 0.0, 0.0)):
-        positions, covariances = np.zeros((1, 3)), np.zeros((1, 3, 3))
-        trust.predict(t_s, self.rows, np.zeros(1, bool), np.array([origin]), positions, covariances)
-        return positions[0], covariances[0]
+        places, targets = empty_places(1), Targets(np.zeros((6, 3)), np.zeros(6, np.uint8))
+        self.tracks["published"][0] = origin
+        knowledge = conclude(t_s, self.tracks, no_verdicts(1), np.array([-1, 0, -1, -1, -1, -1]), places, targets)
+        np.testing.assert_array_equal(targets.positions[1], places.positions[0])
+        assert np.isnan(targets.positions[[0, 2, 3, 4, 5]]).all() and targets.knowledge[1] == knowledge[0]
+        assert knowledge[0] == (Knowledge.UNKNOWN if np.isnan(places.positions).any() else Knowledge.INFERRED)
+        return places.positions[0], places.covariances[0]
 
 
 def test_a_new_marker_is_believed_and_starts_its_filters():

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.filter import update
@@ -27,11 +25,11 @@ from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
 from rhot_app.hand.solvers.finger_ik import solve_fingers
 from rhot_app.hand.solvers.palm_before_camera import palms_before_camera
 from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
-from rhot_app.tracking.locate import choose_views, locate_all
+from rhot_app.tracking.locate import locate_paired, rig_table
 from rhot_app.tracking.markers.marker_model import MarkerModel
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
 from rhot_app.tracking.markers.size_evidence import Posture, implausibility
-from rhot_app.tracking.pairing import Paired, Pairing
+from rhot_app.tracking.pairing import Pairing
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.tracker import CameraObservations
 
@@ -73,7 +71,7 @@ class Starter:
     """Collects frames until one instant shows enough of the hand."""
 
     def __init__(self, rig: RigArrays, markers: MarkerModel) -> None:
-        self._rig, self._markers = rig, markers
+        self._rig, self._markers, self._table = rig, markers, rig_table(rig)
         self._pairing = Pairing(len(rig.cameras), len(rig.marker_ids))
         self._tips = [markers.marker_of(role) for role in TIP_ROLES]
         self._wrist = markers.marker_of(WRIST_ROLE)
@@ -101,14 +99,11 @@ class Starter:
     def locate(self) -> Located | None:
         """Where the markers were at the newest instant; None: none is due."""
         paired = self._pairing.due()
-        return None if paired is None else self._locate(paired)
-
-    def _locate(self, paired: Paired) -> Located:
-        rig, count = self._rig, len(self._rig.marker_ids)
-        positions, covariances, clear = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count, np.bool_)
-        _locate_clear(paired.flags, paired.live, paired.pixels, paired.covariances, rig.intrinsics, rig.cameras,
-                      rig.shapes, positions, covariances, clear)
-        return Located(paired.t_ns, positions, covariances, clear)
+        if paired is None:
+            return None
+        places, doubtful = locate_paired(paired, self._table)
+        return Located(paired.t_ns, places.positions, places.covariances,
+                       ~doubtful & np.isfinite(places.positions[:, 0]))
 
     def pose_of(self, markers: Array, scale: float = 1.0) -> HandPose | None:
         """The hand, `scale` times as large as its file says, whose `markers` (M, 3) m, NaN where not located, are
@@ -228,16 +223,3 @@ def _best_of(places: Sequence[Array], frame: MarkerFrame, process: HandProcess,
     off_px = np.linalg.norm(frame.pixels - frame.expected(state), axis=1)[frame.seen]
     return (HandPose(world, state[STATE.angles].copy())
             if np.all(off_px < UNFIT_M * pixels_per_metre(slopes[0])) else None)
-
-
-@njit(cache=True)
-def _locate_clear(flags: NDArray[np.int64], live: NDArray[np.bool_], pixels: Array, covariances: Array,
-                  intrinsics: Array, cameras: Array, shapes: Array, positions: Array,
-                  position_covariances: Array, clear: NDArray[np.bool_]) -> None:
-    """Fill what `Located` holds of one instant; arrays as in `Paired` and `RigArrays`."""
-    used, count = np.empty(flags.shape, np.bool_), positions.shape[0]
-    choose_views(flags, live, used, clear)
-    locate_all(pixels, covariances, used, intrinsics, cameras, shapes, positions, position_covariances,
-               np.empty(count))
-    for m in range(count):
-        clear[m] = not (clear[m] or math.isnan(positions[m, 0]))

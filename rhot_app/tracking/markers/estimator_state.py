@@ -26,9 +26,8 @@ from rhot_app.state import (
     Knowledge,
     no_hand,
 )
-from rhot_app.tracking import locate
 from rhot_app.tracking.association import GATE
-from rhot_app.tracking.locate import locate_all
+from rhot_app.tracking.locate import Views, empty_places, locate_all, rig_table, turn_band
 from rhot_app.tracking.markers.marker_model import MarkerModel, project_marker, scaled_table
 from rhot_app.tracking.markers.marker_residual import SIZE_S, SIZE_SD, MarkerFrame
 from rhot_app.tracking.pairing import DOUBTFUL, SAME_FRAME_NS
@@ -167,7 +166,7 @@ class EstimatorStates:
         fresh = age <= observations.fresh_ns[:, None]
         clear = fresh & ~observations.doubtful & (observations.fresh_ns[:, None] <= _SLOWEST_CLEAR_NS)
         shown = np.count_nonzero(clear, axis=0) >= 2
-        raw, raw_covariances, errors = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count)
+        raw = empty_places(count)
         markers, joints, angles = np.empty(count, np.uint8), np.empty(21, np.uint8), np.empty(21, np.uint8)
         angle_sd = np.empty(21)
         aligned, motion_sd = np.empty((*fresh.shape, 2)), np.empty((2, 21))
@@ -176,9 +175,9 @@ class EstimatorStates:
                covariances, motion_sd, aligned)
         if rig.band_half_axes is not None:
             world = pose_matrix(state)
-            locate.turn_band(world, rig.band_half_axes, self._shapes[rig.wrist])
-        locate_all(aligned, observations.covariances, fresh & (np.count_nonzero(fresh, axis=0) > 1), rig.intrinsics,
-                   rig.cameras, self._shapes, raw, raw_covariances, errors)
+            turn_band(world, rig.band_half_axes, self._shapes[rig.wrist])
+        used = fresh & (np.count_nonzero(fresh, axis=0) > 1)
+        locate_all(Views(aligned, observations.covariances, used), rig_table(rig, self._shapes), raw)
         if by_one:
             covariance = covariance.copy()
             seeing = int(np.argmax(observations.times.max(axis=1)))
@@ -194,13 +193,13 @@ class EstimatorStates:
         return HandState(
             sequence=sequence, t_master_ns=t_ns, t_receive_ns=newest.t_receive_ns,
             condition=Condition.TRACKING if in_sight else Condition.PARTIAL,
-            marker_ids=rig.marker_ids, marker_positions=points[_FIRST_MARKER:], marker_raw_positions=raw,
+            marker_ids=rig.marker_ids, marker_positions=points[_FIRST_MARKER:], marker_raw_positions=raw.positions,
             marker_covariances=covariances[_FIRST_MARKER:], marker_knowledge=markers,
             camera_names=rig.camera_names, camera_pixels=observations.pixels.copy(),
             camera_flags=observations.flags.copy(),
             joint_positions=points[:_FIRST_TIP], joint_knowledge=joints,
             fingertip_positions=points[_FIRST_TIP:_FIRST_MARKER], angles=state[STATE.angles].copy(),
-            angle_knowledge=angles, world_from_palm=world, palm_knowledge=Knowledge(palm), epipolar_error_px=errors,
+            angle_knowledge=angles, world_from_palm=world, palm_knowledge=Knowledge(palm), epipolar_error_px=raw.errors,
             joint_covariances=covariances[:_FIRST_TIP], angle_sd=angle_sd,
             fingertip_covariances=covariances[_FIRST_TIP:_FIRST_MARKER],
             palm_covariance=covariance[TANGENT.palm, TANGENT.palm].copy(), velocity=state[STATE.velocity].copy(),
