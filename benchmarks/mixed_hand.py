@@ -126,7 +126,7 @@ def _hide(one: CameraObservations, centres: Array, radii: Array, camera: CameraM
         way = 0.5 * (centres[tip, 0] + centres[tip, 1]) - o
         far = float(np.linalg.norm(way))
         u = way / far
-        hits = [ray_to_capsule(*o, *u, centres[k, 0], centres[k, 1], *radii[k]) for k in range(len(radii)) if k != tip]
+        hits = [ray_to_capsule(o, u, centres, radii, k) for k in range(len(radii)) if k != tip]
         if any(0.0 < hit < far - radii[tip].max() for hit in hits):
             one.pixels[m], one.flags[m] = np.nan, int(MarkerFlag.LOST)
 

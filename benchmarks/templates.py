@@ -88,7 +88,7 @@ def order(poses: int) -> None:
     model, surface = model_and_surface()
     bodies, _ = hand_bodies(surface)
     camera = look_at(np.zeros(3), np.array([0.0, 0.0, 0.5]), focal=150.0, width=160, height=120)
-    rays, pose = camera_rays(camera), np.ascontiguousarray(camera.camera_from_world[:3])
+    rays, record = camera_rays(camera), camera.record
     rng, covariance = np.random.default_rng(1), np.linalg.inv(pose_prior().information)
     wrong = deep = digits = cyclic = above = 0
     worst, spent = 0.0, 0.0
@@ -99,9 +99,9 @@ def order(poses: int) -> None:
         root[:3, 3] = [0.0, 0.0, 0.5] - 0.09 * root[:3, 0]
         placed = place(bodies, root, angles)
         begun = time.process_time()
-        seen = visibility(bodies, placed, pose)
+        seen = visibility(bodies, placed, record)
         spent += time.process_time() - begun
-        labels = segment(bodies, placed, seen.order, pose, camera.intrinsics, rays)
+        labels = segment(bodies, placed, seen.order, record, rays)
         nearest, depth = depth_labels(bodies, placed, camera, rays, labels >= 0)
         digit = (labels >= 0) & ((labels < 15) | (nearest < 15))
         own = np.take_along_axis(depth, np.maximum(labels, 0)[..., None], 2)[..., 0]

@@ -15,6 +15,18 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.surface import FOREARM, PALM, Surface, ray_to_capsule
+from rhot_app.estimation.vectors import (
+    along,
+    axis_of,
+    dot,
+    minus,
+    norm,
+    origin_of,
+    to_outer,
+    turned,
+    turned_back,
+    unit,
+)
 from rhot_app.geometry.camera import CameraModel, undistort_points
 from rhot_app.hand.articulated import Box, Capsule
 from rhot_app.hand.articulated_model import ArticulatedModel
@@ -36,6 +48,8 @@ ROOT_POSE = 6
 
 ANGLES = 12
 """Numbers of a state before the angles: world_from_root (3, 4), row by row."""
+
+_SAME = 1e-9  # m, or of a direction: as good as nothing
 
 
 class Bodies(NamedTuple):
@@ -145,19 +159,23 @@ def place(bodies: Bodies, root: Array, angles: Array) -> Placed:
 
 
 @njit(cache=True)
+def frame_of(placed, row):
+    """(3, 4) world_from_row, or (4, 4) of the root."""
+    return placed.root if row < 0 else placed.frames[row]
+
+
+@njit(cache=True)
 def _place(bodies, angles, placed):
     forward_arrays(bodies.dh, placed.root, angles, placed.frames, bodies.dh.point_offset)
-    for k in range(bodies.row.shape[0]):
-        base = placed.root if bodies.row[k] < 0 else placed.frames[bodies.row[k]]
-        for i in range(3):
-            for end in range(2):
-                placed.ends[k, end, i] = (base[i, 3] + base[i, 0] * bodies.ends[k, end, 0]
-                                          + base[i, 1] * bodies.ends[k, end, 1] + base[i, 2] * bodies.ends[k, end, 2])
-            for j in range(4):
-                placed.box[k, i, j] = (base[i, 0] * bodies.box[k, 0, j] + base[i, 1] * bodies.box[k, 1, j]
-                                       + base[i, 2] * bodies.box[k, 2, j])
-            placed.box[k, i, 3] += base[i, 3]
-    for layer in range(bodies.carrier.shape[0]):
+    for k in range(len(bodies.row)):
+        base = frame_of(placed, bodies.row[k])
+        for end in range(2):
+            placed.ends[k, end] = to_outer(base, bodies.ends[k, end])
+        for j in range(4):
+            column = to_outer(base, bodies.box[k, :, 3]) if j == 3 else turned(base, bodies.box[k, :, j])
+            for i in range(3):
+                placed.box[k, i, j] = column[i]
+    for layer in range(len(bodies.carrier)):
         placed.plane[layer] = 0.0
         if bodies.carrier[layer] >= 0 and bodies.hinge[layer] >= 0:
             _bisect(bodies, placed, layer, placed.plane[layer])
@@ -165,137 +183,109 @@ def _place(bodies, angles, placed):
 
 @njit(cache=True)
 def joint_of(bodies, placed, layer):
-    """(3, 4) world_from_joint of a layer that has a hinge: z is the axis of the joint."""
-    parent = bodies.dh.parent[bodies.hinge[layer]]
-    return placed.root[:3] if parent < 0 else placed.frames[parent]
+    """World_from_joint of a layer that has a hinge: z is the axis of the joint."""
+    return frame_of(placed, bodies.dh.parent[bodies.hinge[layer]])
 
 
 @njit(cache=True)
 def _bisect(bodies, placed, layer, plane):
     """Fill `plane` (4,) of a layer's joint; leave it where either is no capsule."""
-    joint, sides = joint_of(bodies, placed, layer), np.zeros((2, 3))
+    joint, sides = origin_of(joint_of(bodies, placed, layer)), np.zeros((2, 3))
     for side in range(2):
         which, far = layer if side == 0 else bodies.carrier[layer], 0.0
         for k in range(bodies.first[which], bodies.first[which + 1]):
             if bodies.kind[k] != CAPSULE:
                 return
             for end in range(2):
-                square = 0.0
-                for i in range(3):
-                    square += (placed.ends[k, end, i] - joint[i, 3]) ** 2
-                if square > far:
-                    far = square
-                    for i in range(3):
-                        sides[side, i] = (placed.ends[k, end, i] - joint[i, 3]) / math.sqrt(square)
-    length = 0.0
-    for i in range(3):
-        length += (sides[0, i] - sides[1, i]) ** 2
-    if length > 1e-12:
-        for i in range(3):
-            plane[i] = (sides[0, i] - sides[1, i]) / math.sqrt(length)
-            plane[3] += plane[i] * joint[i, 3]
+                away = minus(placed.ends[k, end], joint)
+                if norm(away) > far:
+                    far = norm(away)
+                    sides[side] = unit(away)
+    across = minus(sides[0], sides[1])
+    if norm(across) > _SAME:
+        normal = unit(across)
+        plane[:3], plane[3] = normal, dot(normal, joint)
 
 
 @njit(cache=True)
-def hit(bodies, placed, k, ox, oy, oz, ux, uy, uz, margin):
-    """Distance, m, along the ray from o with unit direction u to body `k` grown by `margin` m; -1 for none."""
-    if bodies.kind[k] == CAPSULE:
-        a, b = placed.ends[k, 0], placed.ends[k, 1]
-        ra, rb = bodies.radii[k, 0] + margin, bodies.radii[k, 1] + margin
-        mx, my, mz = 0.5 * (a[0] + b[0]) - ox, 0.5 * (a[1] + b[1]) - oy, 0.5 * (a[2] + b[2]) - oz
-        along = mx * ux + my * uy + mz * uz
-        reach = 0.5 * math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2) + max(ra, rb)
-        if mx * mx + my * my + mz * mz - along * along > reach * reach:
-            return -1.0
-        if reach <= max(ra, rb) + 1e-12:  # a ball
-            rest = mx * mx + my * my + mz * mz - along * along
-            return along - math.sqrt(ra * ra - rest)
-        return ray_to_capsule(ox, oy, oz, ux, uy, uz, a, b, ra, rb)
-    pose = placed.box[k]
-    enter, leave = -1e9, 1e9
+def _ray_to_box(o, u, pose, half, margin):
+    """Distance along the ray from o with unit direction u to a box grown by `margin`; -1 for none."""
+    at, slope, enter, leave = turned_back(pose, minus(o, origin_of(pose))), turned_back(pose, u), -np.inf, np.inf
     for i in range(3):
-        at = pose[0, i] * (ox - pose[0, 3]) + pose[1, i] * (oy - pose[1, 3]) + pose[2, i] * (oz - pose[2, 3])
-        slope = pose[0, i] * ux + pose[1, i] * uy + pose[2, i] * uz
-        half = bodies.half[k, i] + margin
-        if abs(slope) < 1e-12:
-            if abs(at) > half:
+        wide = half[i] + margin
+        if abs(slope[i]) < _SAME:
+            if abs(at[i]) > wide:
                 return -1.0
             continue
-        first, second = (-half - at) / slope, (half - at) / slope
+        first, second = (-wide - at[i]) / slope[i], (wide - at[i]) / slope[i]
         enter, leave = max(enter, min(first, second)), min(leave, max(first, second))
     return enter if 0.0 < enter <= leave else -1.0
 
 
 @njit(cache=True)
-def hit_layer(bodies, placed, layer, ox, oy, oz, ux, uy, uz, margin):
-    """As `hit`, of all bodies of a layer: the nearest, on the layer's side of its joints."""
-    best = -1.0
-    for k in range(bodies.first[layer], bodies.first[layer + 1]):
-        t = hit(bodies, placed, k, ox, oy, oz, ux, uy, uz, margin)
-        if t > 0.0 and (best < 0.0 or t < best):
-            best = t
-    if best > 0.0:
-        x, y, z = ox + best * ux, oy + best * uy, oz + best * uz
-        for other in range(bodies.carrier.shape[0]):
-            if other == layer or bodies.carrier[other] == layer:
-                n = placed.plane[other]
-                beyond = n[0] * x + n[1] * y + n[2] * z - n[3]
-                if other == layer:
-                    if beyond < -margin:
-                        return -1.0
-                elif beyond > margin and (bodies.first[layer + 1] == bodies.first[layer] + 1
-                                          or _in_joint(bodies, placed, other, x, y, z)):
-                    return -1.0
-    return best
+def layer_distances(bodies, placed, layer, o, rays, margin):
+    """(N,) m along rays (N, 3), of unit length, from o to the bodies of a layer, grown by `margin` m: to the nearest,
+    if that is on the layer's side of its joints; -1 for none."""
+    ends, radii, kinds, planes, carrier = placed.ends, bodies.radii, bodies.kind, placed.plane, bodies.carrier
+    start, stop, found = bodies.first[layer], bodies.first[layer + 1], np.full(len(rays), -1.0)
+    joints, reach = np.zeros((len(carrier), 3)), np.full(len(carrier), np.inf)
+    for other in range(len(carrier)):
+        if carrier[other] == layer and bodies.hinge[other] >= 0 and stop > start + 1:
+            # of several bodies, only what lies so near to the joint is the link's
+            joints[other], reach[other] = origin_of(joint_of(bodies, placed, other)), FLESH * radii[
+                bodies.first[other], 0]
+    for n in range(len(rays)):
+        u, best = (rays[n, 0], rays[n, 1], rays[n, 2]), -1.0
+        for k in range(start, stop):
+            t = (ray_to_capsule(o, u, ends, radii, k, margin) if kinds[k] == CAPSULE else
+                 _ray_to_box(o, u, placed.box[k], bodies.half[k], margin))
+            if t > 0.0 and (best < 0.0 or t < best):
+                best = t
+        if best > 0.0:
+            p = along(o, best, u)
+            for other in range(len(carrier)):
+                if other == layer or carrier[other] == layer:
+                    beyond = dot(planes[other], p) - planes[other, 3]
+                    if (beyond < -margin if other == layer else
+                            beyond > margin and norm(minus(p, joints[other])) < reach[other]):
+                        best = -1.0
+                        break
+        found[n] = best
+    return found
 
 
 @njit(cache=True)
-def _in_joint(bodies, placed, layer, x, y, z):
-    """Whether a point lies within the thickness of a link from its joint: of a palm, only that is the link's."""
-    joint = joint_of(bodies, placed, layer)
-    reach = FLESH * bodies.radii[bodies.first[layer], 0]
-    return (x - joint[0, 3]) ** 2 + (y - joint[1, 3]) ** 2 + (z - joint[2, 3]) ** 2 < reach * reach
+def normals_at(bodies, placed, layer, points):
+    """(N, 3) outward normals of a layer's surface at points (N, 3) on it."""
+    normals = np.empty((len(points), 3))
+    for n in range(len(points)):
+        _fill_normal(bodies, placed, layer, points[n], normals[n])
+    return normals
 
 
 @njit(cache=True)
-def normal_at(bodies, placed, layer, px, py, pz, out):
-    """Fill `out` (3,), the outward normal of a layer's surface at the point p on it."""
-    best = 1e9
-    v = np.empty(3)
+def _fill_normal(bodies, placed, layer, p, out):
+    best, v, away = 1e9, (0.0, 0.0, 0.0), 0.0
     for k in range(bodies.first[layer], bodies.first[layer + 1]):
         if bodies.kind[k] == CAPSULE:
-            a, b = placed.ends[k, 0], placed.ends[k, 1]
-            length = dot = 0.0
-            for i in range(3):
-                p = px if i == 0 else (py if i == 1 else pz)
-                length += (b[i] - a[i]) ** 2
-                dot += (p - a[i]) * (b[i] - a[i])
+            a, rod = placed.ends[k, 0], minus(placed.ends[k, 1], placed.ends[k, 0])
+            length, from_a = norm(rod), minus(p, a)
             # where the cone's normal meets the axis
             taper = bodies.radii[k, 0] - bodies.radii[k, 1]
-            t = dot / length if length > 1e-18 else 0.0
-            square = 0.0
-            for i in range(3):
-                p = px if i == 0 else (py if i == 1 else pz)
-                square += (p - a[i] - t * (b[i] - a[i])) ** 2
-            if length > taper * taper and length > 1e-18:
-                t -= math.sqrt(square) * taper / math.sqrt(length - taper * taper) / math.sqrt(length)
+            t = dot(from_a, rod) / length**2 if length > _SAME else 0.0
+            if length > max(abs(taper), _SAME):
+                t -= norm(along(from_a, -t, rod)) * taper / math.sqrt(length**2 - taper**2) / length
             t = min(max(t, 0.0), 1.0)
-            radius, square = bodies.radii[k, 0] - t * taper, 0.0
-            for i in range(3):
-                p = px if i == 0 else (py if i == 1 else pz)
-                v[i] = p - a[i] - t * (b[i] - a[i])
-                square += v[i] * v[i]
-            away = abs(math.sqrt(square) - radius)
-            for i in range(3):
-                v[i] /= max(math.sqrt(square), 1e-12)
+            v = along(from_a, -t, rod)
+            away = abs(norm(v) - bodies.radii[k, 0] + t * taper)
+            v = unit(v)
         else:
-            pose, away, face, side = placed.box[k], 1e9, 0, 1.0
+            pose, away = placed.box[k], 1e9
+            at = turned_back(pose, minus(p, origin_of(pose)))
             for i in range(3):
-                at = pose[0, i] * (px - pose[0, 3]) + pose[1, i] * (py - pose[1, 3]) + pose[2, i] * (pz - pose[2, 3])
-                if abs(abs(at) - bodies.half[k, i]) < away:
-                    away, face, side = abs(abs(at) - bodies.half[k, i]), i, (1.0 if at > 0.0 else -1.0)
-            for i in range(3):
-                v[i] = side * pose[i, face]
+                if abs(abs(at[i]) - bodies.half[k, i]) < away:
+                    away = abs(abs(at[i]) - bodies.half[k, i])
+                    v = along((0.0, 0.0, 0.0), 1.0 if at[i] > 0.0 else -1.0, axis_of(pose, i))
         if away < best:
             best = away
             out[:] = v

@@ -9,15 +9,15 @@ views.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.articulated.bodies import Bodies, Placed, hit_layer, normal_at
-from rhot_app.barehand.contours import camera_centre
+from rhot_app.articulated.bodies import Bodies, Placed, frame_of, layer_distances, normals_at
+from rhot_app.geometry.camera import CameraRecord
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -61,6 +61,7 @@ def _apply(luma: Filtered, kind: Kind, sigma_px: float) -> Filtered:
     return np.asarray(-sigma_px**2 * cv2.Laplacian(smooth, cv2.CV_32F, borderType=cv2.BORDER_REPLICATE), np.float32)
 
 
+@lru_cache
 def noise_gain(kind: Kind, sigma_px: float) -> float:
     """Standard deviation of filtered noise, of that of the pixels."""
     size = 2 * int(6.0 * sigma_px) + 3
@@ -116,24 +117,25 @@ class TemplateSet:
         """The image with every smoothing."""
         return [filtered(image, self.kind, sigma) for sigma in self.sigmas_px]
 
-    def take(self, layer: int, images: list[Filtered], labels: Indices, bodies: Bodies, placed: Placed, pose: Array,
-             rays: Array, noise: float, anchor: bool) -> bool:
-        """Take a template of a layer from the filtered images of a camera with `pose` (3, 4) and `rays` (H, W, 3), in
-        which `labels` (H, W) says where the layer is seen. `noise`: of a pixel, of 255. False: `refused` says why."""
+    def take(self, layer: int, images: list[Filtered], labels: Indices, bodies: Bodies, placed: Placed,
+             camera: CameraRecord, rays: Array, noise: float, anchor: bool) -> bool:
+        """Take a template of a layer from the filtered images of a camera with `rays` (H, W, 3), in which `labels`
+        (H, W) says where the layer is seen. `noise`: of a pixel, of 255. False: `refused` says why."""
         mask = (labels == layer).astype(np.uint8)
         if mask.sum() < LEAST_POINTS * SPACING_PX**2:
             self.refused[layer] = "it is hidden, or outside of the picture"
             return False
-        base = placed.root if bodies.layer_row[layer] < 0 else placed.frames[bodies.layer_row[layer]]
-        centre = np.empty(3)
-        camera_centre(np.ascontiguousarray(pose), centre)
+        base, centre = frame_of(placed, bodies.layer_row[layer]), camera.centre
         row, column = (int(np.median(one)) for one in np.nonzero(mask))
         steep = float(np.linalg.norm(rays[row, column] - rays[row, column - 1 if column else 1]))  # rad per px
         spacing = max(SPACING_PX, round(SPACING_M / (steep * float(np.linalg.norm(centre - base[:3, 3])))))
         rows, columns = np.nonzero(mask[::spacing, ::spacing])
         rows, columns = spacing * rows, spacing * columns
-        points, normals, good = np.empty((len(rows), 3)), np.empty((len(rows), 3)), np.empty(len(rows), np.bool_)
-        _lift(bodies, placed, layer, np.ascontiguousarray(pose), rays[rows, columns], points, normals, good)
+        lines = rays[rows, columns] @ camera.pose[:, :3]
+        far = layer_distances(bodies, placed, layer, centre, lines, 0.0)
+        points = centre + far[:, None] * lines
+        normals = normals_at(bodies, placed, layer, points)
+        good = (far > 0.0) & (-np.sum(normals * lines, axis=1) > FACING)
         rows, columns, points, normals = rows[good], columns[good], points[good], normals[good]
         if len(rows) < LEAST_POINTS:
             self.refused[layer] = "it is seen too steeply"
@@ -156,23 +158,3 @@ class TemplateSet:
         self.refused.pop(layer, None)
         self.templates.append(made)
         return True
-
-
-@njit(cache=True)
-def _lift(bodies, placed, layer, pose, rays, points, normals, good):
-    """Where the rays (K, 3), camera frame, meet a layer: world `points` (K, 3) and outward `normals` (K, 3); `good`
-    (K,) where they do and the surface faces the camera."""
-    o = np.empty(3)
-    camera_centre(pose, o)
-    for k in range(rays.shape[0]):
-        r = rays[k]
-        ux = pose[0, 0] * r[0] + pose[1, 0] * r[1] + pose[2, 0] * r[2]
-        uy = pose[0, 1] * r[0] + pose[1, 1] * r[1] + pose[2, 1] * r[2]
-        uz = pose[0, 2] * r[0] + pose[1, 2] * r[1] + pose[2, 2] * r[2]
-        t = hit_layer(bodies, placed, layer, o[0], o[1], o[2], ux, uy, uz, 0.0)
-        good[k] = False
-        if not t > 0.0:
-            continue
-        points[k, 0], points[k, 1], points[k, 2] = o[0] + t * ux, o[1] + t * uy, o[2] + t * uz
-        normal_at(bodies, placed, layer, points[k, 0], points[k, 1], points[k, 2], normals[k])
-        good[k] = -(normals[k, 0] * ux + normals[k, 1] * uy + normals[k, 2] * uz) > FACING

@@ -12,7 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.articulated.bodies import ANGLES, CAPSULE, ROOT_POSE, Bodies, Placed, camera_rays, place, root_of
+from rhot_app.articulated.bodies import (
+    ANGLES,
+    CAPSULE,
+    ROOT_POSE,
+    Bodies,
+    Placed,
+    camera_rays,
+    frame_of,
+    place,
+    root_of,
+)
 from rhot_app.articulated.layered import LayeredFrame, layer_covariance
 from rhot_app.articulated.outline import outline_of
 from rhot_app.articulated.templates import LEAST_POINTS, Filtered, Image, Kind, TemplateSet, filtered
@@ -21,7 +31,7 @@ from rhot_app.barehand.contour_residual import SHAPE_SD_M, JointLimits
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import IteratedFilter, Knot, update
 from rhot_app.estimation.residual import Process, Residual
-from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.camera import CameraModel, CameraRecord
 from rhot_node.detect.edges import noise_of
 
 Array = NDArray[np.float64]
@@ -36,8 +46,7 @@ class View:
     """One camera of a tracker. `background`: the filtered scene without the object, by smoothing; None: unknown.
     `visibility` of the last image, and its `frame`."""
 
-    camera: CameraModel
-    pose: Array
+    camera: CameraRecord
     rays: Array
     background: list[Filtered] | None = None
     noise: float = 0.0
@@ -58,8 +67,7 @@ class LayeredTracker:
         self.bodies, self.process, self.layered = bodies, process, layered
         self.outline = outline and kind == "raw"
         self.templates = TemplateSet(kind)
-        self.views = [View(camera, np.ascontiguousarray(camera.camera_from_world[:3]), camera_rays(camera))
-                      for camera in cameras]
+        self.views = [View(camera.record, camera_rays(camera)) for camera in cameras]
         for view, background in zip(self.views, backgrounds or (), strict=False):
             view.background = self.templates.images(background)
         self.filter = IteratedFilter(process)
@@ -99,17 +107,15 @@ class LayeredTracker:
         if not view.noise:
             view.noise = noise_of(image)
         placed = self._placed(state)
-        view.visibility = visibility(self.bodies, placed, view.pose)
+        view.visibility = visibility(self.bodies, placed, view.camera)
         chosen = [one for layer in range(len(self.bodies.layer_row))
                   if (one := self.templates.choose(layer, self._direction(view, placed, layer))) is not None]
         outline, order = None, view.visibility.order if self.layered else np.empty(0, np.int64)
         if self.outline:
-            outline = outline_of(self.bodies, placed, order, view.pose, view.camera.intrinsics,
-                                 (view.camera.width, view.camera.height))
+            outline = outline_of(self.bodies, placed, order, view.camera)
         view.frame = LayeredFrame(
-            self.bodies, order, view.pose, view.camera.intrinsics, smooth, chosen, self.templates.kind,
-            self.templates.sigmas_px[level], level, view.noise,
-            np.ascontiguousarray(covariance[:self._pose, :self._pose]), outline,
+            self.bodies, order, view.camera, smooth, chosen, self.templates.kind, self.templates.sigmas_px[level],
+            level, view.noise, np.ascontiguousarray(covariance[:self._pose, :self._pose]), outline,
             None if view.background is None else view.background[level])
         return view.frame
 
@@ -118,7 +124,7 @@ class LayeredTracker:
 
     def _direction(self, view: View, placed: Placed, layer: int) -> Array:
         """(3,) unit, from the layer's frame to the camera, in that frame."""
-        base = placed.root if self.bodies.layer_row[layer] < 0 else placed.frames[self.bodies.layer_row[layer]]
+        base = frame_of(placed, self.bodies.layer_row[layer])
         away = base[:3, :3].T @ (view.camera.centre - base[:3, 3])
         return np.asarray(away / np.linalg.norm(away))
 
@@ -149,9 +155,9 @@ class LayeredTracker:
                 continue
             if not view.noise:
                 view.noise = noise_of(image)
-            order = visibility(self.bodies, placed, view.pose).order
-            labels = segment(self.bodies, placed, order, view.pose, view.camera.intrinsics, view.rays)
+            order = visibility(self.bodies, placed, view.camera).order
+            labels = segment(self.bodies, placed, order, view.camera, view.rays)
             smooth = self.templates.images(image)
             for layer in wanted:
-                self.templates.take(layer, smooth, labels, self.bodies, placed, view.pose, view.rays, view.noise,
+                self.templates.take(layer, smooth, labels, self.bodies, placed, view.camera, view.rays, view.noise,
                                     anchor)

@@ -35,13 +35,13 @@ def draw_layers(image: Image, bodies: Bodies, placed: Placed, camera: CameraMode
                 names: Sequence[str] = ()) -> Image:
     """A copy of `image` (H, W, 3) RGB with masks, outlines and numbers of an object's layers. `rays`: `camera_rays`.
     `names` (L,): a list of the order beside them."""
-    pose = np.ascontiguousarray(camera.camera_from_world[:3])
-    seen = visibility(bodies, placed, pose)
-    labels = segment(bodies, placed, seen.order, pose, camera.intrinsics, rays)
+    record = camera.record
+    seen = visibility(bodies, placed, record)
+    labels = segment(bodies, placed, seen.order, record, rays)
     colours, out = layer_colours(len(seen.order)), image.copy()
     shown = labels != NONE
     out[shown] = ((1.0 - MASK_OPACITY) * out[shown] + MASK_OPACITY * colours[labels[shown]]).astype(np.uint8)
-    outline = outline_of(bodies, placed, seen.order, pose, camera.intrinsics, (camera.width, camera.height), 1e-3)
+    outline = outline_of(bodies, placed, seen.order, record, 1e-3)
     for pixel, behind in zip(outline.pixel, outline.behind, strict=True):
         x, y = (round(float(v) * 2**_SUB) for v in pixel)
         cv2.circle(out, (x, y), 1 << _SUB, (255, 255, 255) if behind == NONE else (0, 0, 0), -1, cv2.LINE_AA, _SUB)

@@ -13,14 +13,17 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contours import COLUMNS, INNER, ContourPoints, contour_on_slices
+from rhot_app.barehand.contours import COLUMNS, INNER, contour_on_slices
+from rhot_app.barehand.joints import POSE_AND_SHAPE
 from rhot_app.barehand.surface import FOREARM, PALM, Surface
 from rhot_app.estimation.residual import UNIT, Rows, compressed
+from rhot_app.geometry.camera import CameraRecord
 from rhot_app.hand.limits import LIMIT_SD_RAD
 from rhot_app.hand.motion.hand_state import POSE, STATE, TANGENT, tangent_size
 from rhot_node.detect.edges import Edges
@@ -65,11 +68,10 @@ class ContourFrame:
     slices on which the contour may be confused with its neighbour's, as it was predicted so uncertainly.
     """
 
-    def __init__(self, surface: Surface, points: ContourPoints, pose: Array, intrinsics: Array, slices: Array,
-                 expected_sd: Array, late_s: Array, repeated: float = 1.0) -> None:
-        self.surface, self.points, self.pose, self.intrinsics = surface, points, pose, intrinsics
+    def __init__(self, surface: Surface, camera: CameraRecord, points: np.recarray, slices: Array, expected_sd: Array,
+                 late_s: Array, repeated: float = 1.0) -> None:
+        self.surface, self.camera, self.points = surface, camera, points
         self.slices, self.expected_sd, self.late_s, self.repeated = slices, expected_sd, late_s, repeated
-        self.pixel, self.normal = slices[:, :2].copy(), slices[:, 2:4].copy()
         fleshy = np.where(surface.group[points.capsule] < PALM, 1.0, FLESHY)
         self.shape_variance = repeated * (SHAPE_SD_M * fleshy * points.scale) ** 2
         self.edges: Edges | None = None
@@ -89,12 +91,7 @@ class ContourFrame:
     def predict(self, state: Array) -> Predicted:
         """The contour on each slice: (K,) px from the slice's centre, its derivative (K, COLUMNS), and whether it
         exists."""
-        count = len(self.slices)
-        offset, rows = np.zeros(count), np.zeros((count, COLUMNS))
-        good = np.zeros(count, np.bool_)
-        p = self.points
-        contour_on_slices(self.surface, state, state[STATE.shape].copy(), self.pose, self.intrinsics, self.late_s,
-                          p.capsule, p.kind, p.along, self.pixel, self.normal, offset, rows, good)
+        offset, rows, good = contour_on_slices(self.surface, state, self.camera, self.points, self.slices, self.late_s)
         return offset, rows, good
 
     def linearise(self, state: Array) -> Rows:
@@ -106,8 +103,9 @@ class ContourFrame:
         cost. The derivatives in `predicted` have N columns."""
         assert self.edges is not None, "the edges of the slices have not been observed"
         self.slice_counts = np.zeros((GROUPS, 2))
-        return float(_gather(self.surface, *predicted, self.points, self.shape_variance, self.edges, self.expected_sd,
-                             self.clutter, information, pull, self.slice_counts))
+        slices = _Slices(self.points, self.surface.group[self.points.capsule], self.edges, self.clutter,
+                         self.shape_variance, self.expected_sd**2)
+        return float(_gather(slices, *predicted, information, pull, self.slice_counts))
 
 
 def in_a_fit(frame: ContourFrame) -> ContourFrame:
@@ -184,7 +182,7 @@ class JointLimits:
 
     def linearise(self, state: Array) -> Rows:
         """One row for each angle beyond its limits."""
-        angles = state[STATE.angles]
+        angles = state[STATE.angles][:len(self.limits)]
         excess = np.minimum(self.limits[:, 1] - angles, 0.0) + np.maximum(self.limits[:, 0] - angles, 0.0)
         beyond = np.flatnonzero(excess)
         jacobian = np.zeros((len(beyond), tangent_size(state)))
@@ -192,20 +190,20 @@ class JointLimits:
         return Rows(excess[beyond] / LIMIT_SD_RAD, jacobian, UNIT)
 
 
-def slices_of(surface: Surface, state: Array, covariance: Array, pose: Array, intrinsics: Array,
-              points: ContourPoints, row_s: float, reach: float, longest_px: float,
-              repeated: float = 1.0, late_s: float = 0.0) -> ContourFrame:
+def slices_of(surface: Surface, state: Array, covariance: Array, camera: CameraRecord, points: np.recarray,
+              row_s: float, reach: float, longest_px: float, repeated: float = 1.0,
+              late_s: float = 0.0) -> ContourFrame:
     """The slices at the contour `points` that are expected of a hand in `state` with `covariance` (n, n). They reach
     `reach` standard deviations to both sides, at most `longest_px`. `row_s`: time between rows, s; `late_s`: the
     image's time less the state's, s."""
-    count = len(points.along)
+    count = len(points)
     late = np.full(count, late_s)
     if count and row_s:
         late += row_s * (points.pixel[:, 1] - points.pixel[:, 1].mean())
     slices = np.column_stack([points.pixel, points.normal, np.ones(count)])
-    frame = ContourFrame(surface, points, pose, intrinsics, slices, np.zeros(count), late, repeated)
+    frame = ContourFrame(surface, camera, points, slices, np.zeros(count), late, repeated)
     _, rows, _ = frame.predict(state)
-    own = np.r_[0:POSE, TANGENT.shape]
+    own = POSE_AND_SHAPE
     if abs(late_s) > SAME_TIME_S:
         own, rows = np.r_[own, POSE:2 * POSE], np.hstack([rows, late_s * rows[:, :POSE]])
     variance = np.sum((rows @ covariance[np.ix_(own, own)]) * rows, axis=1)
@@ -215,33 +213,44 @@ def slices_of(surface: Surface, state: Array, covariance: Array, pose: Array, in
     return frame
 
 
+class _Slices(NamedTuple):
+    """What is known on K slices, see `ContourFrame`; `group` (K,) of their capsules."""
+
+    points: np.recarray
+    group: NDArray[np.int64]
+    edges: Edges
+    clutter: Array
+    shape_variance: Array
+    expected_variance: Array
+
+
 @njit(cache=True)
-def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance, spread_variance, clutter, found):
-    """Probabilistic data association on one slice (Bar-Shalom and Tse 1975): fill `found` with the probability that
-    each edge is the hand's. Returns -2 log likelihood above its minimum, the weight 1/px^2, the weighted mean error px,
-    and the probability that any edge is the hand's. The weight includes the spread of the means of several edges."""
-    missed = MISSED[behind]
-    total, peak = missed, missed
+def _mix(slices, s, expected, found):
+    """Probabilistic data association on slice `s` (Bar-Shalom and Tse 1975): fill `found` with the probability that
+    each edge is the hand's, whose contour is `expected` at that offset, px. Returns -2 log likelihood above its
+    minimum, the weight 1/px^2, the weighted mean error px, and the probability that any edge is the hand's. The weight
+    includes the spread of the means of several edges."""
+    edges, behind, count = slices.edges, slices.points[s].behind, slices.edges.number[s]
+    total = peak = missed = MISSED[behind]
     for k in range(count):
-        variance = sds[k] * sds[k] + shape_variance + spread_variance
-        error = offsets[k] - expected
-        ours = UNSURE + (1.0 - 2.0 * UNSURE) * inside[k]
-        theirs = UNSURE + (1.0 - 2.0 * UNSURE) * outside[k]
-        odds = 4.0 * ours * (theirs if behind == INNER else 1.0 - theirs)
-        top = (1.0 - missed) * odds * _STUDENT_4 / (np.sqrt(variance) * clutter[k])
+        variance = edges.sd[s, k] * edges.sd[s, k] + slices.shape_variance[s] + slices.expected_variance[s]
+        error = edges.offset[s, k] - expected
+        ours = UNSURE + (1.0 - 2.0 * UNSURE) * edges.inside[s, k]
+        theirs = UNSURE + (1.0 - 2.0 * UNSURE) * edges.outside[s, k]
+        odds = ours * (theirs if behind == INNER else 1.0 - theirs) / 0.25  # by even ones, a half each
+        top = (1.0 - missed) * odds * _STUDENT_4 / (np.sqrt(variance) * slices.clutter[s, k])
         found[k] = top * (1.0 + error * error / (DEGREES * variance)) ** (-0.5 * (DEGREES + 1.0))
         total += found[k]
         peak = max(peak, missed + top)
     weight = mean = square = 0.0
     for k in range(count):
         found[k] /= total
-        variance = sds[k] * sds[k] + shape_variance
-        wide = variance + spread_variance
-        error = offsets[k] - expected
-        one = found[k] * (DEGREES + 1.0) / (DEGREES + error * error / wide) / variance
-        weight += one
-        mean += one * error
-        square += one * error * error
+        variance = edges.sd[s, k] * edges.sd[s, k] + slices.shape_variance[s]
+        error = edges.offset[s, k] - expected
+        one = found[k] * (DEGREES + 1.0) / (DEGREES + error * error / (variance + slices.expected_variance[s]))
+        weight += one / variance
+        mean += one / variance * error
+        square += one / variance * error * error
     if weight > 0.0:
         mean /= weight
         weight /= 1.0 + max(square - weight * mean * mean, 0.0)  # the spread of the means
@@ -249,29 +258,23 @@ def _mix(count, offsets, sds, inside, outside, behind, expected, shape_variance,
 
 
 @njit(cache=True)
-def _gather(surface, offset, rows, good, points, shape_variance, edges, expected_sd, clutter, information, pull,
-            slice_counts):
+def _gather(slices, offset, rows, good, information, pull, slice_counts):
     """Add the slices' information to the lower triangle of `information` (N, N) and their gradient to `pull` (N,);
-    returns their cost."""
-    found, cost, own = np.empty(edges.offset.shape[1]), 0.0, np.empty(rows.shape[1], np.int64)
-    for s in range(offset.shape[0]):
+    returns their cost. `offset` (K,), `rows` (K, N) and `good` (K,): as `contour_on_slices` predicts them."""
+    found, cost = np.empty(slices.clutter.shape[1]), 0.0
+    for s in range(len(offset)):
         if not good[s]:
             continue
-        one, weight, error, present = _mix(edges.number[s], edges.offset[s], edges.sd[s], edges.inside[s],
-                                           edges.outside[s], points.behind[s], offset[s], shape_variance[s],
-                                           expected_sd[s] ** 2, clutter[s], found)
+        one, weight, error, present = _mix(slices, s, offset[s], found)
         cost += one
-        group = surface.group[points.capsule[s]]
-        slice_counts[group, 0] += present
-        slice_counts[group, 1] += 1.0
-        used = 0
-        for i in range(rows.shape[1]):
-            if rows[s, i] != 0.0:
-                own[used] = i
-                used += 1
-        for p in range(used):
-            a = weight * rows[s, own[p]]
-            pull[own[p]] += a * error
-            for q in range(p + 1):
-                information[own[p], own[q]] += a * rows[s, own[q]]
+        slice_counts[slices.group[s], 0] += present
+        slice_counts[slices.group[s], 1] += 1.0
+        own = np.flatnonzero(rows[s])
+        for i in own:
+            a = weight * rows[s, i]
+            pull[i] += a * error
+            for j in own:
+                if j > i:
+                    break
+                information[i, j] += a * rows[s, j]
     return cost

@@ -7,29 +7,23 @@ on it, and the best pose near the shown one is more probable there than no hand.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.silhouette import CORRELATED, LogOddsMaps, log_odds_maps, score, score_steps, search
-from rhot_app.barehand.surface import Surface
+from rhot_app.barehand.pose_search import PoseSearch
+from rhot_app.barehand.silhouette import STEP, ForegroundMaps
 from rhot_app.estimation.se3 import quaternion_from_rotation, rotation_from_quaternion
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.motion.hand_state import SHAPE
+from rhot_app.hand.motion.hand_state import SHAPE, pose_of, state_at
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
-from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, FLEXIONS, JOINTS, HandPose
+from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
 from rhot_app.project import Rig, StartPose
 
 Array = NDArray[np.float64]
-ForegroundMaps = Sequence[NDArray[np.float32] | None]
-"""Foreground probabilities (h, w) of every STEP-th pixel of each camera, None of a camera without an image."""
-
-STEP = 8
-"""px: spacing of the pixels of the foreground map."""
 
 START_SD = 0.015, 0.2, 0.2
 """m, rad and rad: standard deviations of position, rotation and angles of a given start, such as a pose that a person
@@ -57,9 +51,6 @@ CANDIDATE_SHARE = 0.25
 """Part of the joints of the shown pose that must lie on foreground before a hand is looked for there. Chosen: fingers
 that are a finger's breadth off miss the hand."""
 
-ROUNDS = 15
-"""Rounds of a search about a pose (`silhouette.search`). Chosen: enough to rank postures."""
-
 UPRIGHT = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """camera_from_palm of a hand that shows its palm to a camera, fingers up."""
 
@@ -70,10 +61,8 @@ when it moves by its own length."""
 LATERAL_M = 0.1
 """m: of a shown hand from the middle, where there are two. Chosen: two hands' breadths are then between the palms."""
 
-_CURLS_DEG = ((5.0, 10.0, 5.0), (20.0, 30.0, 20.0), (65.0, 80.0, 45.0))  # MCP, PIP, DIP: open, relaxed, closed
 _PARALLEL = 1e-3  # 3 degrees between the axes of two cameras
 _MIDDLE_TIP = JOINTS.index("middle_tip")
-_THUMB_STEP = 0.5  # rad to either side of a relaxed thumb: a third of its range
 
 
 def shown_pose(rig: Rig, cameras: Sequence[CameraModel], model: HandModel, plane: PalmOnPlane | None = None,
@@ -128,45 +117,32 @@ def _middle(rig: Rig, cameras: Sequence[CameraModel], model: HandModel) -> Array
     return np.asarray(centres.mean(axis=0) + distance * axes[0])
 
 
-def taken_pose(shown: HandPose, maps: ForegroundMaps, cameras: Sequence[CameraModel], model: HandModel,
-               surface: Surface, rng: np.random.Generator, plane: PalmOnPlane | None = None) -> HandPose | None:
+def taken_pose(shown: HandPose, maps: ForegroundMaps, search: PoseSearch) -> HandPose | None:
     """The pose about the `shown` one that a hand of the file's shape has taken in foreground maps; None without.
 
-    In every map some of the joints must lie on foreground where they are shown, and most where they are found.
-    `mean_log_odds` must be positive there. All this only saves work: `BareHandTracker.verified` decides.
+    In every map some of the joints must lie on foreground where they are shown, and most where they are found. The log
+    odds of `even_log_odds` must be positive there. All this only saves work: `BareHandTracker.verified` decides.
     """
-    used = [camera for camera, one in zip(cameras, maps, strict=True) if one is not None]
-    known = [one for one in maps if one is not None]
-    if not known or not _on_foreground(shown, known, used, model, CANDIDATE_SHARE):
+    if all(one is None for one in maps) or not _on_foreground(shown, maps, search, CANDIDATE_SHARE):
         return None
-    lenses = [camera.camera_from_world[:3] for camera in used], [camera.intrinsics for camera in used]
     covariance = np.diag(np.repeat(np.square(START_SD), (3, 3, 21)))
-    covariance[6:, 6:] = np.linalg.inv(model.pose_prior.information + np.eye(21) / START_SD[2] ** 2)
-    size = np.zeros(SHAPE)
-    world, angles = settle(surface, shown.world_from_palm, shown.angles, covariance, model, size,
-                           log_odds_maps(known, STEP, *lenses), rng, plane)
-    found = HandPose(world, angles)
-    good = (mean_log_odds(found, size, maps, cameras, surface) > 0.0
-            and _on_foreground(found, known, used, model, MAJORITY))
+    covariance[6:, 6:] = np.linalg.inv(search.model.pose_prior.information + np.eye(21) / START_SD[2] ** 2)
+    state = search.settle(search.odds_of(maps), state_at(shown.world_from_palm, shown.angles, SHAPE), covariance)
+    found = pose_of(state)
+    good = even_log_odds(search, maps, state) > 0.0 and _on_foreground(found, maps, search, MAJORITY)
     return found if good else None
 
 
-def mean_log_odds(pose: HandPose, size: Array, maps: ForegroundMaps, cameras: Sequence[CameraModel],
-              surface: Surface) -> float:
-    """Log odds per pixel of a hand of the shape `size` (SHAPE,) in foreground maps, and of the ring about it, if each
-    pixel of the rest were foreground with probability 0.5: a large foreground, such as a face, has less."""
-    used = [(camera, one) for camera, one in zip(cameras, maps, strict=True) if one is not None]
-    even = log_odds_maps([one for _, one in used], STEP, [camera.camera_from_world[:3] for camera, _ in used],
-                         [camera.intrinsics for camera, _ in used], rate=0.5)
-    _, parts = score(surface, pose.world_from_palm, pose.angles, size, even)
-    return float((parts[:, 0] + parts[:, 2]).sum() / max(parts[:, 1].sum(), 1.0))
+def even_log_odds(search: PoseSearch, maps: ForegroundMaps, state: Array) -> float:
+    """Log odds per pixel of a hand in foreground maps, and of the ring about it, if each pixel of the rest were
+    foreground with probability 0.5: a large foreground, such as a face, has less."""
+    return search.log_odds_per_pixel(search.odds_of(maps, rate=0.5), state)
 
 
-def _on_foreground(pose: HandPose, maps: Sequence[NDArray[np.float32]], cameras: Sequence[CameraModel],
-                   model: HandModel, share: float) -> bool:
-    joints = forward(model, pose).joints
+def _on_foreground(pose: HandPose, maps: ForegroundMaps, search: PoseSearch, share: float) -> bool:
+    joints = forward(search.model, pose).joints
     return all(min(joints_on_foreground(camera, joints, one)) > share
-               for camera, one in zip(cameras, maps, strict=True))
+               for camera, one in zip(search.cameras, maps, strict=True) if one is not None)
 
 
 def joints_on_foreground(camera: CameraModel, joints: Array, probability: NDArray[np.float32]) -> tuple[float, float]:
@@ -180,52 +156,3 @@ def joints_on_foreground(camera: CameraModel, joints: Array, probability: NDArra
     shown = probability[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)]
     shown = shown[~np.isnan(shown)]
     return len(shown) / len(places), float(np.mean(shown > 0.5)) if len(shown) else 0.0
-
-
-def log_odds(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array, odds: LogOddsMaps) -> float:
-    """Log odds of a pose by the foreground (`silhouette.score`) and the pose prior, up to a constant."""
-    prior, shown = model.pose_prior, score(surface, world, angles, size, odds)[0]
-    bent = angles - prior.mean
-    return shown / CORRELATED - 0.5 * float(bent @ prior.information @ bent)
-
-
-def settle(surface: Surface, world: Array, angles: Array, covariance: Array, model: HandModel, size: Array,
-           odds: LogOddsMaps, rng: np.random.Generator, plane: PalmOnPlane | None = None) -> tuple[Array, Array]:
-    """The most probable pose by the foreground about `world`, `angles` with prior covariance (27, 27)
-    (`silhouette.search`). Each finger is tried in each posture before the search and in between (`choose_postures`)."""
-    if plane is not None:
-        covariance = plane.narrowed(covariance)
-    angles = choose_postures(surface, world, angles, model, size, odds)
-    moved, bent = search(surface, world, angles, covariance, model.limits, size, odds, rng, ROUNDS)
-    bent = choose_postures(surface, moved, bent, model, size, odds)
-    return search(surface, moved, bent, 0.25 * covariance, model.limits, size, odds, rng, ROUNDS)
-
-
-def choose_postures(surface: Surface, world: Array, angles: Array, model: HandModel, size: Array,
-                    odds: LogOddsMaps) -> Array:
-    """The angles (21,) with the posture of each digit that the foreground makes most probable: a finger unchanged,
-    open, relaxed or closed; the thumb unchanged, relaxed or to either side. Then each pair of neighbouring fingers,
-    with the prior's abduction, in all nine combinations: one may lie in the other's place. Coordinate descent, twice
-    over all digits. Locked angles (`HandModel.locked`) stay."""
-    angles, held = angles.copy(), set(model.locked)
-    turns = [k for k in (0, 1) if k not in held]  # the thumb's angles at its root
-    thumbs = [model.pose_prior.mean[ANGLE_SLICES[0]] + aside * np.eye(5)[which]
-              for which, aside in ((0, 0.0), *product(turns, (-_THUMB_STEP, _THUMB_STEP)))]
-    choices: list[tuple[slice | list[int] | NDArray[np.int64], list[Array] | Array]] = []
-    if turns:
-        choices.append((ANGLE_SLICES[0], thumbs))
-    choices += [(list(flexions), np.radians(_CURLS_DEG)) for flexions in FLEXIONS[1:] if not held & set(flexions)]
-    curls = np.radians(_CURLS_DEG)
-    for finger in (1, 2, 3):
-        both = np.r_[ANGLE_SLICES[finger], ANGLE_SLICES[finger + 1]]
-        if not held & set(both):
-            spread = model.pose_prior.mean[both[[0, 4]]]
-            choices.append((both, [np.concatenate([spread[:1], one, spread[1:], other])
-                                   for one, other in product(curls, curls)]))
-    for where, options in [*choices, *choices]:
-        steps = np.zeros((1 + len(options), 27))
-        for k, option in enumerate(options):
-            steps[1 + k, 6:][where] = option - angles[where]
-        best = int(np.argmax(score_steps(surface, world, angles, steps, model.limits, size, odds)))
-        angles += steps[best, 6:]
-    return angles

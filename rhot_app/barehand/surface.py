@@ -15,11 +15,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.se3 import exponential
+from rhot_app.estimation.vectors import dot, minus, norm, turned
 from rhot_app.hand.dh import ROOT, DhArrays
 from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.motion.hand_state import SHAPE
+from rhot_app.hand.motion.hand_state import SHAPE, STATE
 from rhot_app.hand.shape import FLESH
 
 Array = NDArray[np.float64]
@@ -113,68 +115,86 @@ def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, 
     return parts
 
 
+class Posed(NamedTuple):
+    """A surface in the world, m. `table`: the DH table of a hand of its shape; `world` (4, 4) world_from_palm; `frames`
+    (R, 3, 4); the balls' `centres` (N, 2, 3) and `radii` (N, 2)."""
+
+    table: DhArrays
+    world: Array
+    frames: Array
+    centres: Array
+    radii: Array
+
+
 @njit(cache=True)
-def sized_table(dh, bone, shape, a, d):
-    """Fill `a` (R,) and `d` (R,), the DH lengths of a hand of `shape` (SHAPE,), m."""
+def sized(dh, bone, shape):
+    """The DH table `dh` of a hand of `shape` (SHAPE,), its points too; `bone` (R,): as in `Surface`."""
     whole = np.exp(shape[HAND_SIZE])
+    a, d = np.empty(dh.a.shape[0]), np.empty(dh.a.shape[0])
     for row in range(a.shape[0]):
         a[row] = dh.a[row] * whole * (np.exp(shape[FINGER_SIZE] + shape[LENGTH + bone[row]]) if bone[row] >= 0 else 1.0)
         d[row] = dh.d[row] * whole
+    return DhArrays(dh.parent, dh.theta, d, a, dh.cos_alpha, dh.sin_alpha, dh.angle, dh.sign, dh.point_row,
+                    whole * dh.point_offset)
 
 
 @njit(cache=True)
-def place_capsules(surface, world, angles, shape, frames, centres, radii):
-    """Fill frames (R, 3, 4), the balls' `centres` (N, 2, 3) m and `radii` (N, 2) m of a hand at `world` (4, 4)."""
-    dh = surface.dh
-    a, d = np.empty(dh.a.shape[0]), np.empty(dh.a.shape[0])
-    sized_table(dh, surface.bone, shape, a, d)
-    table = DhArrays(dh.parent, dh.theta, d, a, dh.cos_alpha, dh.sin_alpha, dh.angle, dh.sign, dh.point_row,
-                     dh.point_offset)
-    forward_arrays(table, world, angles, frames, dh.point_offset)
-    whole, turned, left = np.exp(shape[HAND_SIZE]), np.empty((3, 3)), np.empty((3, 3))
-    exponential(0.0, shape[FOREARM_TURN], shape[FOREARM_TURN + 1], turned, left)
-    forearm = np.dot(np.ascontiguousarray(world[:3, :3]), turned)
-    for k in range(centres.shape[0]):
-        row = surface.row[k]
-        thick = np.exp(shape[FOREARM_RADIUS] if surface.group[k] == FOREARM else shape[THICKNESS])
-        longer = 1.0
+def posed(surface, world, angles, shape):
+    """The `Posed` surface of a hand at `world` (4, 4) with `angles` (21,) rad and `shape` (SHAPE,)."""
+    table, count = sized(surface.dh, surface.bone, shape), surface.row.shape[0]
+    frames, centres, radii = np.empty((len(table.parent), 3, 4)), np.empty((count, 2, 3)), np.empty((count, 2))
+    forward_arrays(table, world, angles, frames, table.point_offset)
+    whole, forearm, left = np.exp(shape[HAND_SIZE]), np.empty((3, 3)), np.empty((3, 3))
+    exponential(0.0, shape[FOREARM_TURN], shape[FOREARM_TURN + 1], forearm, left)
+    forearm = np.dot(np.ascontiguousarray(world[:3, :3]), forearm)
+    for k in range(count):
+        row, arm = surface.row[k], surface.group[k] == FOREARM
+        thick, longer = np.exp(shape[FOREARM_RADIUS] if arm else shape[THICKNESS]), 1.0
         if row >= 0:
             thick *= np.exp(shape[RADIUS + surface.bone[row]])
             longer = np.exp(shape[FINGER_SIZE] + shape[LENGTH + surface.bone[row]])
         base = world if row < 0 else frames[row]
         for end in range(2):
             radii[k, end] = surface.radii[k, end] * whole * thick
-            x, y, z = surface.ends[k, end, 0], surface.ends[k, end, 1], surface.ends[k, end, 2]
+            x, y, z = surface.ends[k, end]
+            lever = turned(forearm, (x, y, z)) if arm else turned(base, (x * longer, y, z))
             for i in range(3):
-                if surface.group[k] == FOREARM:
-                    along = forearm[i, 0] * x + forearm[i, 1] * y + forearm[i, 2] * z
-                else:
-                    along = base[i, 0] * x * longer + base[i, 1] * y + base[i, 2] * z
-                centres[k, end, i] = base[i, 3] + whole * along
+                centres[k, end, i] = base[i, 3] + whole * lever[i]
+    return Posed(table, world, frames, centres, radii)
+
+
+@njit(cache=True)
+def posed_in(surface, state):
+    """The `Posed` surface of the hand in a state that has a shape."""
+    return posed(surface, pose_matrix(state), state[STATE.angles], state[STATE.shape])
 
 
 def capsules_of(surface: Surface, world: Array, angles: Array, shape: Array | None = None) -> tuple[Array, Array]:
     """`centres` (N, 2, 3) m and `radii` (N, 2) m of a posed hand: `world` (4, 4), `angles` (21,) rad."""
-    frames = np.empty((len(surface.dh.parent), 3, 4))
-    centres, radii = np.empty_like(surface.ends), np.empty_like(surface.radii)
-    place_capsules(surface, world, angles, np.zeros(SHAPE) if shape is None else shape, frames, centres, radii)
-    return centres, radii
+    hand = posed(surface, world, angles, np.zeros(SHAPE) if shape is None else shape)
+    return hand.centres, hand.radii
+
+
+@njit(cache=True, inline="always")  # the test of most capsules is shorter than a call
+def ray_to_capsule(o, u, centres, radii, k, margin=0.0):
+    """Distance along the ray from o (3,) with unit direction u (3,) to capsule `k` of those with balls at `centres`
+    (N, 2, 3) and with `radii` (N, 2), grown by `margin`; -1 for none."""
+    a = centres[k, 0, 0], centres[k, 0, 1], centres[k, 0, 2]
+    b = centres[k, 1, 0], centres[k, 1, 1], centres[k, 1, 2]
+    ra, rb = radii[k, 0] + margin, radii[k, 1] + margin
+    to_middle = minus(((a[0] + b[0]) * 0.5, (a[1] + b[1]) * 0.5, (a[2] + b[2]) * 0.5), o)
+    reach = 0.5 * norm(minus(a, b)) + max(ra, rb)
+    if dot(to_middle, to_middle) - dot(to_middle, u) ** 2 > reach * reach:
+        return -1.0
+    return _first_root(u, minus(b, a), minus(o, a), minus(o, b), ra, rb)
 
 
 @njit(cache=True)
-def ray_to_capsule(ox, oy, oz, ux, uy, uz, a, b, ra, rb):
-    """Distance along the ray from o with unit direction u to the capsule of the balls at `a`, `b` (3,); -1 for none."""
-    bx, by, bz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    px, py, pz = ox - a[0], oy - a[1], oz - a[2]
-    qx, qy, qz = ox - b[0], oy - b[1], oz - b[2]
+def _first_root(u, ba, oa, ob, ra, rb):
+    """The smallest positive t at which o + t u lies on the capsule, from the vectors between o and its ends a and b."""
     taper = ra - rb
-    m0 = bx * bx + by * by + bz * bz
-    m1 = bx * px + by * py + bz * pz
-    m2 = bx * ux + by * uy + bz * uz
-    m3 = ux * px + uy * py + uz * pz
-    m5 = px * px + py * py + pz * pz
-    m6 = ux * qx + uy * qy + uz * qz
-    m7 = qx * qx + qy * qy + qz * qz
+    m0, m1, m2 = dot(ba, ba), dot(ba, oa), dot(ba, u)
+    m3, m5, m6, m7 = dot(u, oa), dot(oa, oa), dot(u, ob), dot(ob, ob)
     d2 = m0 - taper * taper
     k2 = d2 - m2 * m2
     k1 = d2 * m3 - m1 * m2 + m2 * taper * ra
@@ -182,14 +202,12 @@ def ray_to_capsule(ox, oy, oz, ux, uy, uz, a, b, ra, rb):
     h = k1 * k1 - k0 * k2
     if d2 > 0.0 and h < 0.0:
         return -1.0
-    if d2 > 0.0 and abs(k2) > 1e-18:
+    if d2 > 0.0 and k2 != 0.0:
         t = (-np.sqrt(h) - k1) / k2
         y = m1 - ra * taper + t * m2
         if 0.0 < y < d2:
             return t
-    h1 = m3 * m3 - m5 + ra * ra
-    h2 = m6 * m6 - m7 + rb * rb
-    best = -1.0
+    h1, h2, best = m3 * m3 - m5 + ra * ra, m6 * m6 - m7 + rb * rb, -1.0
     if h1 > 0.0:
         best = -m3 - np.sqrt(h1)
     if h2 > 0.0:

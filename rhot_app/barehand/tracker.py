@@ -24,16 +24,15 @@ from rhot_app.barehand.contour_residual import (
     velocity_of,
 )
 from rhot_app.barehand.contours import STEP_M, contour_points
-from rhot_app.barehand.joints import knowledge_of, place_joints
-from rhot_app.barehand.relocalisation import ODDS_DROP, Relocaliser
+from rhot_app.barehand.joints import covariances_of, knowledge_of, points_in
+from rhot_app.barehand.pose_search import ODDS_DROP, PoseSearch
+from rhot_app.barehand.silhouette import STEP, ForegroundMaps
 from rhot_app.barehand.start import (
     CONTOUR_THRESHOLD,
     LOG_ODDS_THRESHOLD,
     MAJORITY,
     START_SD,
-    STEP,
-    ForegroundMaps,
-    mean_log_odds,
+    even_log_odds,
     shown_pose,
     taken_pose,
 )
@@ -121,7 +120,7 @@ class BareHandTracker:
         self.surface = surface_of(self.model)
         self.cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
         self.names = tuple(node.name for node in rig.nodes)
-        self.poses = [np.ascontiguousarray(camera.camera_from_world[:3]) for camera in self.cameras]
+        self.records = [camera.record for camera in self.cameras]
         self.row_s = [0.0] * len(self.cameras) if row_s is None else list(row_s)
         self.foreground = list(foreground) if foreground else [no_foreground() for _ in self.cameras]
         prior = self.model.pose_prior
@@ -143,7 +142,7 @@ class BareHandTracker:
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
         self._sequence, self._first_update = 0, False
-        self.relocaliser = Relocaliser(self.model, self.surface, self.cameras, self.plane)
+        self.search = PoseSearch(self.model, self.surface, self.cameras, self.plane)
         self.start_pose = shown_pose(rig, self.cameras, self.model, self.plane, lateral_m)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
 
@@ -157,7 +156,7 @@ class BareHandTracker:
         self.filter.begin(t_ns, state, covariance)
         self.tracking = self._first_update = True
         self._taken_s = [-np.inf] * len(self.cameras)
-        self.relocaliser.restart()
+        self.search.last_search_s = -np.inf
         self.frames = [None] * len(self.cameras)
 
     def begin(self, images: Sequence[Image | None], t_ns: int) -> bool:
@@ -175,8 +174,7 @@ class BareHandTracker:
 
     def taken(self, maps: ForegroundMaps) -> HandPose | None:
         """The pose about `start_pose` that a hand has taken (`start.taken_pose`)."""
-        return taken_pose(self.start_pose, maps, self.cameras, self.model, self.surface, self.relocaliser.rng,
-                          self.plane)
+        return taken_pose(self.start_pose, maps, self.search)
 
     def verified(self, maps: ForegroundMaps, state: Array | None = None) -> bool:
         """Whether the last images and these maps show a hand in the newest state, or in `state` (n,) at the maps' time:
@@ -184,8 +182,8 @@ class BareHandTracker:
         found, expected = self.slice_counts.sum(axis=(0, 1))
         state = self.filter.newest.state if state is None else state
         known = any(one is not None for one in maps)
-        return bool(found > CONTOUR_THRESHOLD * expected > 0.0 and known and mean_log_odds(
-            pose_of(state), state[STATE.shape].copy(), maps, self.cameras, self.surface) > LOG_ODDS_THRESHOLD)
+        return bool(found > CONTOUR_THRESHOLD * expected > 0.0 and known
+                    and even_log_odds(self.search, maps, state) > LOG_ODDS_THRESHOLD)
 
     def step(self, images: Sequence[Image | None], t_ns: Sequence[int]) -> HandState:
         """The hand after one image (H, W, 3) RGB of each camera, None without one, at master times `t_ns`. Raises
@@ -208,20 +206,20 @@ class BareHandTracker:
         prediction, since_s = self.filter.predict(t_s), t_s - self.filter.newest.t_s
         self.prepare_update(images, t_s)
         self.frames = [frame if c in images else None for c, frame in enumerate(self.frames)]
-        maps, relocaliser, start = self._maps(images), self.relocaliser, None
-        odds = None if maps is None else relocaliser.odds_of(maps)
-        if maps and odds and (self._first_update or relocaliser.search_due(odds, prediction[0], t_s)):
-            start = relocaliser.relocalise(maps, prediction, self.process.stationary, since_s)
-            relocaliser.last_search_s = t_s
+        maps, search, start = self._maps(images), self.search, None
+        odds = None if maps is None else search.odds_of(maps)
+        if maps and odds and (self._first_update or search.search_due(odds, prediction[0], t_s)):
+            start = search.relocalise(maps, prediction, self.process.stationary, since_s)
+            search.last_search_s = t_s
         passes = START_PASSES if self._first_update or start is not None else PASSES
         knot = self._fit(images, late, t_s, prediction, prediction[0] if start is None else start, extra, passes)
         if odds is not None:
-            per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
-            if start is not None and per_pixel < relocaliser.log_odds_per_pixel(odds, start) - ODDS_DROP:
+            per_pixel = search.log_odds_per_pixel(odds, knot.state)
+            if start is not None and per_pixel < search.log_odds_per_pixel(odds, start) - ODDS_DROP:
                 # Edges have drawn the pose away from the foreground: restart there, without the prediction.
                 knot = self._fit(images, late, t_s, self._restart(t_s, start), start, extra, START_PASSES)
-                per_pixel = relocaliser.log_odds_per_pixel(odds, knot.state)
-            relocaliser.average(per_pixel, first=self._first_update)
+                per_pixel = search.log_odds_per_pixel(odds, knot.state)
+            search.average(per_pixel, first=self._first_update)
         self._first_update = False
         return knot
 
@@ -300,15 +298,14 @@ class BareHandTracker:
                          late_s: float = 0.0) -> ContourFrame:
         """The slices across the contours, `step_m` apart, of a hand in `state` with `covariance` in one camera's image,
         taken `late_s` s later. They have no edges yet."""
-        model, then = self.cameras[camera], state
+        record, then = self.records[camera], state
         if abs(late_s) > SAME_TIME_S:
             step = np.zeros(self.process.size)
             step[TANGENT.pose] = late_s * state[STATE.velocity]
             then = self.process.retract(state, step)
-        size, pose, image_size = state[STATE.shape].copy(), self.poses[camera], (model.width, model.height)
-        points = contour_points(self.surface, then, size, pose, model.intrinsics, image_size, step_m)
-        frame = slices_of(self.surface, state, covariance, pose, model.intrinsics, points, self.row_s[camera], REACH,
-                          LONGEST_PX, self._repeated[camera], late_s)
+        points = contour_points(self.surface, then, record, step_m)
+        frame = slices_of(self.surface, state, covariance, record, points, self.row_s[camera], REACH, LONGEST_PX,
+                          self._repeated[camera], late_s)
         frame.ambiguous = float(np.mean(frame.expected_sd > AMBIGUOUS_PX)) if len(frame.slices) else 0.0
         frame.expected_sd = np.minimum(frame.expected_sd, AMBIGUOUS_PX)
         return frame
@@ -331,8 +328,8 @@ class BareHandTracker:
         begun = time.perf_counter() if begun is None else begun
         knot = self.filter.newest
         state, covariance = knot.state, knot.covariance
-        points, covariances, motion = np.empty((26, 3)), np.empty((26, 3, 3)), np.empty((2, 21))
-        place_joints(state, covariance, self.model.dh, self.surface.bone, points, covariances, motion)
+        points, jacobian = points_in(self.model.dh, self.surface.bone, state)
+        covariances, motion = covariances_of(jacobian, covariance)
         deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         frames = [frame for frame in self.frames if frame is not None]
         # predicted so uncertainly, fingers are taken for each other
@@ -363,7 +360,7 @@ class BareHandTracker:
             angle_sd=deviation[TANGENT.angles].copy(), palm_covariance=covariance[TANGENT.palm, TANGENT.palm].copy(),
             velocity=state[STATE.velocity].copy(), acceleration=state[STATE.acceleration].copy(),
             velocity_sd=deviation[TANGENT.velocity], acceleration_sd=deviation[TANGENT.acceleration],
-            joint_velocity_sd=motion[0], joint_acceleration_sd=motion[1],
+            joint_velocity_sd=motion[0, :21], joint_acceleration_sd=motion[1, :21],
             hand_scale=float(np.exp(state[STATE.shape][HAND_SIZE])),
             hand_scale_sd=float(deviation[TANGENT.shape][HAND_SIZE]))
 

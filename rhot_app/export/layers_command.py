@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
                 writer.add(one)
     else:
         _picture(args.out, next(pictures))
-    seen = visibility(bodies, placed, np.ascontiguousarray(cameras[0].camera_from_world[:3]))
+    seen = visibility(bodies, placed, cameras[0].record)
     order = [names[layer] for layer in seen.order]
     cut = [names[layer] for layer in np.flatnonzero(seen.cut)]
     if args.json:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -244,6 +245,15 @@ def pixels_per_metre(slope: Array) -> float:
 
 
 @njit(cache=True)
+def scales_of(slopes: Array) -> Array:
+    """(N,) `pixels_per_metre` of slopes (N, 2, 3)."""
+    scales = np.empty(len(slopes))
+    for n in range(len(slopes)):
+        scales[n] = pixels_per_metre(slopes[n])
+    return scales
+
+
+@njit(cache=True)
 def pixels_per_metre_facing(slope: Array, camera_from_world: Array) -> float:
     """The same of a square that faces along the camera's axis: the focal length by the depth, for a plain lens."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
@@ -263,7 +273,7 @@ def camera_coordinates(camera: Array, x: float, y: float, z: float) -> tuple[flo
             camera[2, 3] + camera[2, 0] * x + camera[2, 1] * y + camera[2, 2] * z)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def project_ray_with_slope(x: float, y: float, depth: float, camera: Array, intrinsics: Array, pixel: Array,
                            slope: Array) -> bool:
     """pixel = f(x, y), slope = f'(x, y) (R_xy - (x, y) R_z) / depth: f the lens, R the rows of `camera` (3, 4).
@@ -280,7 +290,7 @@ def project_ray_with_slope(x: float, y: float, depth: float, camera: Array, intr
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def project_point(x: float, y: float, z: float, camera: Array, intrinsics: Array, pixel: Array, slope: Array) -> bool:
     """The projection of a world point (x, y, z) m, for all compiled code: fills `pixel` (2,) px and its Jacobian
     `slope` (2, 3) px/m; False, with nothing filled, where the camera cannot see it.
@@ -310,6 +320,16 @@ def lens_rays(pixels: Array, lens: Array) -> Array:
     return np.asarray(undistort_points(np.ascontiguousarray(pixels), intrinsics_row(lens)))
 
 
+class CameraRecord(NamedTuple):
+    """A camera as compiled functions take it: `pose` (3, 4) camera_from_world and `centre` (3,), m; `intrinsics` (13,);
+    `size` (2,), width and height, px."""
+
+    pose: Array
+    centre: Array
+    intrinsics: Array
+    size: Array
+
+
 @dataclass(frozen=True, slots=True)
 class CameraModel:
     """One calibrated camera.
@@ -335,6 +355,12 @@ class CameraModel:
         translation = np.array(pose.translation_m)
         return cls(intrinsics.width, intrinsics.height, intrinsics_row(lens_parameters(intrinsics)),
                    rigid(rotation, translation), rigid(rotation.T, -rotation.T @ translation))
+
+    @property
+    def record(self) -> CameraRecord:
+        """The model for compiled functions."""
+        return CameraRecord(np.ascontiguousarray(self.camera_from_world[:3]), self.centre.copy(), self.intrinsics,
+                            np.array([self.width, self.height], float))
 
     @property
     def matrix(self) -> Array:
@@ -369,7 +395,7 @@ class CameraModel:
         """(N,) px per m across the line of sight at world points (N, 3) m; NaN where the camera sees nothing."""
         _, slopes = project_with_slope(np.ascontiguousarray(np.atleast_2d(points)), self.camera_from_world,
                                        self.intrinsics)
-        return np.array([pixels_per_metre(slope) for slope in slopes])
+        return np.asarray(scales_of(slopes))
 
     def undistort(self, pixels: Array) -> Array:
         """Raw pixels (N, 2) to normalised coordinates (N, 2)."""

@@ -112,7 +112,7 @@ def point_jacobian(dh: DhArrays, world_from_root: Array, frames: Array, row: int
         row = dh.parent[row]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def chain_row(dh: DhArrays, world_from_root: Array, frames: Array, row: int, x: float, y: float, z: float,
               gradient: Array, out: Array) -> None:
     """g^T dp: `point_jacobian` times a `gradient` g (3,), such as a row of a projection's slope.

@@ -19,9 +19,9 @@ from rhot_app.barehand.surface import FOREARM_TURN
 from rhot_app.barehand.tracker import START_PASSES, BareHandTracker
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_app.hand.motion.hand_state import MOTION, POSE, SHAPE, STATE, state_at
+from rhot_app.hand.motion.hand_state import MOTION, POSE, SHAPE
 from rhot_app.handfit.solve import Evidence, Freedom, Solver, free_numbers
-from rhot_app.handfit.state import Contour, FitState, Instant
+from rhot_app.handfit.state import Contour, FitState, Instant, bare_state
 from rhot_app.project import Rig
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import Foreground, learn_skin
@@ -70,9 +70,7 @@ def _search(hand: HandAnatomy, rig: Rig, state: FitState, k: int, spread: Array,
     each picture, the colours of skin and the noise."""
     instant = state.instants[k]
     tracker = _tracker(rig, hand, instant)
-    bare = state_at(instant.pose.world_from_palm, instant.pose.angles, SHAPE)
-    covariance = np.zeros((MOTION + SHAPE, MOTION + SHAPE))
-    bare[STATE.shape][FOREARM_TURN:] = instant.bend
+    bare, covariance = bare_state(instant), np.zeros((MOTION + SHAPE, MOTION + SHAPE))
     first = state.own(k).start
     ours = np.concatenate([np.arange(first, first + POSE), np.arange(FOREARM_TURN), first + POSE + np.arange(2)])
     theirs = np.concatenate([np.arange(POSE), MOTION + np.arange(SHAPE)])

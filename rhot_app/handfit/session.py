@@ -12,12 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contours import INNER, contour_points
-from rhot_app.barehand.surface import FOREARM_TURN
 from rhot_app.errors import CalibrationError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel, neutral_pose
-from rhot_app.hand.motion.hand_state import SHAPE, state_at
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, JOINTS, HandPose
 from rhot_app.handfit.contour_search import fit_to_contours
 from rhot_app.handfit.hand_shape import SIZE, Shapes
@@ -37,7 +35,7 @@ from rhot_app.handfit.solve import (
     Solver,
     free_numbers,
 )
-from rhot_app.handfit.state import Anchor, FitState, Image, Instant
+from rhot_app.handfit.state import Anchor, FitState, Image, Instant, bare_state
 from rhot_app.progress import Progress
 from rhot_app.project import CameraCalibration, Rig
 
@@ -152,11 +150,7 @@ class HandFit:
         one, model = self.instant, self.cameras[camera]
         if one is None:
             return []
-        bare, size = state_at(one.pose.world_from_palm, one.pose.angles, SHAPE), np.zeros(SHAPE)
-        size[FOREARM_TURN:] = one.bend
-        points = contour_points(self.shapes.surface(self.state.shape), bare, size,
-                                np.ascontiguousarray(model.camera_from_world[:3]), model.intrinsics,
-                                (model.width, model.height))
+        points = contour_points(self.shapes.surface(self.state.shape), bare_state(one), model.record)
         kind = 8 * points.capsule + 2 * points.kind + (points.behind == INNER)
         apart = np.linalg.norm(np.diff(points.pixel, axis=0), axis=1) > GAP_M * points.scale[1:]
         starts = np.flatnonzero((np.diff(kind) != 0) | apart) + 1

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import RIDGE, gathered
-from rhot_app.barehand.contours import NEAREST_M, project
-from rhot_app.barehand.joints import add_lengths
+from rhot_app.barehand.joints import points_in
 from rhot_app.barehand.start import START_SD
 from rhot_app.barehand.surface import FINGER_SIZE, FOREARM_TURN, HAND_SIZE, LENGTH, RADIUS
 from rhot_app.barehand.tracker import FOREARM_SD
@@ -24,13 +23,12 @@ from rhot_app.errors import CalibrationError
 from rhot_app.estimation.least_squares import Dense, minimise
 from rhot_app.estimation.residual import UNIT, Rows, compressed
 from rhot_app.estimation.se3 import pose_difference
-from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.kinematics import empty_frames, forward_arrays, jacobian_arrays
+from rhot_app.geometry.camera import NEAREST_M, CameraModel, project_with_slope
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.motion.hand_state import POSE, SHAPE, STATE, TANGENT, state_at
+from rhot_app.hand.motion.hand_state import POSE, STATE, TANGENT
 from rhot_app.hand.skeleton import JOINTS, HandPose
 from rhot_app.handfit.hand_shape import ROOTS, SHAPE_LIMIT, SHAPE_SD, SIZE, Shapes
-from rhot_app.handfit.state import BEND_LIMIT, OWN, Contour, FitState, Instant
+from rhot_app.handfit.state import BEND_LIMIT, OWN, Contour, FitState, Instant, bare_state
 
 Array = NDArray[np.float64]
 Freedom = Literal["pose", "lengths", "roots"]
@@ -147,15 +145,13 @@ class Solver:
     def _anchors(self, one: Instant, sd_px: float, state: FitState, k: int) -> Rows:
         places, slopes = self.places(state.shape, one)
         error, jacobian = np.zeros(2 * len(one.anchors)), np.zeros((2 * len(one.anchors), state.size))
-        pixel, slope = np.empty(2), np.empty((2, 3))
         for n, anchor in enumerate(one.anchors):
             camera = self.cameras[anchor.camera]
-            pose = np.ascontiguousarray(camera.camera_from_world[:3])
-            x, y, z = places[anchor.joint]
-            if not project(x, y, z, pose, camera.intrinsics, pixel, slope):
+            pixel, slope = project_with_slope(places[None, anchor.joint], camera.camera_from_world, camera.intrinsics)
+            if not np.isfinite(pixel).all():
                 continue  # behind the camera it says nothing; a solution never leads there (`_bounded`)
-            rows, moves = slice(2 * n, 2 * n + 2), slope @ slopes[anchor.joint]
-            error[rows] = np.array(anchor.pixel) - pixel
+            rows, moves = slice(2 * n, 2 * n + 2), slope[0] @ slopes[anchor.joint]
+            error[rows] = np.array(anchor.pixel) - pixel[0]
             jacobian[rows, :SIZE], jacobian[rows, state.own(k)] = moves[:, :SIZE], moves[:, SIZE:]
         return Rows(error / sd_px, jacobian / sd_px, UNIT)
 
@@ -192,17 +188,11 @@ class Solver:
 
 def joint_places(model: HandModel, bone: NDArray[np.int64], shape: Array, instant: Instant) -> tuple[Array, Array]:
     """See `Solver.places`; `bone` (R,): the phalanx of each row of the hand's table (`barehand.surface`)."""
-    dh, pose, count = model.dh, instant.pose, len(JOINTS)
-    frames, points = empty_frames(dh), np.empty((len(dh.point_row), 3))
-    forward_arrays(dh, pose.world_from_palm, pose.angles, frames, points)
-    moves = np.empty((len(points), 3, POSE))
-    jacobian_arrays(dh, pose.world_from_palm, frames, points, moves)
+    pose, count = instant.pose, len(JOINTS)
+    points, jacobian = points_in(model.dh, bone, bare_state(instant))
     out = np.zeros((count, 3, SIZE + OWN))
-    out[:, :, SIZE:SIZE + POSE] = moves[:count]
-    lengths = np.zeros((count, 3, 2 + RADIUS - LENGTH))
-    add_lengths(dh, bone, pose.world_from_palm, frames, points[:count], lengths)
-    out[:, :, HAND_SIZE], out[:, :, FINGER_SIZE] = lengths[..., 0], lengths[..., 1]
-    out[:, :, LENGTH:RADIUS] = lengths[..., 2:]
+    out[:, :, SIZE:SIZE + POSE] = jacobian[:count, :, :POSE]
+    out[:, :, :FOREARM_TURN] = jacobian[:count, :, POSE:POSE + FOREARM_TURN]
     roots = np.exp(shape[HAND_SIZE]) * pose.world_from_palm[:3, :3] * np.array([1.0, model.mirror, 1.0])
     for joint in range(1, count):
         finger = (joint - 1) // 4
@@ -213,9 +203,8 @@ def joint_places(model: HandModel, bone: NDArray[np.int64], shape: Array, instan
 def _contour_rows(contour: Contour, state: FitState, k: int) -> Rows:
     """The rows of one instant's edges: its pose and forearm, and the shape's numbers but the finger roots."""
     one = state.instants[k]
-    bare = state_at(one.pose.world_from_palm, one.pose.angles, SHAPE)
+    bare = bare_state(one)
     bare[STATE.shape][:FOREARM_TURN] = (state.shape - contour.shape)[:FOREARM_TURN]
-    bare[STATE.shape][FOREARM_TURN:] = one.bend
     information, pull, cost = gathered(contour.frames, bare)
     error, rows = compressed(information, pull, cost, RIDGE)
     jacobian, own = np.zeros((len(error), state.size)), state.own(k).start

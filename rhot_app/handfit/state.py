@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
+from rhot_app.barehand.surface import FOREARM_TURN
 from rhot_app.hand.kinematics import move
-from rhot_app.hand.motion.hand_state import POSE, TANGENT
+from rhot_app.hand.motion.hand_state import POSE, SHAPE, STATE, TANGENT, state_at
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.handfit.hand_shape import SHAPE_LIMIT, SIZE
 
@@ -68,6 +69,13 @@ class Instant:
     def without_anchor(self, camera: int, joint: int) -> Instant:
         """The instant without a joint's anchor in a camera."""
         return replace(self, anchors=tuple(one for one in self.anchors if (one.camera, one.joint) != (camera, joint)))
+
+
+def bare_state(instant: Instant) -> Array:
+    """The hand at rest in the state of `hand_state`, with its base shape."""
+    state = state_at(instant.pose.world_from_palm, instant.pose.angles, SHAPE)
+    state[STATE.shape][FOREARM_TURN:] = instant.bend
+    return state
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,16 +7,15 @@ from painted_object import meshes_of, picture
 from pictures import look_at, wall
 
 from rhot_app.articulated.bodies import ANGLES, camera_rays, place, root_of
-from rhot_app.articulated.layered import LayeredFrame, point_row
+from rhot_app.articulated.layered import LayeredFrame, chain_rows
 from rhot_app.articulated.outline import outline_of
 from rhot_app.articulated.process import ConstantVelocity
 from rhot_app.articulated.templates import TemplateSet, filtered, noise_gain
 from rhot_app.articulated.visibility import NONE, segment, visibility
-from rhot_app.barehand.contours import project
 
 ANGLES_DEG = np.array([20.0, 30.0, 60.0, 50.0])
 CAMERA = look_at(np.array([0.10, -0.28, 0.27]), np.array([0.04, 0.0, 0.0]), focal=500.0, width=400, height=300)
-POSE = np.ascontiguousarray(CAMERA.camera_from_world[:3])
+RECORD = CAMERA.record
 RAYS = camera_rays(CAMERA)
 BACKGROUND = wall(CAMERA, 3, False)
 EMPTY = np.clip(BACKGROUND, 0.0, 255.0).astype(np.uint8)
@@ -43,19 +42,19 @@ def taken(kind="raw", texture=0.15):
     """Templates of both fingers, and the image that they were taken from."""
     image, state = image_of(texture=texture), state_at()
     templates, placed = TemplateSet(kind), placed_at(state)
-    order = visibility(BODIES, placed, POSE).order
-    labels = segment(BODIES, placed, order, POSE, CAMERA.intrinsics, RAYS)
+    order = visibility(BODIES, placed, RECORD).order
+    labels = segment(BODIES, placed, order, RECORD, RAYS)
     for layer in range(4):
-        templates.take(layer, templates.images(image), labels, BODIES, placed, POSE, RAYS, 1.0, True)
+        templates.take(layer, templates.images(image), labels, BODIES, placed, RECORD, RAYS, 1.0, True)
     return templates, image
 
 
 def frame_of(templates, image, state, level=2, outline=False, background=None, layered=True):
     placed = placed_at(state)
-    order = visibility(BODIES, placed, POSE).order if layered else np.empty(0, np.int64)
+    order = visibility(BODIES, placed, RECORD).order if layered else np.empty(0, np.int64)
     sigma = templates.sigmas_px[level]
-    line = outline_of(BODIES, placed, order, POSE, CAMERA.intrinsics, (400, 300)) if outline else None
-    return LayeredFrame(BODIES, order, POSE, CAMERA.intrinsics, filtered(image, templates.kind, sigma),
+    line = outline_of(BODIES, placed, order, RECORD) if outline else None
+    return LayeredFrame(BODIES, order, RECORD, filtered(image, templates.kind, sigma),
                         templates.templates, templates.kind, sigma, level, 1.0, np.zeros((10, 10)), line,
                         None if background is None else filtered(background, templates.kind, sigma))
 
@@ -70,9 +69,10 @@ def test_points_of_a_link_follow_the_state_as_finite_differences_say():
             frame = placed_at(PROCESS.retract(state, step)).frames[BODIES.layer_row[layer]]
             return direction @ (frame[:, :3] @ point + frame[:, 3])
 
-        placed, row = placed_at(state), np.empty(10)
+        placed = placed_at(state)
         frame = placed.frames[BODIES.layer_row[layer]]
-        point_row(BODIES, placed, layer, *(frame[:, :3] @ point + frame[:, 3]), direction, row)
+        row, = chain_rows(BODIES.dh, placed.root, placed.frames, BODIES.layer_row[[layer]],
+                          (frame[:, :3] @ point + frame[:, 3])[None], direction[None])
         numerical = [(along(1e-6 * step) - along(-1e-6 * step)) / 2e-6 for step in np.eye(20)]
         np.testing.assert_allclose(numerical, [*row, *np.zeros(10)], atol=1e-8)
 
@@ -80,16 +80,15 @@ def test_points_of_a_link_follow_the_state_as_finite_differences_say():
 def test_outlines_move_as_the_contour_of_the_moved_object_does():
     """Rehg eq. 3.12: the outline of a moved finger lies where its points moved to, along their normals."""
     before, state = placed_at(state_at()), state_at()
-    order = visibility(BODIES, before, POSE).order
-    line = outline_of(BODIES, before, order, POSE, CAMERA.intrinsics, (400, 300))
+    order = visibility(BODIES, before, RECORD).order
+    line = outline_of(BODIES, before, order, RECORD)
     moved = placed_at(PROCESS.retract(state, np.r_[1e-4, -2e-4, 1e-4, 0.002, 0.003, -0.002, 0.004, -0.004, 0.003, 0.003,
                                                    np.zeros(10)]))
-    new = outline_of(BODIES, moved, order, POSE, CAMERA.intrinsics, (400, 300), 5e-4)
+    new = outline_of(BODIES, moved, order, RECORD, 5e-4)
     apart = []
     for k in range(len(line.layer)):
         frame = moved.frames[BODIES.layer_row[line.layer[k]]]
-        pixel, slope = np.empty(2), np.empty((2, 3))
-        assert project(*(frame[:, :3] @ line.point[k] + frame[:, 3]), POSE, CAMERA.intrinsics, pixel, slope)
+        pixel = CAMERA.project(frame[:, :3] @ line.point[k] + frame[:, 3])[0]
         same = (new.layer == line.layer[k]) & (new.across @ line.across[k] > 0.97)
         away = new.pixel[same] - pixel
         near = np.abs(away @ [-line.across[k][1], line.across[k][0]]) < 1.0
@@ -183,10 +182,10 @@ def test_behind_the_camera_nothing_is_compared():
 def test_a_link_without_texture_gives_no_template_and_says_why():
     image = np.full((300, 400, 3), 90, np.uint8)
     templates, placed = TemplateSet(), placed_at(state_at())
-    labels = segment(BODIES, placed, visibility(BODIES, placed, POSE).order, POSE, CAMERA.intrinsics, RAYS)
-    assert not templates.take(0, templates.images(image), labels, BODIES, placed, POSE, RAYS, 1.0, True)
+    labels = segment(BODIES, placed, visibility(BODIES, placed, RECORD).order, RECORD, RAYS)
+    assert not templates.take(0, templates.images(image), labels, BODIES, placed, RECORD, RAYS, 1.0, True)
     assert "no contrast" in templates.refused[0]
-    assert not templates.take(0, templates.images(image), np.full_like(labels, NONE), BODIES, placed, POSE, RAYS, 1.0,
+    assert not templates.take(0, templates.images(image), np.full_like(labels, NONE), BODIES, placed, RECORD, RAYS, 1.0,
                               True)
     assert "outside of the picture" in templates.refused[0]
     assert not templates.templates

@@ -10,7 +10,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contours import camera_centre
 from rhot_app.barehand.surface import FOREARM, Surface, capsules_of, ray_to_capsule
 from rhot_app.geometry.camera import CameraModel, intrinsics_row
 from rhot_app.geometry.transforms import inverse, rigid
@@ -115,10 +114,8 @@ def taken(scene: Array, seed: int, blur_px: float = 0.8, noise: float = 2.0,
 
 
 def _cast(centres: Array, radii: Array, colours: Array, camera: CameraModel, out: Array) -> None:
-    o = np.empty(3)
-    camera_centre(camera.camera_from_world[:3], o)
-    _draw(centres, radii, o, camera.camera_from_world[:3, :3].copy(), camera.intrinsics, LIGHT / np.linalg.norm(LIGHT),
-          colours, out)
+    _draw(centres, radii, camera.centre.copy(), camera.camera_from_world[:3, :3].copy(), camera.intrinsics,
+          LIGHT / np.linalg.norm(LIGHT), colours, out)
 
 
 @njit(cache=True)
@@ -154,8 +151,7 @@ def _draw(centres, radii, o, rotation, intrinsics, light, colours, out):
                     d[i] = (rotation[0, i] * a + rotation[1, i] * b + rotation[2, i]) / length
                 best, which = 1e9, -1
                 for k in near[:count]:
-                    t = ray_to_capsule(o[0], o[1], o[2], d[0], d[1], d[2], centres[k, 0], centres[k, 1],
-                                       radii[k, 0], radii[k, 1])
+                    t = ray_to_capsule(o, d, centres, radii, k)
                     if 0.0 < t < best:
                         best, which = t, k
                 if which < 0:

@@ -25,9 +25,8 @@ def process_of(side: str = "right") -> HandProcess:
 
 
 def frame_of(surface: Surface, state: np.ndarray, camera: CameraModel) -> ContourFrame:
-    pose, size = camera.camera_from_world[:3].copy(), (camera.width, camera.height)
-    points = contour_points(surface, state, state[STATE.lasting].copy(), pose, camera.intrinsics, size)
-    return slices_of(surface, state, 1e-6 * np.eye(process_of().size), pose, camera.intrinsics, points, 0.0, 3.0, 20.0)
+    points = contour_points(surface, state, camera.record)
+    return slices_of(surface, state, 1e-6 * np.eye(process_of().size), camera.record, points, 0.0, 3.0, 20.0)
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
@@ -39,8 +38,7 @@ def test_silhouette_points_lie_between_hand_and_background(side: str, motion: st
         bright = np.zeros((camera.height, camera.width, 3))
         drawn = picture(surface, pose.world_from_palm, pose.angles, camera, bright, 0, blur_px=0.0, noise=0.0)
         mask = drawn[..., 0] > 0
-        points = contour_points(surface, state_of(pose), np.zeros(SHAPE), camera.camera_from_world[:3].copy(),
-                                camera.intrinsics, (camera.width, camera.height))
+        points = contour_points(surface, state_of(pose), camera.record)
         silhouette = points.behind == SILHOUETTE
         assert np.count_nonzero(silhouette) > 80
         for side_px, expected, most in ((-2.0, True, 0.97), (2.0, False, 0.9)):  # gaps between fingers are narrow
@@ -51,14 +49,13 @@ def test_silhouette_points_lie_between_hand_and_background(side: str, motion: st
 def test_background_in_an_empty_image_says_nothing_and_unknown_pixels_neither() -> None:
     """Of a hand in it, both do: its own pixels and the background about it."""
     camera = two_cameras()[0]
-    lens = [camera.camera_from_world[:3]], [camera.intrinsics]
     empty, hand = np.zeros((60, 80), np.float32), np.zeros((60, 80), np.float32)
     empty[0, 0] = np.nan
     hand[20:40, 30:50] = 1.0
-    odds = log_odds_maps([empty], 8, *lens)
+    odds = log_odds_maps([empty], [camera])
     assert odds.inside[0, 0, 0] == odds.outside[0, 0, 0] == 0.0
     assert abs(odds.outside[0, 30, 40]) < 1e-9 and odds.inside[0, 30, 40] < -2.0
-    odds = log_odds_maps([hand], 8, *lens)
+    odds = log_odds_maps([hand], [camera])
     assert odds.inside[0, 30, 40] > 1.5 and odds.outside[0, 30, 40] < -0.5
     assert odds.inside[0, 0, 0] < -2.0 and 0.0 < odds.outside[0, 0, 0] < 0.2
 
@@ -128,8 +125,7 @@ def test_a_later_image_has_the_velocitys_uncertainty_and_does_not_update_it() ->
 def test_inner_edges_are_distinguished_from_the_silhouette() -> None:
     _, surface = model_and_surface()
     pose, camera = poses("grasp", (1.4,))[0], two_cameras()[0]
-    points = contour_points(surface, state_of(pose), np.zeros(SHAPE), camera.camera_from_world[:3].copy(),
-                            camera.intrinsics, (camera.width, camera.height))
+    points = contour_points(surface, state_of(pose), camera.record)
     assert np.any(points.behind == INNER)
 
 

@@ -10,20 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
-from rhot_app.barehand.joints import place_joints
+from rhot_app.barehand.joints import points_in
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
-from rhot_app.barehand.relocalisation import SAME_POSE_M
 from rhot_app.barehand.start import MAJORITY, joints_on_foreground
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.estimation.track import LOST_NS, LOST_PERIODS, NEVER, WRONG_NS, WRONG_PERIODS
 from rhot_app.hand.kinematics import forward
-from rhot_app.hand.skeleton import HandPose
+from rhot_app.hand.skeleton import JOINTS, HandPose
 from rhot_app.tracking.contours.requests import CameraFrames
 
 Array = NDArray[np.float64]
 
+SAME_POSE_M = 0.02
+"""m: joints of one pose are nearer to each other, in the mean or at most; beyond, a finger is taken for another one.
+Neighbouring knuckles are so far apart in the hand files."""
+
 SAME_HAND_M = 0.1
 """m: palms of one hand are nearer to each other: a hand's breadth."""
+
 
 @dataclass(slots=True)
 class _CameraEvidence:
@@ -114,7 +118,4 @@ def same_hand(hand: BareHandTracker, state: Array, pose: HandPose) -> bool:
 
 def joints_of(hand: BareHandTracker, state: Array) -> Array:
     """(21, 3) m, world: the joints of a hand in `state`."""
-    points, covariances, motion = np.empty((26, 3)), np.empty((26, 3, 3)), np.empty((2, 21))
-    place_joints(state, np.zeros((len(hand.process.stationary),) * 2), hand.model.dh, hand.surface.bone, points,
-                 covariances, motion)
-    return points[:21]
+    return np.asarray(points_in(hand.model.dh, hand.surface.bone, state)[0][:len(JOINTS)])

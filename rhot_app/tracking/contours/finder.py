@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import ForegroundFrame
-from rhot_app.barehand.relocalisation import LOCAL_SEARCH_S, ODDS_DROP, RELOCALISATION_LOG_ODDS, SAME_POSE_M
+from rhot_app.barehand.pose_search import LOCAL_SEARCH_S, ODDS_DROP, RELOCALISATION_LOG_ODDS
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.motion.hand_process import FASTEST
 from rhot_app.hand.motion.hand_state import POSE, TANGENT
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.tracking.contours.evidence import joints_of
+from rhot_app.tracking.contours.evidence import SAME_POSE_M, joints_of
 from rhot_app.tracking.contours.requests import CameraFrames
 from rhot_node.threads import OneShotThread
 
@@ -83,7 +83,7 @@ class Finder:
 
     def relocalise(self, maps: Maps, state: Array, covariance: Array, dt_s: float) -> None:
         """Search for a better pose than that in `state`, as far as hands move in `dt_s`, s
-        (`Relocaliser.relocalise`)."""
+        (`PoseSearch.relocalise`)."""
         self._begin(self._relocalise, maps, state.copy(), covariance.copy(), dt_s, self._run)
 
     def verify(self, maps: Maps, t_s: float, dt_s: float) -> bool:
@@ -94,23 +94,23 @@ class Finder:
         result is compared in the newest maps, into which the hand has moved since. Edges locate a hand more accurately,
         so small changes are left to them, unless a finger was mistaken for another one.
         """
-        hand, relocaliser = self._hand, self._hand.relocaliser
+        hand, search = self._hand, self._hand.search
         state, covariance = hand.filter.predict(t_s)
-        odds, change = relocaliser.odds_of(maps.probabilities), self.change()
-        per_pixel = relocaliser.log_odds_per_pixel(odds, state)
-        worse = per_pixel < relocaliser.average_odds - ODDS_DROP
+        odds, change = search.odds_of(maps.probabilities), self.change()
+        per_pixel = search.log_odds_per_pixel(odds, state)
+        worse = per_pixel < search.average_odds - ODDS_DROP
         if change is not None:
             moved = hand.process.retract(state, change)
             way = joints_of(hand, moved) - joints_of(hand, state)
             confused = np.linalg.norm(way - way.mean(axis=0), axis=1).max() > SAME_POSE_M
-            gain = relocaliser.log_odds(odds, moved) - relocaliser.log_odds(odds, state)
+            gain = search.log_odds(odds, moved) - search.log_odds(odds, state)
             if (worse or confused) and gain > RELOCALISATION_LOG_ODDS:
                 hand.filter.start(t_s, moved, _inflated(covariance, change))
                 return True
         if worse or t_s - self._searched_s > LOCAL_SEARCH_S:
             self.relocalise(maps, state, covariance, dt_s)
             self._searched_s = t_s
-        relocaliser.average(per_pixel, first=not relocaliser.average_odds)
+        search.average(per_pixel, first=not search.average_odds)
         return False
 
     def found(self) -> tuple[HandPose, int] | None:
@@ -139,7 +139,7 @@ class Finder:
 
     def _relocalise(self, maps: Maps, state: Array, covariance: Array, dt_s: float, run: int) -> None:
         process = self._hand.process
-        better = self._hand.relocaliser.relocalise(maps.probabilities, (state, covariance), process.stationary, dt_s)
+        better = self._hand.search.relocalise(maps.probabilities, (state, covariance), process.stationary, dt_s)
         self._change = run, None if better is None else process.difference(better, state)
 
 

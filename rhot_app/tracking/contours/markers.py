@@ -11,17 +11,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.joints import add_lengths
-from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS, sized_table
+from rhot_app.barehand.joints import points_in
+from rhot_app.barehand.surface import FINGER_SIZE, HAND_SIZE, LENGTH, RADIUS
+from rhot_app.barehand.surface import sized as sized_table
 from rhot_app.barehand.tracker import BareHandTracker
-from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.residual import Rows
 from rhot_app.estimation.track import TrackFilter
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.landmarks import LASTING_S
 from rhot_app.hand.motion.hand_process import BIAS_S, FASTEST, PALM_SPREAD, HandProcess
-from rhot_app.hand.motion.hand_state import MOTION, SHAPE, STATE, TANGENT
+from rhot_app.hand.motion.hand_state import MOTION, POSE, SHAPE, STATE, TANGENT
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.association import MarkerAssociation
@@ -112,7 +111,7 @@ class SizedMarkerResidual:
         frame.markers = sized(markers, bone, prediction[0])
         frame.add_landmark_noise(without_shape(prediction[0]))
         frame.late_s, frame.t_ns = np.where(frame.seen, frame.late_s + 1e-9 * (frame.t_ns - t_ns), 0.0), t_ns
-        lengths = lengths_jacobian(frame.markers.dh, bone, prediction[0])
+        lengths = lengths_jacobian(markers.dh, bone, prediction[0])
         pixels, covariances = frame.predict_pixels(without_shape(prediction[0]),
                                                    without_shape_covariance(prediction[1], lengths))
         self.frame = associate(frame, pixels, covariances, distances_of(frame, pixels, covariances))
@@ -123,25 +122,18 @@ class SizedMarkerResidual:
         rows = self.frame.linearise(without_shape(state))
         by_place = rows.jacobian[:, MOTION:]  # a lasting error moves its marker directly
         jacobian = np.insert(rows.jacobian, [MOTION] * SHAPE, 0.0, axis=1)
-        jacobian[:, MOTION + LENGTHS] = by_place @ lengths_jacobian(self.frame.markers.dh, self._bone, state)
+        jacobian[:, MOTION + LENGTHS] = by_place @ lengths_jacobian(self._markers.dh, self._bone, state)
         return replace(rows, jacobian=jacobian)
 
 
 def sized(markers: MarkerModel, bone: Indices, state: Array) -> MarkerModel:
     """The marker model of a hand with the lengths in `state`."""
-    dh, shape = markers.dh, np.ascontiguousarray(state[STATE.shape])
-    a, d = np.empty(len(dh.a)), np.empty(len(dh.d))
-    sized_table(dh, bone, shape, a, d)
-    return replace(markers, dh=dh._replace(a=a, d=d, point_offset=np.exp(shape[HAND_SIZE]) * dh.point_offset))
+    return replace(markers, dh=sized_table(markers.dh, bone, state[STATE.shape]))
 
 
 def lengths_jacobian(dh: DhArrays, bone: Indices, state: Array) -> Array:
-    """(3 P, 17): Jacobian of the P points of a sized table by the LENGTHS of a shape."""
-    world, frames, points = pose_matrix(state), empty_frames(dh), np.empty((len(dh.point_row), 3))
-    forward_arrays(dh, world, state[STATE.angles], frames, points)
-    out = np.zeros((len(points), 3, len(LENGTHS)))
-    add_lengths(dh, bone, world, frames, points, out)
-    return out.reshape(-1, len(LENGTHS))
+    """(3 P, 17): Jacobian of the P points of a hand file's table by the LENGTHS of a shape."""
+    return np.asarray(points_in(dh, bone, state)[1][:, :, POSE + LENGTHS].reshape(-1, len(LENGTHS)))
 
 
 def without_shape_covariance(covariance: Array, lengths: Array) -> Array:

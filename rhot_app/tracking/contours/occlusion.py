@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.contours import INNER, JUMP_M, OUTSIDE_M
 from rhot_app.barehand.silhouette import FOREARM_M, FOREARM_SPREAD, rasterise
-from rhot_app.barehand.surface import FOREARM, capsules_of, ray_to_capsule
+from rhot_app.barehand.surface import FOREARM, posed_in, ray_to_capsule
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.motion.hand_state import STATE, pose_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -22,7 +21,8 @@ Capsules = tuple[Array, Array]
 
 def capsules_in(hand: BareHandTracker, state: Array) -> Capsules:
     """The capsules of a hand in `state`, with the forearm to the elbow."""
-    centres, radii = _own_capsules(hand, state)
+    posed = posed_in(hand.surface, state)
+    centres, radii = posed.centres, posed.radii
     for k in np.flatnonzero(hand.surface.group == FOREARM):
         along = centres[k, 1] - centres[k, 0]
         centres[k, 1] = centres[k, 0] + FOREARM_M / np.linalg.norm(along) * along
@@ -34,9 +34,9 @@ def visible(hand: BareHandTracker, frame: ContourFrame, camera: CameraModel, sta
     """Which points (K,) of a hand's contour in `state` the `other` hand does not occlude. Sets `frame.points.behind` to
     INNER where the other hand lies behind the contour: there is skin on both sides."""
     points = frame.points
-    centres, radii = _own_capsules(hand, state)
+    posed = posed_in(hand.surface, state)
     along = points.along[:, None]
-    ends, r = centres[points.capsule], radii[points.capsule]
+    ends, r = posed.centres[points.capsule], posed.radii[points.capsule]
     axis = (1.0 - along) * ends[:, 0] + along * ends[:, 1] - camera.centre
     r_there = (1.0 - points.along) * r[:, 0] + points.along * r[:, 1]
     far = np.sqrt(np.maximum(np.sum(axis * axis, axis=1) - r_there**2, 0.0))
@@ -54,11 +54,6 @@ def occluded_pixels(camera: CameraModel, other: Capsules, shape: tuple[int, int]
     return mask > 0
 
 
-def _own_capsules(hand: BareHandTracker, state: Array) -> Capsules:
-    pose = pose_of(state)
-    return capsules_of(hand.surface, pose.world_from_palm, pose.angles, state[STATE.shape].copy())
-
-
 def _rays(camera: CameraModel, pixels: Array) -> Array:
     """(K, 3) unit directions, world, of pixels (K, 2)."""
     rays = np.column_stack([camera.undistort(pixels), np.ones(len(pixels))]) @ camera.world_from_camera[:3, :3].T
@@ -71,8 +66,7 @@ def _nearest(o, rays, centres, radii):
     found = np.full(rays.shape[0], np.inf)
     for i in range(rays.shape[0]):
         for k in range(centres.shape[0]):
-            t = ray_to_capsule(o[0], o[1], o[2], rays[i, 0], rays[i, 1], rays[i, 2], centres[k, 0], centres[k, 1],
-                               radii[k, 0], radii[k, 1])
+            t = ray_to_capsule(o, rays[i], centres, radii, k)
             if 0.0 < t < found[i]:
                 found[i] = t
     return found

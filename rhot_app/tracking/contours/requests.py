@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
-from rhot_app.barehand.contours import STEP_M, ContourPoints
+from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.observations import EdgeFrame, SliceRequest
-from rhot_app.barehand.start import STEP
+from rhot_app.barehand.silhouette import STEP
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.estimation.track import NEVER, SESSION_NS, WRONG_PERIODS
 from rhot_app.tracking.contours.occlusion import Capsules, visible
@@ -184,9 +184,9 @@ def matched_contour(hand: BareHandTracker, frame: EdgeFrame, state: Array, covar
     expected, slices = hand.expected_contour(frame.camera, state, covariance, 0.5 * STEP_M), frame.request.slices
     if not len(expected.slices) or not len(slices):
         return None
-    apart = slices[:, None, :2] - expected.pixel[None]
+    apart = slices[:, None, :2] - expected.slices[None, :, :2]
     distance = np.hypot(*apart.transpose(2, 0, 1))
-    distance += np.where(slices[:, 2:4] @ expected.normal.T < MIN_COSINE, 1e6, 0.0)
+    distance += np.where(slices[:, 2:4] @ expected.slices[:, 2:4].T < MIN_COSINE, 1e6, 0.0)
     if occluder is not None:
         distance += np.where(visible(hand, expected, hand.cameras[frame.camera], state, occluder), 0.0, 1e6)
     nearest = np.argmin(distance, axis=1)
@@ -202,8 +202,7 @@ def matched_contour(hand: BareHandTracker, frame: EdgeFrame, state: Array, covar
 
 def _on(frame: ContourFrame, chosen: NDArray[np.int64], slices: Array) -> ContourFrame:
     """The frame with its points of indices `chosen` (K,) on other slices (K, 5)."""
-    points = ContourPoints._make(column[chosen] for column in frame.points)
-    out = ContourFrame(frame.surface, points, frame.pose, frame.intrinsics, slices, frame.expected_sd[chosen],
-                       frame.late_s[chosen], frame.repeated)
+    out = ContourFrame(frame.surface, frame.camera, frame.points[chosen].view(np.recarray), slices,
+                       frame.expected_sd[chosen], frame.late_s[chosen], frame.repeated)
     out.ambiguous = frame.ambiguous
     return out

@@ -16,15 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest
-from rhot_app.barehand.relocalisation import RELOCALISATION_LOG_ODDS
-from rhot_app.barehand.silhouette import CORRELATED, score
-from rhot_app.barehand.start import START_SD, STEP
+from rhot_app.barehand.pose_search import CORRELATED, RELOCALISATION_LOG_ODDS
+from rhot_app.barehand.silhouette import STEP, score
+from rhot_app.barehand.start import START_SD
 from rhot_app.barehand.tracker import BareHandTracker
-from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.track import NEVER, SESSION_NS
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
-from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.skeleton import JOINT_SLICES
 from rhot_app.project import Rig
 from rhot_app.tracking.contours.evidence import joints_of
@@ -142,8 +140,8 @@ class SharedImages:
         if _palm_distance_m(*places) > self._thick_m:
             return
         maps = self._newest_maps(t_ns)
-        foreground = self._both[0].hand.relocaliser.odds_of(maps.probabilities)
-        odds = [one.hand.relocaliser.log_odds(foreground, state) + RELOCALISATION_LOG_ODDS * one.confirmed
+        foreground = self._both[0].hand.search.odds_of(maps.probabilities)
+        odds = [one.hand.search.log_odds(foreground, state) + RELOCALISATION_LOG_ODDS * one.confirmed
                 for one, state in zip(self._both, states, strict=True)]
         worse = int(odds[0] >= odds[1])
         one, better = self._both[worse], self._both[1 - worse]
@@ -190,7 +188,5 @@ def _palm_distance_m(ours: Array, theirs: Array) -> float:
 
 def _own_log_odds(hand: BareHandTracker, state: Array, maps: Maps) -> float:
     """Log odds of the pixels of a hand in `state`, without the ring about it."""
-    world = pose_matrix(state)
-    _, parts = score(hand.surface, world, state[STATE.angles], state[STATE.shape].copy(),
-                     hand.relocaliser.odds_of(maps.probabilities))
+    _, parts = score(hand.surface, state, hand.search.odds_of(maps.probabilities))
     return float(parts[:, 0].sum())

@@ -74,7 +74,7 @@ class LayerPictures:
         bodies, names = self._bodies(round(_SCALES * scale))
         placed = place(bodies, state.world_from_palm, state.angles)
         image = draw_layers(_background(preview, model), bodies, placed, model, self._rays(camera))
-        seen, colours = visibility(bodies, placed, np.ascontiguousarray(model.camera_from_world[:3])), layer_colours(
+        seen, colours = visibility(bodies, placed, model.record), layer_colours(
             len(names))
         lines = tuple(LayerLine(k + 1, names[layer], (int(colours[layer][0]), int(colours[layer][1]),
                                                       int(colours[layer][2])), bool(seen.cut[layer]))
