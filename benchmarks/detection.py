@@ -94,17 +94,16 @@ def measure(scene: Scene, rounds: int, clock: Clock) -> tuple[dict[str, Array], 
     yuv, bgr = frames_of(scene, ())
     room, gate, everything = np.empty_like(bgr[0]), ColourGate(MARKERS), range(len(MARKERS.markers))
     whole, regions, lacking = (ThesisPipeline(MARKERS) for _ in range(3))
-    fit, soft, partly, lost, cold = (FastDetector(MARKERS, precise=k != 1) for k in range(5))
+    tracked, partly, lost, cold = (FastDetector(MARKERS) for _ in range(4))
     regions.full(bgr[-1])
     stages: list[tuple[str, Callable[..., Any], list[Any]]] = [
         ("read one BGR frame (copy)", lambda picture: np.copyto(room, picture), bgr),
         ("thesis, whole frame", whole.full, bgr[::8]),
         ("thesis, regions of interest", regions.regions, bgr),
         ("acquire: search for all six", lambda image: gate.blobs(image, everything, step=SEARCH_STEP), yuv),
-        ("track, soft centroids only", soft.detect, yuv),
-        ("track, outlines fitted", fit.detect, yuv)]
+        ("track, outlines fitted", tracked.detect, yuv)]
     hidden_frames = {f"{len(hidden)} hidden": frames_of(scene, hidden) for hidden in HIDDEN}
-    for detector in (fit, soft, lost):
+    for detector in (tracked, lost):
         for image in yuv[-SETTLE:]:
             detector.detect(image)
     for _ in range(rounds):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rhot_node.detect.illuminant import fit_temperature_shift
 from rhot_node.detect.image import Detector, YuvImage
 from rhot_node.markers import MarkerSet
 
@@ -24,6 +25,7 @@ def warm_up(detector: Detector, markers: MarkerSet, size: tuple[int, int]) -> No
     for _ in range(FRAMES):
         detector.detect(image)
     detector.reset()
+    fit_temperature_shift(np.zeros(1), np.zeros((1, 3)), np.linspace(-1.0, 1.0, 3))  # of colours stronger than these
 
 
 def warm_up_image(markers: MarkerSet, size: tuple[int, int]) -> YuvImage:

@@ -31,8 +31,7 @@ class FastDetector:
     """Finds the candidates of every marker in one YUV420 image after the other; see
     `rhot_node.detect.image.Detector`."""
 
-    def __init__(self, markers: MarkerSet, *, precise: bool = True) -> None:
-        """`precise` False: markers in plain view are placed by their soft centroid, without a fit of the outline."""
+    def __init__(self, markers: MarkerSet) -> None:
         self._set = markers
         self._markers = markers.markers
         self._light = Illuminant(markers)
@@ -40,7 +39,6 @@ class FastDetector:
         self._until_guess = GUESS_EVERY
         self._found = 0  # markers found in the last frame
         self._finder = Finder(markers, self._light)
-        self._precise = precise
         self._until_glance = 0
         self.reset()
 
@@ -81,7 +79,7 @@ class FastDetector:
         if self._fresh:
             seen = self._find_at_first(image)
         else:
-            self._finder.followed.follow(image, self._precise)
+            self._finder.followed.follow(image)
             self._until_glance -= 1
             followed = self._finder.report_followed()
             if followed is not None and self._until_glance > 0:

@@ -1,7 +1,7 @@
 """Find the markers in one picture whose light is known: tracks in their predicted windows, other blobs by a search.
 
 A marker has up to CANDIDATES_MAX tracks, one for each object of its colour. The master decides which of them is the
-marker. The fast lane (`followed`) measures tracks in plain view, and `measure` the others.
+marker. The fast lane (`follow`) measures tracks in plain view, and `measure` the others.
 """
 
 from __future__ import annotations
@@ -13,27 +13,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect.colour import directions, sector_table
+from rhot_node.detect.coverage import INTERIOR, OUTSIDE, Measured
+from rhot_node.detect.follow import Followed, Noise, learn_noise, noise_level
 from rhot_node.detect.illuminant import Illuminant
-from rhot_node.detect.image import YuvImage
-from rhot_node.detect.region import measure as m
-from rhot_node.detect.region.outline import INTERIOR, OUTSIDE
+from rhot_node.detect.image import YuvImage, rows_of, table_of
 from rhot_node.detect.search import AREA_MIN, Blob, ColourGate
-from rhot_node.detect.tracks.follow import learn_noise, noise_level
-from rhot_node.detect.tracks.followed import Followed
-from rhot_node.detect.tracks.track import (
-    ALIVE,
-    EXTENT,
+from rhot_node.detect.segment import Paint, measure, scratch
+from rhot_node.detect.track import (
     FLOOR_VARIANCE,
     MARGIN,
-    TRACK_COLUMNS,
+    MEMORY_FRAMES,
+    Report,
+    Request,
     Track,
-    lost_observation,
+    blob_cost,
+    expect,
+    is_outside,
     mask_variance,
+    new_tracks,
+    observe,
 )
-from rhot_node.detect.tracks.track import X as TRACK_X
-from rhot_node.detect.tracks.track import Y as TRACK_Y
 from rhot_node.markers import MarkerSet
-from rhot_node.wire.messages import CANDIDATES_MAX, NO_FLAGS, MarkerFlag, MarkerObservation
+from rhot_node.wire.messages import CANDIDATES_MAX, FLAGS, NO_FLAGS, MarkerFlag, MarkerObservation
 
 NOISE_START, NOISE_START_BLOCKS = 1.5, 20.0  # grey levels of chroma noise, until so many blocks of paint have told
 LARGEST = 0.12  # of the picture: a larger blob is no marker
@@ -54,16 +55,17 @@ class Finder:
         """`light`: that of the pictures, read and set by the caller."""
         self._markers, self._light = markers.markers, light
         self._count = len(self._markers)
-        self._directions = directions(markers)
-        self._sector = sector_table(markers)
+        sector = sector_table(markers)
+        self._paints = [Paint(sector, index + 1, direction) for index, direction in enumerate(directions(markers))]
         self.gate = ColourGate(markers)
-        self._request = np.zeros(m.REQUEST_COLUMNS)
-        self._row = np.zeros(m.MEASURE_COLUMNS)
-        self._scratch = m.Scratch(0, 0)
-        self._shapes = [marker.shape for marker in self._markers] * CANDIDATES_MAX
-        self._states = np.zeros((len(self._shapes), TRACK_COLUMNS))
-        self._noise_variance = np.array([NOISE_START**2, NOISE_START_BLOCKS])
-        self.followed = Followed(self._shapes, self._count, self._states, self._noise_variance)
+        self._request, self._measured = np.zeros(1, table_of(Request)), np.zeros(1, table_of(Measured))
+        self._scratch = scratch(0, 0)
+        self._unknown = new_tracks([marker.shape for marker in self._markers] * CANDIDATES_MAX)
+        self._tracks = self._unknown.copy()
+        self._rows = rows_of(self._tracks)
+        self._reports = np.zeros(len(self._tracks), table_of(Report))
+        self._noise = np.array([Noise(NOISE_START**2, NOISE_START_BLOCKS)], table_of(Noise))
+        self.followed = Followed(self._count, self._tracks, self._noise)
         self.paint = np.zeros((self._count, 3))
         """(M, 3) Y, Cb and Cr (minus 128) of every marker's paint as the camera showed it when it was measured."""
         self._paint_pixels = np.zeros(self._count)
@@ -79,11 +81,10 @@ class Finder:
         searched, in the order of INTERLACED.
         """
         seen, self._balanced = self.followed.observations(), None
-        for slot in np.flatnonzero(self._states[:, ALIVE]).tolist():
+        for slot in np.flatnonzero(self._tracks["alive"]).tolist():
             if slot not in seen:
-                track = self._tracks[slot]
-                if self._measure(camera_image, slot, track.request(self._request)) \
-                        and not track.is_outside(self._row.tolist()):
+                expect(self._tracks, slot, False, self._request)
+                if self._measure(camera_image, slot) and not is_outside(self._tracks, slot, self._measured):
                     seen[slot] = self._observe(slot, NO_FLAGS)
                     self._follow(camera_image, slot, seen[slot])
                 else:
@@ -93,7 +94,7 @@ class Finder:
             self._lose(slot)
         self._search(camera_image, seen, whole)
         complete = all(slot in seen for slot in self._best)
-        self._tracked = int(np.count_nonzero(self._states[:, ALIVE])) if complete else -1
+        self._tracked = int(np.count_nonzero(self._tracks["alive"])) if complete else -1
         return self._report(seen)
 
     def report_followed(self) -> tuple[MarkerObservation, ...] | None:
@@ -122,7 +123,8 @@ class Finder:
         self._scratch.kind[:], self._balanced = OUTSIDE, None
         if seen.found:
             slot = self._best[seen.index]
-            self._measure(image, slot, self._tracks[slot].recall(self._request))
+            expect(self._tracks, slot, True, self._request)
+            self._measure(image, slot)
         return np.asarray(self._scratch.kind == INTERIOR)
 
     def all_blobs(self, image: YuvImage) -> list[list[MarkerObservation]]:
@@ -132,16 +134,20 @@ class Finder:
         """
         everything: list[list[MarkerObservation]] = [[] for _ in self._markers]
         self._balanced = None
+        tracks, reports = self._unknown.copy(), np.zeros_like(self._reports)
         for blob in self.gate.blobs(self._light.balanced(image), range(self._count)):
             index = int(blob.label) - 1
-            if self._measure(image, index, self._request_of(index, blob)):
-                everything[index].append(Track(self._shapes[index]).observe(index, self._row.tolist(), self._noise,
-                                                                            MarkerFlag.ACQUIRED))
+            self._request_blob(index, blob)
+            if self._measure(image, index):
+                tracks[index] = self._unknown[index]
+                flags = observe(tracks, index, self._measured, noise_level(self._noise), MarkerFlag.ACQUIRED.value,
+                                FLOOR_VARIANCE, reports)
+                everything[index].append(_observation(index, reports[index], flags))
         return [sorted(own, key=lambda seen: -seen.diameter) for own in everything]
 
     def forget(self) -> None:
         """Forget all tracks."""
-        self._tracks = [Track(shape, state) for shape, state in zip(self._shapes, self._states, strict=True)]
+        self._tracks[:] = self._unknown
         self._best = list(range(self._count))  # the track of each marker that is reported first
         self.followed.forget()
 
@@ -149,49 +155,44 @@ class Finder:
         """Make room for pictures of this size; False when there is already."""
         if self._scratch.mask.shape == image.u.shape:
             return False
-        self._scratch = m.Scratch(*image.u.shape)
+        self._scratch = scratch(*image.u.shape)
         return True
 
-    @property
-    def _noise(self) -> float:
-        return float(noise_level(self._noise_variance))
-
-    def _measure(self, camera_image: YuvImage, slot: int, request: NDArray[np.float64], careful: bool = True) -> bool:
-        """Measure the marker of a track into `self._row` and learn the chroma noise from its paint.
+    def _measure(self, camera_image: YuvImage, slot: int, careful: bool = True) -> bool:
+        """Measure the marker of a track as requested and learn the chroma noise from its paint.
 
         `careful` as in `measure`. Returns False when the window does not show the marker.
         """
-        row, index = self._row, slot % self._count
         if self._balanced is None:
             self._balanced = self._light.balanced(camera_image)
-        image = self._balanced
-        if not m.measure(image.y, image.u, image.v, self._sector, index + 1, self._directions[index], request,
-                         self._scratch.arrays, careful, row):
+        if not measure(self._balanced, self._paints[slot % self._count], self._request, self._scratch, careful,
+                       self._measured):
             return False
-        learn_noise(self._noise_variance, row[m.NOISE_SUM], row[m.NOISE_COUNT])
+        learn_noise(self._noise, self._measured["noise_sum"].item(), self._measured["noise_count"].item())
         return True
 
     def _observe(self, slot: int, flags: MarkerFlag, careful: bool = True) -> MarkerObservation:
-        """Take `self._row` into a track and return it as an observation. `careful`: how it was measured."""
-        row, index = self._row, slot % self._count
+        """Take what was measured into a track and return it as an observation. `careful`: how it was measured."""
+        row, index = Measured._make(rows_of(self._measured)[0].tolist()), slot % self._count
         if slot == self._best[index]:
-            self._paint_pixels[index] = row[m.PAINT_PIXELS]
+            self._paint_pixels[index] = row.paint_pixels
             if careful:
-                self.paint[index] = self._light.unbalanced(row[m.PAINT_Y:m.PAINT_CR + 1])
-        floor = FLOOR_VARIANCE if careful else mask_variance(row[m.AREA])
-        return self._tracks[slot].observe(index, row.tolist(), self._noise, int(flags), floor)
+                self.paint[index] = self._light.unbalanced(np.array([row.paint_y, row.paint_cb, row.paint_cr]))
+        floor = FLOOR_VARIANCE if careful else mask_variance(row.area)
+        flag = observe(self._tracks, slot, self._measured, noise_level(self._noise), flags.value, floor, self._reports)
+        return _observation(index, self._reports[slot], flag)
 
     def _follow(self, camera_image: YuvImage, slot: int, seen: MarkerObservation) -> bool:
         """Let the fast lane follow the track that was just measured; returns False if it is not in plain view."""
-        return not seen.flags & DOUBTFUL and self.followed.start(camera_image, slot, self._row.tolist())
+        return not seen.flags & DOUBTFUL and self.followed.start(camera_image, slot, self._measured)
 
     def _lose(self, slot: int) -> None:
-        self._states[slot, ALIVE] = 0.0
+        self._tracks["alive"][slot] = 0.0
         self.followed.drop(slot)
 
     def _pale_or_twin(self, seen: Iterable[int]) -> list[int]:
         """Tracks whose chroma is too low for the marker's paint, or that are where another track of the marker is."""
-        gone = [slot for slot in seen if self._is_pale(slot, self._tracks[slot].level)]
+        gone = [slot for slot in seen if self._is_pale(slot, self._tracks["level"][slot])]
         for slot in seen:
             if slot != self._best[slot % self._count] and slot not in gone:
                 twin = [other for other in seen
@@ -202,8 +203,11 @@ class Finder:
 
     def _relative_distance(self, slot: int, other: int) -> float:
         """Distance of two tracks, as a share of the longer one's length."""
-        one, two = self._states[slot], self._states[other]
-        return math.hypot(one[TRACK_X] - two[TRACK_X], one[TRACK_Y] - two[TRACK_Y]) / max(one[EXTENT], two[EXTENT], 1.0)
+        one, two = self._track(slot), self._track(other)
+        return math.hypot(one.x - two.x, one.y - two.y) / max(one.extent, two.extent, 1.0)
+
+    def _track(self, slot: int) -> Track:
+        return Track._make(self._rows[slot].tolist())
 
     def _is_pale(self, slot: int, level: float) -> bool:
         """Whether a level of chroma, grey levels, is too low for the marker's paint."""
@@ -233,8 +237,8 @@ class Finder:
         """By marker, the blobs that are not too large and not where a track of the marker is."""
         tracked: list[list[tuple[float, float, float]]] = [[] for _ in self._markers]
         for slot in seen:
-            state = self._states[slot].tolist()
-            tracked[slot % self._count].append((state[TRACK_X], state[TRACK_Y], state[EXTENT]))
+            track = self._track(slot)
+            tracked[slot % self._count].append((track.x, track.y, track.extent))
         found: dict[int, list[Blob]] = {}
         for blob in blobs:
             index, area = int(blob.label) - 1, blob.area
@@ -253,17 +257,17 @@ class Finder:
         While the track is remembered, blobs are tried in the order of its motion and size, else by `Blob.merit`.
         """
         slot = self._best[index]
-        track = self._tracks[slot]
+        track = self._track(slot)
         if len(own) > 1:
-            if track.remembered:
-                own = sorted(own, key=track.candidate_cost)
+            if track.missed < MEMORY_FRAMES:
+                own = sorted(own, key=lambda blob: blob_cost(track, blob))
             else:
                 marker, shape = self._markers[index], self._scratch.mask.shape
                 own = sorted(own, key=lambda blob: -blob.merit(marker, shape))
         for place, blob in enumerate(own[:CANDIDATES_MAX]):
-            if self._measure(camera_image, slot, self._request_of(index, blob), careful) \
-                    and not self._is_pale(slot, self._row[m.LEVEL]):
-                self._row[m.RIVAL_COST] = np.inf  # it was the best blob of the whole frame
+            self._request_blob(index, blob)
+            if self._measure(camera_image, slot, careful) and not self._is_pale(slot, self._measured["level"].item()):
+                self._measured["rival_cost"] = np.inf  # it was the best blob of the whole frame
                 seen[slot] = self._observe(slot, MarkerFlag.ACQUIRED, careful)
                 return own[:place] + own[place + 1:]
         return own[CANDIDATES_MAX:]
@@ -271,13 +275,14 @@ class Finder:
     def _measure_rival(self, camera_image: YuvImage, index: int, blob: Blob,
                        seen: dict[int, MarkerObservation]) -> None:
         """Measure a blob as a further candidate of a marker and give it a free track, if there is one."""
-        slots = range(index, len(self._shapes), self._count)
+        slots = range(index, len(self._tracks), self._count)
         slot = next((slot for slot in slots if slot not in seen and slot != self._best[index]), None)
-        if slot is None or not self._measure(camera_image, slot, self._request_of(index, blob)) \
-                or self._is_pale(slot, self._row[m.LEVEL]):
+        self._request_blob(index, blob)
+        if slot is None or not self._measure(camera_image, slot) \
+                or self._is_pale(slot, self._measured["level"].item()):
             return
-        self._tracks[slot] = Track(self._shapes[slot], self._states[slot])
-        self._row[m.RIVAL_COST] = np.inf
+        self._tracks[slot] = self._unknown[slot]
+        self._measured["rival_cost"] = np.inf
         seen[slot] = self._observe(slot, MarkerFlag.ACQUIRED)
         if slot in self._pale_or_twin(seen):
             del seen[slot]
@@ -285,17 +290,13 @@ class Finder:
         else:
             self._follow(camera_image, slot, seen[slot])
 
-    def _request_of(self, index: int, blob: Blob) -> NDArray[np.float64]:
-        """The request to measure a blob as marker `index`."""
-        out, area, direction = self._request, blob.area, self._directions[index]
-        out[m.PX], out[m.PY] = blob.centroid
-        out[m.HALF_X] = max(blob.x_max - out[m.PX], out[m.PX] - blob.x_min) + MARGIN
-        out[m.HALF_Y] = max(blob.y_max - out[m.PY], out[m.PY] - blob.y_min) + MARGIN
-        out[m.SIGMA] = 1.0 + 0.25 * math.sqrt(area)
-        out[m.AREA_REF] = area
-        out[m.LEVEL_REF] = (blob.sum_u * direction[0] + blob.sum_v * direction[1]) / area
-        out[m.IS_BAND] = self._shapes[index] == "band"
-        return out
+    def _request_blob(self, index: int, blob: Blob) -> None:
+        """Request to measure a blob as marker `index`."""
+        direction, (x, y) = self._paints[index].direction, blob.centroid
+        self._request[0] = Request(
+            x, y, max(blob.x_max - x, x - blob.x_min) + MARGIN, max(blob.y_max - y, y - blob.y_min) + MARGIN,
+            1.0 + 0.25 * math.sqrt(blob.area), blob.area,
+            (blob.sum_u * direction[0] + blob.sum_v * direction[1]) / blob.area, self._markers[index].shape == "band")
 
     def _report(self, seen: dict[int, MarkerObservation]) -> tuple[MarkerObservation, ...]:
         """The observations of one picture as `find` returns them."""
@@ -303,14 +304,25 @@ class Finder:
             return tuple([seen[slot] for slot in self._best])
         first, further = [], []
         for index in range(self._count):
-            own = [slot for slot in range(index, len(self._shapes), self._count) if slot in seen]
-            best = self._tracks[self._best[index]]
-            if self._best[index] not in seen:
-                best.lose()
-            own.sort(key=lambda slot: (slot != self._best[index], -seen[slot].diameter))
-            if own and not best.remembered:
+            own = [slot for slot in range(index, len(self._tracks), self._count) if slot in seen]
+            best = self._best[index]
+            if best not in seen:
+                self._lose(best)
+                self._tracks["missed"][best] = min(self._tracks["missed"][best] + 1.0, MEMORY_FRAMES)
+            own.sort(key=lambda slot: (slot != best, -seen[slot].diameter))
+            if own and self._tracks["missed"][best] >= MEMORY_FRAMES:
                 self._best[index] = own[0]
-            first.append(seen[own[0]] if own else lost_observation(index))
+            first.append(seen[own[0]] if own else _lost(index))
             further += [(rank, seen[slot]) for rank, slot in enumerate(own[1:])]
         further.sort(key=lambda one: one[0])  # the second candidates of all markers first
         return (*first, *(mark for _, mark in further))
+
+
+def _observation(index: int, report: NDArray[np.void], flags: int) -> MarkerObservation:
+    x, y, diameter, xx, xy, yy, quality, _ = report.item()
+    return MarkerObservation(index, x, y, diameter, xx, xy, yy, quality, FLAGS[flags])
+
+
+def _lost(index: int) -> MarkerObservation:
+    nan = math.nan
+    return MarkerObservation(index, nan, nan, 0.0, nan, nan, nan, 0.0, MarkerFlag.LOST)

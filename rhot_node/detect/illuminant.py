@@ -153,23 +153,26 @@ def _byte(chroma):
     return min(max(int(np.floor(chroma + 128.5)), 0), 255)
 
 
-def fit_temperature_shift(hues: Array, predicted: Array, grid: Array) -> tuple[float, float]:
+@njit(cache=True)
+def fit_temperature_shift(hues, predicted, grid):
     """The warmth (of the `grid` (K,), interpolated) that explains the hues (N,) deg best, and how much they tell of it.
 
     Least squares over the difference to the `predicted` hues (N, K), each capped, and over the warmth itself. The
     information is the curvature of the hues' share: 1 / variance.
     """
-    away = np.abs(np.remainder(hues[:, None] - predicted + 180.0, 360.0) - 180.0)
-    misfit = np.sum((np.minimum(away, HUE_CAP_DEG) / HUE_SIGMA_DEG) ** 2, axis=0)
+    misfit = np.zeros(len(grid))
+    for k in range(len(grid)):
+        for n in range(len(hues)):
+            away = min(abs((hues[n] - predicted[n, k] + 180.0) % 360.0 - 180.0), HUE_CAP_DEG)
+            misfit[k] += (away / HUE_SIGMA_DEG) ** 2
     costs = (grid / WARMTH_SIGMA) ** 2 + misfit
-    best = int(np.argmin(costs))
-    if best in (0, len(grid) - 1):
-        return float(grid[best]), 0.0
-    before, here, after = costs[best - 1:best + 2].tolist()
-    bend = before - 2.0 * here + after
-    shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
-    curvature = float(np.diff(misfit[best - 1:best + 2], 2)[0]) / STEP**2
-    return float(grid[best]) + shift * STEP, max(0.5 * curvature, 0.0)
+    best = np.argmin(costs)
+    if best == 0 or best == len(grid) - 1:
+        return grid[best], 0.0
+    bend = costs[best - 1] - 2.0 * costs[best] + costs[best + 1]
+    shift = 0.5 * (costs[best - 1] - costs[best + 1]) / bend if bend > 0.0 else 0.0
+    curvature = (misfit[best - 1] - 2.0 * misfit[best] + misfit[best + 1]) / STEP**2
+    return grid[best] + shift * STEP, max(0.5 * curvature, 0.0)
 
 
 # -- illuminant estimation without a prior -----------------------------------------------------------------------------

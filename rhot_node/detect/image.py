@@ -19,6 +19,11 @@ def table_of(record: Any) -> np.dtype[Any]:
     return np.dtype([(name, np.float64) for name in record._fields])
 
 
+def rows_of(records: NDArray[np.void]) -> NDArray[np.float64]:
+    """(N, fields) view of such records; read quicker than the records themselves."""
+    return records.view(np.float64).reshape(len(records), -1)
+
+
 class YuvImage(NamedTuple):
     """Three planes: `y` (H, W), `u` = Cb and `v` = Cr (H/2, W/2), uint8, H and W even.
 

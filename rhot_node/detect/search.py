@@ -18,7 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_node.detect.colour import Table, acquisition_table
-from rhot_node.detect.image import YuvImage, table_of
+from rhot_node.detect.image import YuvImage, rows_of, table_of
 from rhot_node.markers import Marker, MarkerSet
 
 AREA_MIN = 6  # chroma pixels; smaller blobs are specks (a marker of 5.5 px across)
@@ -113,6 +113,7 @@ class ColourGate:
         self._runs = np.zeros(RUNS_MAX, dtype=_RUN)
         self._slots = np.zeros(RUNS_MAX, dtype=np.int32)
         self._blobs = np.zeros(BLOBS_MAX, dtype=table_of(Blob))
+        self._rows = rows_of(self._blobs)
 
     def labels(self, image: YuvImage) -> Labels:
         """(H/2, W/2) for every chroma pixel 1 + the index of the marker it is taken for, 0 for none."""
@@ -136,7 +137,7 @@ class ColourGate:
                 self._bright = np.zeros(words_u.shape[1], dtype=np.uint64)
         runs = label_runs(image, _Words(words_u, words_v, self._bright), self._gate, step, first, self._runs)
         count = gather_blobs(self._runs, runs, area_min, step, self._slots, self._blobs)
-        return [Blob(*row) for row in self._blobs[:count].tolist()]
+        return [Blob._make(row) for row in self._rows[:count].tolist()]
 
 
 def dull_box(table: Table) -> tuple[int, int, int, int]:

@@ -5,9 +5,9 @@ import pytest
 from marker_rendering import SKIN, Canvas, capsule, disc
 from numpy.typing import NDArray
 
+from rhot_node.detect import coverage as c
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.region import coverage as c
-from rhot_node.detect.region import outline as o
+from rhot_node.detect.segment import scratch
 
 Array = NDArray[np.float64]
 PAINT = (205.0, 40.0, 165.0)
@@ -18,17 +18,16 @@ def classified(inside: NDArray[np.bool_]) -> tuple[NDArray[np.uint8], tuple[int,
     region = (0, width - 1, 0, height - 1)
     kind = np.zeros(inside.shape, dtype=np.uint8)
     mask = np.where(inside, 2, 0).astype(np.int16)
-    o.classify(region, np.array([True]), mask, kind, np.zeros(inside.size, dtype=np.int32))
+    c.classify(region, np.array([True]), mask, kind, np.zeros(inside.size, dtype=np.int32))
     return kind, region
 
 
 def measured(image: YuvImage, inside: NDArray[np.bool_]) -> tuple[Array, Array, NDArray[np.uint8]]:
     kind, region = classified(inside)
-    height, width = inside.shape
-    cover, gain = np.zeros(inside.shape, dtype=np.float32), np.zeros(inside.shape, dtype=np.float32)
-    c.unmix(image.y, image.u, image.v, region, 80.0, kind, np.zeros((height, width, 3), dtype=np.float32),
-            np.zeros((height + 1, width + 1, c.SUM_COLUMNS)), cover, gain, np.empty((3, 3)))
-    return cover.astype(np.float64), gain.astype(np.float64), kind
+    room = scratch(*inside.shape)
+    room.kind[:] = kind
+    c.unmix(image, region, 80.0, room, np.empty((3, 3)))
+    return room.coverage.astype(np.float64), room.gain.astype(np.float64), kind
 
 
 def twin(image: YuvImage, kind: NDArray[np.uint8]) -> Array:
@@ -37,13 +36,13 @@ def twin(image: YuvImage, kind: NDArray[np.uint8]) -> Array:
     luma = image.y.reshape(height, 2, width, 2).mean(axis=(1, 3))
     colour = np.stack([luma, image.u, image.v], axis=2).astype(np.float64)
     ys, xs = np.mgrid[:height, :width].astype(np.float64)
-    paint = kind == o.INTERIOR
+    paint = kind == c.INTERIOR
     design = np.column_stack([np.ones(paint.sum()), xs[paint], ys[paint]])
     slopes = np.linalg.lstsq(design, colour[paint], rcond=None)[0][1:]
-    result = np.where(np.isin(kind, (o.INTERIOR, o.HOLE)), 1.0, 0.0)
-    for y, x in zip(*np.nonzero(np.isin(kind, (o.EDGE, o.RIM))), strict=True):
+    result = np.where(np.isin(kind, (c.INTERIOR, c.HOLE)), 1.0, 0.0)
+    for y, x in zip(*np.nonzero(np.isin(kind, (c.EDGE, c.RIM))), strict=True):
         near = (np.abs(ys - y) <= c.REACH) & (np.abs(xs - x) <= c.REACH)
-        own, around = near & paint, near & (kind == o.OUTSIDE)
+        own, around = near & paint, near & (kind == c.OUTSIDE)
         if not own.any() or not around.any():
             result[y, x] = np.nan
             continue
@@ -81,22 +80,22 @@ def test_a_hole_is_filled_and_a_ring_is_not() -> None:
     inside[8:24, 8:24] = True
     inside[14:17, 14:18] = False
     kind, _ = classified(inside)
-    assert (kind[14:17, 14:18] == o.HOLE).all()
+    assert (kind[14:17, 14:18] == c.HOLE).all()
     inside[10:22, 10:22] = False
     kind, _ = classified(inside)
-    assert (kind[13:19, 13:19] == o.OUTSIDE).all()
+    assert (kind[13:19, 13:19] == c.OUTSIDE).all()
 
 
 def test_classes_lie_where_they_should() -> None:
     inside = np.zeros((30, 30), dtype=np.bool_)
     inside[10:18, 10:20] = True
     kind, _ = classified(inside)
-    assert (kind[11:17, 11:19] == o.INTERIOR).all()
-    assert (kind[10, 10:20] == o.EDGE).all()
-    assert (kind[8:10, 8:22] == o.RIM).all()
-    assert kind[7, 15] == o.OUTSIDE
-    assert (kind == o.INTERIOR).sum() == 48
-    assert (kind == o.RIM).sum() == 12 * 14 - 80
+    assert (kind[11:17, 11:19] == c.INTERIOR).all()
+    assert (kind[10, 10:20] == c.EDGE).all()
+    assert (kind[8:10, 8:22] == c.RIM).all()
+    assert kind[7, 15] == c.OUTSIDE
+    assert (kind == c.INTERIOR).sum() == 48
+    assert (kind == c.RIM).sum() == 12 * 14 - 80
 
 
 def test_noise_is_estimated_from_the_paint_under_shading() -> None:

@@ -8,6 +8,7 @@ from marker_rendering import SKIN, Canvas, Rgb, capsule, disc
 from shipped_markers import RHOT6
 
 from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import from_bgr
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
@@ -209,3 +210,19 @@ def test_hypotheses_survive_short_hiding() -> None:
     decoy = Canvas(320, 240).paint(disc(250, 190, 24), RGB["ring"], (250, 190), 27)
     seen = detector.detect(decoy.expose())[0]
     assert not seen.found or seen.flags & MarkerFlag.AMBIGUOUS
+
+
+@pytest.mark.parametrize("column", [0, 1])
+def test_a_marker_of_one_column_at_the_border_is_found_with_a_covariance(column: int) -> None:
+    image = Canvas(160, 120).expose()
+    rgb = np.zeros((1, 1, 3), np.uint8)
+    rgb[:] = RGB["ring"][::-1]
+    paint = from_bgr(np.repeat(np.repeat(rgb, 2, axis=0), 2, axis=1))
+    rows = slice(20, 34)
+    image.u[rows, column], image.v[rows, column] = paint.u[0, 0], paint.v[0, 0]
+    image.y[40:68, 2 * column:2 * column + 2] = paint.y[0, 0]
+    detector = only("ring")
+    detector.detect(Canvas(160, 120).expose())  # what is found later is placed by its mask at first
+    for _ in range(4):
+        seen = detector.detect(image)[0]
+        assert not seen.found or (math.isfinite(seen.cov_xx) and seen.cov_xx > 0.0)

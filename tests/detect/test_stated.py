@@ -11,9 +11,9 @@ import pytest
 from marker_rendering import SKIN, to_yuv
 from shipped_markers import RHOT6
 
+from rhot_node.detect import track as st
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.tracks import track as st
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerObservation
 

@@ -161,7 +161,7 @@ def test_a_process_says_how_long_it_has_compiled_while_it_goes_on(tmp_path: Path
 def test_a_program_that_loads_numba_first_uses_the_same_folder() -> None:
     folders = []
     for first in ("rhot_node", "numba"):
-        program = (f"import {first}; from rhot_node.detect.region.position import centroid; "
+        program = (f"import {first}; from rhot_node.detect.coverage import centroid; "
                    "print(centroid.stats.cache_path)")
         environment = {name: value for name, value in os.environ.items() if name != VARIABLE}
         said = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True,

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import CalibrationError
 from rhot_node.detect.colour import MAGNITUDE_LEAST, SAMPLES_MIN, Box, Colours, box_mask, colours_of
+from rhot_node.detect.coverage import RING
 from rhot_node.detect.image import YuvImage
-from rhot_node.detect.region.outline import RING
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

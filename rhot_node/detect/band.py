@@ -1,12 +1,19 @@
-"""From a coverage plane to a position with covariance: the centroid, and the centre of a tilted band.
+"""The axis of a tilted band: from its coverage, and from frame to frame from its outline.
+
+Both rims of a band tilted by theta are half-ellipse arcs, so the mid of the band at u (-1..1 across) is
+m(u) = c + k u + s sqrt(1 - u^2), with the sag s = R sin(theta): its centroid lies (pi / 4) s off the axis point.
 
 All coordinates are chroma pixels; covariances are per unit variance of the chroma noise.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
+
+from rhot_node.detect import outline_pixels as c
 
 BLUR_VARIANCE = 0.2  # px^2: point spread of about 0.7 luma px and the 2x2 chroma mean
 BAND_HALF_WIDTH_MIN = 3.5  # px; a narrower band shows no curvature
@@ -14,105 +21,33 @@ CROSS_MOMENT_MIN = 0.92
 """Least normalised cross moment E[u^2 w^2] / (E[u^2] E[w^2]) of a band. It is 1 for a rectangle, 2/3 for an ellipse and
 at most 0.84 for a capsule of any length."""
 
-# Columns of the result row.
-X, Y, AREA, COV_XX, COV_XY, COV_YY, VAR_MAJOR, VAR_MINOR, AXIS_X, AXIS_Y = range(10)
-SAG, SAG_VARIANCE, FIT, SOFT, ROUND = range(10, 15)
-RESULT_COLUMNS = 15
+# The wrist band's sag (`band_center`): a measured value within so many standard deviations of the last one is
+# taken in with this gain, any other as it is.
+SAG_GAIN, SAG_STEADY = 0.25, 5.0
+SAG_MOST = 0.3  # of half the band's length: what the sag may change before the outline is straightened anew
+SAG_SETTLE, SAG_JUMP = 4.0, 0.35  # frames that say what is no sag; px that it may jump in them
+GAUSS_AT = 0.5 + 0.5 * np.polynomial.legendre.leggauss(4)[0]
+GAUSS_WEIGHT = 0.5 * np.polynomial.legendre.leggauss(4)[1]
 
 
-@njit(cache=True)
-def centroid(region, coverage, gain, result):
-    """Coverage centroid, its covariance, area and principal axes; False when nothing is covered."""
-    x0, x1, y0, y1 = region
-    area = sum_x = sum_y = 0.0
-    for row in range(y0, y1 + 1):
-        for column in range(x0, x1 + 1):
-            a = coverage[row, column]
-            area += a
-            sum_x += a * (column - x0)
-            sum_y += a * (row - y0)
-    if area <= 0.5:
-        return False
-    center_x = sum_x / area + x0
-    center_y = sum_y / area + y0
-    m_xx = m_xy = m_yy = v_xx = v_xy = v_yy = soft = 0.0
-    for row in range(y0, y1 + 1):
-        for column in range(x0, x1 + 1):
-            dx = column - center_x
-            dy = row - center_y
-            a = coverage[row, column]
-            m_xx += a * dx * dx
-            m_xy += a * dx * dy
-            m_yy += a * dy * dy
-            soft += max(a * (1.0 - a), 0.0)
-            g2 = gain[row, column] ** 2
-            v_xx += g2 * dx * dx
-            v_xy += g2 * dx * dy
-            v_yy += g2 * dy * dy
-    result[X], result[Y], result[AREA] = center_x, center_y, area
-    result[COV_XX], result[COV_XY], result[COV_YY] = v_xx / area**2, v_xy / area**2, v_yy / area**2
-    _principal_axes(m_xx / area, m_xy / area, m_yy / area, result)
-    result[SAG] = result[SAG_VARIANCE] = result[FIT] = result[ROUND] = 0.0
-    result[SOFT] = soft / area
-    return True
-
-
-@njit(cache=True)
-def mask_centroid(mask, components, own, count, result):
-    """Fill `result` with centroid, area and principal axes of the components marked in `own`, which `mask` numbers from
-    2 on. Returns whether they touch the frame's border. Columns of components: see rhot_node.detect.region.measure.
-    """
-    height, width = mask.shape
-    n = s_x = s_y = s_xx = s_xy = s_yy = 0.0
-    at_border = False
-    for number in range(count):
-        if not own[number]:
-            continue
-        x0, x1 = int(components[number, 3]), int(components[number, 4])
-        y0, y1 = int(components[number, 5]), int(components[number, 6])
-        at_border |= x0 == 0 or y0 == 0 or x1 == width - 1 or y1 == height - 1
-        for row in range(y0, y1 + 1):
-            for column in range(x0, x1 + 1):
-                if mask[row, column] == number + 2:
-                    n += 1.0
-                    s_x += column
-                    s_y += row
-                    s_xx += column * column
-                    s_xy += column * row
-                    s_yy += row * row
-    x, y = s_x / n, s_y / n
-    result[X], result[Y], result[AREA] = x, y, n
-    _principal_axes(s_xx / n - x * x, s_xy / n - x * y, s_yy / n - y * y, result)
-    return at_border
-
-
-@njit(cache=True)
-def _principal_axes(m_xx, m_xy, m_yy, result):
-    half = 0.5 * (m_xx + m_yy)
-    spread = np.hypot(0.5 * (m_xx - m_yy), m_xy)
-    angle = 0.5 * np.arctan2(2.0 * m_xy, m_xx - m_yy)
-    result[VAR_MAJOR] = max(half + spread, 0.0)
-    result[VAR_MINOR] = max(half - spread, 0.0)
-    result[AXIS_X], result[AXIS_Y] = np.cos(angle), np.sin(angle)
-
+# -- from the coverage ------------------------------------------------------------------------------------------------
 
 @njit(cache=True)
 def band_center(region, coverage, gain, result):
     """Replace the centroid in `result` by the projection of the band's centre on its axis; True when the fit holds.
 
-    Both rims of a band tilted by theta are half-ellipse arcs, so the mid of the coverage at u (-1..1 across) is
-    m(u) = c + k u + s sqrt(1 - u^2), s = R sin(theta): its centroid lies (pi / 4) s off the axis point. Least squares
-    of the pixels' axial coordinate on (1, u, sqrt(1 - u^2)), weighted by coverage, is least squares of the column mids
-    weighted by column height. Across is the major axis of the second moments, so a band must look wider than long; k
-    mends the axis's error. Sets ROUND for what has no straight rims at all, whose centroid is what it is.
+    Least squares of the pixels' axial coordinate on (1, u, sqrt(1 - u^2)), weighted by coverage, is least squares of
+    the column mids m(u) weighted by column height. Across is the major axis of the second moments, so a band must look
+    wider than long; k mends the axis's error. Sets `round` for what has no straight rims at all, whose centroid is
+    what it is.
     """
     if _cross_moment(region, coverage, result) < CROSS_MOMENT_MIN:
-        result[ROUND] = 1.0
+        result.round = 1.0
         return False
-    half_width = np.sqrt(max(3.0 * (result[VAR_MAJOR] - BLUR_VARIANCE), 0.0))
+    half_width = np.sqrt(max(3.0 * (result.var_major - BLUR_VARIANCE), 0.0))
     if half_width < BAND_HALF_WIDTH_MIN:
         return False
-    length = result[AREA] / (2.0 * half_width)
+    length = result.area / (2.0 * half_width)
     normal = np.zeros((3, 3))
     right = np.zeros(3)
     moments = np.zeros(4)
@@ -184,9 +119,9 @@ def _inverse(m):
 @njit(cache=True)
 def _band_coordinates(column, row, result):
     """(across, along) of a pixel in the band's own axes, from its centroid."""
-    dx = column - result[X]
-    dy = row - result[Y]
-    return dx * result[AXIS_X] + dy * result[AXIS_Y], dy * result[AXIS_X] - dx * result[AXIS_Y]
+    dx = column - result.x
+    dy = row - result.y
+    return dx * result.axis_x + dy * result.axis_y, dy * result.axis_x - dx * result.axis_y
 
 
 @njit(cache=True)
@@ -230,17 +165,86 @@ def _band_result(region, coverage, gain, half_width, inverse, solution, result):
             misfit = along - solution[0] - solution[1] * u - solution[2] * arc
             on_along = (inverse[0, 0] + inverse[0, 1] * u + inverse[0, 2] * arc) * misfit
             on_sag = (inverse[2, 0] + inverse[2, 1] * u + inverse[2, 2] * arc) * misfit
-            on_across = across / result[AREA]
+            on_across = across / result.area
             v_uu += g2 * on_across * on_across
             v_uv += g2 * on_across * on_along
             v_vv += g2 * on_along * on_along
             v_ss += g2 * on_sag * on_sag
-    ax, ay = result[AXIS_X], result[AXIS_Y]
-    result[X] -= ay * solution[0]
-    result[Y] += ax * solution[0]
-    result[COV_XX] = ax * ax * v_uu - 2.0 * ax * ay * v_uv + ay * ay * v_vv
-    result[COV_XY] = ax * ay * v_uu + (ax * ax - ay * ay) * v_uv - ax * ay * v_vv
-    result[COV_YY] = ay * ay * v_uu + 2.0 * ax * ay * v_uv + ax * ax * v_vv
-    result[SAG] = solution[2]
-    result[SAG_VARIANCE] = v_ss
-    result[FIT] = 1.0
+    ax, ay = result.axis_x, result.axis_y
+    result.x -= ay * solution[0]
+    result.y += ax * solution[0]
+    result.v_xx = ax * ax * v_uu - 2.0 * ax * ay * v_uv + ay * ay * v_vv
+    result.v_xy = ax * ay * v_uu + (ax * ax - ay * ay) * v_uv - ax * ay * v_vv
+    result.v_yy = ay * ay * v_uu + 2.0 * ax * ay * v_uv + ax * ax * v_vv
+    result.sag = solution[2]
+    result.sag_variance = v_ss
+    result.fit = 1.0
+
+
+# -- from frame to frame ----------------------------------------------------------------------------------------------
+
+@njit(**c.FAST)
+def mend_band(outline, noise, fitted, track):
+    """Place a band on its axis: by what its sag, smoothed, differs from that which its outline is straightened by.
+
+    The corners, which the outline rounds, look like a bend of their own: that is what the first frames measure, and
+    it is taken off. False when the sag differs too much.
+    """
+    half = 0.5 * (fitted.m_xx + fitted.m_yy)
+    spread = math.hypot(0.5 * (fitted.m_xx - fitted.m_yy), fitted.m_xy)
+    ax, ay = outline.axis_x, outline.axis_y
+    measured = sag_of(outline)
+    outline.sag_frames += 1.0
+    if outline.sag_frames <= SAG_SETTLE:
+        if outline.sag_frames > 1.0 and abs(measured - outline.sag_zero) > SAG_JUMP:
+            return False
+        outline.sag_zero += (measured - outline.sag_zero) / outline.sag_frames
+    away = measured - outline.sag_zero - outline.sag
+    steady = SAG_STEADY * noise * math.sqrt(outline.sag_variance)
+    if outline.sag_frames > SAG_SETTLE:
+        outline.sag += (SAG_GAIN if abs(away) < steady else 1.0) * away
+    rest = 0.25 * math.pi * outline.sag
+    sag = 0.25 * math.pi * (outline.bend + outline.sag)
+    fitted.x += ay * rest
+    fitted.y -= ax * rest
+    track.sag_x, track.sag_y = -ay * sag, ax * sag
+    # (pi / 4)^2 of the smoothed sag's, and of that which was there at first, which no later frame tells anew.
+    along = 0.6 * outline.sag_variance * (1.0 + 1.0 / SAG_SETTLE + SAG_GAIN)
+    fitted.v_xx += ay * ay * along
+    fitted.v_xy -= ax * ay * along
+    fitted.v_yy += ax * ax * along
+    return abs(outline.sag) < SAG_MOST * math.sqrt(max(3.0 * (half - spread), 0.0))
+
+
+@njit(**c.FAST)
+def sag_of(outline):
+    """s of `band_center`, of the area inside the outline, which is straightened already: what is left of it.
+
+    Least squares of the axial coordinate on (1, u, sqrt(1 - u^2)), by angle and, with Gauss's points, by radius.
+    """
+    radius = outline.radius
+    to_u = outline.long / outline.width
+    n = n_u = n_b = uu = ub = bb = s_v = uv = bv = 0.0
+    for j in range(c.NODES):
+        for half in range(2):
+            r = radius[j] + 0.5 * half * (radius[j + 1] - radius[j])
+            cosine, sine = c.COSINES[j], c.SINES[j]
+            if half == 1:
+                cosine, sine = c.HALF_COSINES[j], c.HALF_SINES[j]
+            for k in range(4):
+                rho = r * GAUSS_AT[k]
+                weight = GAUSS_WEIGHT[k] * rho * r
+                across, along = to_u * rho * cosine, outline.high * rho * sine
+                arc = math.sqrt(max(1.0 - across * across, 0.0))
+                n += weight
+                n_u += weight * across
+                n_b += weight * arc
+                uu += weight * across * across
+                ub += weight * across * arc
+                bb += weight * arc * arc
+                s_v += weight * along
+                uv += weight * across * along
+                bv += weight * arc * along
+    uu, ub, bb = uu - n_u * n_u / n, ub - n_u * n_b / n, bb - n_b * n_b / n
+    uv, bv = uv - n_u * s_v / n, bv - n_b * s_v / n
+    return (uu * bv - ub * uv) / (uu * bb - ub * ub)

@@ -1,1 +1,0 @@
-"""How one blob of a marker colour is measured: its coverage, its outline, its centroid with covariance."""

@@ -1,0 +1,338 @@
+"""The track of one marker: what the last frames say about where it is, how big it is and how it looks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rhot_node.detect.image import table_of
+from rhot_node.detect.search import Blob
+from rhot_node.markers import Shape
+from rhot_node.wire.messages import MarkerFlag
+
+# -- reported covariance and quality -----------------------------------------------------------------------------------
+# A covariance holds what the picture itself tells: the noise, carried through the estimate; how steeply the paint is
+# shaded, because a round body darkens towards its limb as no slope can follow; how far the edge is smeared by motion;
+# what surrounds the marker; and how far its area is from what was expected.
+#
+# Lengths are chroma pixels, but for what is written out (luma pixels).
+
+NOISE_INFLATION = 1.2  # paint and surroundings are themselves means of few noisy pixels
+FLOOR_VARIANCE = 4e-4  # luma px^2: sampling leaves about 0.02 px
+OUTLINE_FLOOR_VARIANCE = 1.5e-4  # luma px^2: of a fitted outline
+AROUND_VARIANCE = 0.09  # luma px^2 per squared contrast that the surroundings vary by: they may do so right beside it
+BAND_ACROSS_VARIANCE, BAND_ALONG_VARIANCE = 2e-3, 5e-3  # luma px^2: shade looks like a bend of the band's rims
+BAND_ALONG = 0.0018  # of the band's breadth: perspective, wrists that are no circles
+SMALL_AREA, SMALL_VARIANCE = 22.0, 0.01  # px^2, luma px^2: too few inner pixels to see the shading
+
+# Share of the paint's brightness that changes over a radius, times this, is how far the limb's shade draws the place of
+# a round body to its dark side: measured on capsules and spheres under Lambert's law. A fitted outline learns most of
+# it, the more the larger the marker is: of the outline, this is divided by the square root of the radius.
+LIMB_COVERAGE, LIMB_OUTLINE = 0.34, 0.33
+LIMB_OF_SHAPE = {"disc": (0.0, 0.0), "blob": (0.0, 1.0), "sphere": (0.8, 0.5), "capsule": (0.8, 0.5),
+                 "band": (0.8, 0.5)}
+"""Share of that shift that is taken off, and share that remains as a standard deviation (other lights and curvatures).
+A disc is flat; a blob may be either, and is left where it is seen."""
+OFF_AXIS_SD = 0.3
+"""Standard deviation of the centroid of a band about its axis, as a share of its extent, when no rims are visible and
+it is not round."""
+LIMB_SHADE = 0.2  # share of brightness per radius: with less, as by a lamp beside the camera, as much remains
+SHARP = 0.48  # px: what lens and 2x2 mean leave of an edge (`edge_width`)
+LIMB_LOST = 0.6  # px more, at which an edge is so wide that the limb no longer shows
+SMEAR_BIAS = 0.145  # px of bias per px^2 that the squared edge width exceeds the sharp one's
+STEADY_AREA = 0.04  # relative change against the expectation beyond which the covariance covers what hiding,
+# uncovering or joining that much would do
+SMEAR_AREA = 3.0  # more of such change per px of smear and of the square root of the area
+
+
+@njit(cache=True)
+def mask_variance(area):
+    """Variance, luma px^2 per axis, of the centroid of a disc of `area` chroma px^2 whose edge is rounded to pixels.
+
+    Each of the edge's 2 pi r pixels is wrong by a uniformly distributed share, with a variance of 1/12 px^2.
+    """
+    return 4.0 / (12.0 * math.sqrt(math.pi * area))
+
+
+@njit(cache=True)
+def edge_width(soft, area, major, minor):
+    """Standard deviation of the blur at a marker's edge: for a blurred step the sum of a (1 - a) over the pixels,
+    here `soft` times the area, is the outline's length times this / sqrt(pi). `major`, `minor`: second moments."""
+    a, b = 2.0 * math.sqrt(major), 2.0 * math.sqrt(minor)
+    around = math.pi * (3.0 * (a + b) - math.sqrt((3.0 * a + b) * (a + 3.0 * b)))
+    return math.sqrt(math.pi) * soft * area / max(around, 1.0)
+
+
+@njit(cache=True)
+def limb_shift(slope_x, slope_y, area):
+    """(x, y, scale): how far the shade of a round body draws the centroid of its coverage, as long as its edge is
+    sharp; and how far at least some light may do so.
+
+    `slope_x`, `slope_y`: of the paint's brightness, of itself per px.
+    """
+    radius = math.sqrt(area / math.pi)
+    return (-LIMB_COVERAGE * radius * slope_x, -LIMB_COVERAGE * radius * slope_y,
+            LIMB_COVERAGE * max(radius * math.hypot(slope_x, slope_y), LIMB_SHADE))
+
+
+@njit(cache=True)
+def limb_shows(width):
+    """0..1: how much of that an edge of this width lets through."""
+    return min(max(1.0 - (width - SHARP) / LIMB_LOST, 0.0), 1.0)
+
+
+@njit(cache=True)
+def outline_limb_shift(slope_x, slope_y, area):
+    """(x, y, scale) as of `limb_shift`, of the centroid of a fitted outline."""
+    x, y, scale = limb_shift(slope_x, slope_y, area)
+    share = LIMB_OUTLINE / LIMB_COVERAGE / math.sqrt(math.sqrt(area / math.pi))
+    return share * x, share * y, share * scale
+
+
+@njit(cache=True)
+def smear_bias(width):
+    """Standard deviation of how far an edge of this width, smeared by motion, may have drawn the centroid."""
+    return SMEAR_BIAS * max(width * width - SHARP * SHARP, 0.0)
+
+
+@njit(cache=True)
+def hidden_bias(ratio, whole, area, width):
+    """Standard deviation of how far hiding or uncovering may have drawn the centroid of a marker.
+
+    `ratio`: of its `area` to what was expected; `whole`: its length; `width`: its edge's, which smears the area too.
+    """
+    change = 1.0 - min(ratio, 1.0 / ratio) - SMEAR_AREA * max(width - SHARP, 0.0) / math.sqrt(area)
+    return 0.5 * change * whole if change > STEADY_AREA else 0.0
+
+
+class Report(NamedTuple):
+    """What is reported of a marker, luma px. `done`: whether it was followed in the last frame."""
+
+    x: float
+    y: float
+    diameter: float
+    cov_xx: float
+    cov_xy: float
+    cov_yy: float
+    quality: float
+    done: float
+
+
+@njit(cache=True)
+def state(place, floor, bias, level, noise, report):
+    """Write x, y, diameter, covariance and quality of a measured place (a record of chroma px, whose covariance is per
+    unit variance of the noise) to a `Report`. `floor`, luma px^2, is what is added to it."""
+    scale = 4.0 * NOISE_INFLATION * noise**2
+    if place.area < SMALL_AREA:
+        floor += SMALL_VARIANCE
+    widened = floor + 4.0 * bias * bias
+    report.x, report.y = 2.0 * place.x + 0.5, 2.0 * place.y + 0.5  # a chroma pixel is the mean of 2x2 of luma
+    report.diameter = 2.0 * math.sqrt(4.0 * place.area / math.pi)
+    report.cov_xx, report.cov_xy = scale * place.v_xx + widened, scale * place.v_xy
+    report.cov_yy = scale * place.v_yy + widened
+    report.quality = min(1.0, level / (15.0 * noise)) * min(1.0, place.area / 12.0)
+
+
+@njit(cache=True)
+def widen_band(axis_x, axis_y, breadth, report):
+    """Add to the covariance of a report what shade and shape do to a band whose breadth lies along the axis (a unit
+    vector)."""
+    more = BAND_ALONG_VARIANCE - BAND_ACROSS_VARIANCE + (2.0 * BAND_ALONG * breadth) ** 2
+    report.cov_xx += BAND_ACROSS_VARIANCE + more * axis_y * axis_y
+    report.cov_xy -= more * axis_x * axis_y
+    report.cov_yy += BAND_ACROSS_VARIANCE + more * axis_x * axis_x
+
+
+# -- track of one marker -----------------------------------------------------------------------------------------------
+
+MEMORY_FRAMES = 40  # how long a lost marker's motion and size are held against candidates
+VELOCITY_GAIN = 0.7
+AREA_GAIN, RATE_GAIN = 0.4, 0.1  # per frame, of the expected log area and its trend
+RATE_MAX = 0.08  # of log area per frame: 2 m/s of approach at 1 m, or a finger bending fast, at 40 frames/s
+HIDDEN_DECAY = 0.99  # per frame: what looks hidden for long is believed to be that small
+PARTIAL_AREA = 0.82  # of the expected area: less is half hidden
+LITTER_AREA, LITTER_LEVEL = 0.25, 0.75  # of what is expected: less of both at once is no paint
+SLIVER_AREA = 0.15  # of the expected area: too little to be believed without the gate of a search
+JUMP_AREA = 1.35  # of the expected area: something else joined the marker
+RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
+SAG_STALE, SAG_HIDDEN = 0.15, 0.5  # of a band's last sag: what it may be off by, whole and partly hidden
+MARGIN = 5.0  # chroma px around a resting marker
+PARTIAL, EDGE, AMBIGUOUS = int(MarkerFlag.PARTIAL), int(MarkerFlag.EDGE), int(MarkerFlag.AMBIGUOUS)
+
+
+class Track(NamedTuple):
+    """Chroma px, and px per frame. `area`: expected in the next frame; `rate`: the trend of its logarithm per frame
+    (approach, foreshortening). `extent`: length along the major axis. `fitted`: a band's curvature is known; `sag_x`,
+    `sag_y`: from its centre to its centroid. `missed`: frames since the last observation. `limb_taken`, `limb_left`:
+    LIMB_OF_SHAPE; `sphere`, `band`: whether its marker is one."""
+
+    x: float = 0.0
+    y: float = 0.0
+    vx: float = 0.0
+    vy: float = 0.0
+    area: float = 0.0
+    rate: float = 0.0
+    extent: float = 0.0
+    level: float = 0.0
+    fitted: float = 0.0
+    sag_x: float = 0.0
+    sag_y: float = 0.0
+    alive: float = 0.0
+    missed: float = MEMORY_FRAMES
+    limb_taken: float = 0.0
+    limb_left: float = 0.0
+    sphere: float = 0.0
+    band: float = 0.0
+
+
+class Request(NamedTuple):
+    """Where a marker is expected, its standard deviation, half the window, and how large and saturated it was; chroma
+    px and grey levels."""
+
+    x: float
+    y: float
+    half_x: float
+    half_y: float
+    sigma: float
+    area: float
+    level: float
+    band: float
+
+
+def new_tracks(shapes: Sequence[Shape]) -> NDArray[np.void]:
+    """(S,) tracks of which nothing is known."""
+    return np.array([Track(limb_taken=LIMB_OF_SHAPE[shape][0], limb_left=LIMB_OF_SHAPE[shape][1],
+                           sphere=shape == "sphere", band=shape == "band") for shape in shapes], table_of(Track))
+
+
+@njit(cache=True)
+def expect(tracks, slot, recall, request):
+    """Fill the `request` (1,) for the next frame: constant velocity, with a margin that grows with speed and size.
+    `recall`: for the very frame that was observed last."""
+    track, out = tracks[slot], request[0]
+    speed = math.hypot(track.vx, track.vy)
+    ahead = 0.0 if recall else 1.0
+    out.x, out.y = track.x + ahead * track.vx + track.sag_x, track.y + ahead * track.vy + track.sag_y
+    out.half_x = out.half_y = 0.65 * track.extent + MARGIN + 0.75 * speed
+    out.sigma = 1.5 + 0.15 * track.extent + 0.4 * speed
+    out.area, out.level, out.band = track.area, track.level, track.band
+
+
+def blob_cost(track: Track, blob: Blob) -> float:
+    """How badly a blob of a full search fits the last observation, in squared standard deviations."""
+    gap = track.missed + 1.0
+    reach = track.extent + gap * (3.0 + 0.75 * math.hypot(track.vx, track.vy))
+    hold = min(gap, 4.0)  # a velocity says little after a few frames
+    x, y = blob.centroid
+    away = math.hypot(x - track.x - hold * track.vx, y - track.y - hold * track.vy) / reach
+    size = math.log(blob.area / track.area) / (0.35 + 0.02 * gap)
+    return away * away + size * size
+
+
+@njit(cache=True)
+def is_outside(tracks, slot, measured):
+    """Whether what was `measured` (1,) may be specks that lie where the marker was, so that a search should decide.
+
+    What hides a marker leaves some of it in its colour, and shade leaves it its size.
+    """
+    track, row = tracks[slot], measured[0]
+    pale = row.level < LITTER_LEVEL * track.level
+    return row.area < LITTER_AREA * track.area and (pale or row.area < SLIVER_AREA * track.area)
+
+
+@njit(cache=True)
+def observe(tracks, slot, measured, noise, flags, floor, reports):
+    """Judge what was `measured` (1,) by the last frames, take it into the track, and report it. Returns the flags.
+
+    `noise`: standard deviation of the chroma noise, grey levels. `flags`: bits of MarkerFlag. `floor`: luma px^2, the
+    variance of the position without any noise.
+    """
+    track, row, report = tracks[slot], measured[0], reports[slot]
+    known = track.missed < MEMORY_FRAMES and track.area > 0.0
+    ratio = row.area / track.area if known else 1.0
+    extent = math.sqrt(12.0 * row.var_major)
+    flags |= _judge(track, row, ratio, known)
+    width = edge_width(row.soft, row.area, row.var_major, row.var_minor)
+    limb_x, limb_y, limb = limb_shift(row.slope_x, row.slope_y, row.area)
+    taken, x, y = track.limb_taken * limb_shows(width), row.x, row.y
+    row.x, row.y = row.x - taken * limb_x, row.y - taken * limb_y
+    bias = math.hypot(_plausible_bias(track, row, ratio, width, flags), math.hypot(smear_bias(width),
+                                                                                   track.limb_left * limb))
+    if track.band > 0.0 and row.fit == 0.0 and (track.fitted > 0.0 or row.round == 0.0):
+        row.x, row.y = row.x - track.sag_x, row.y - track.sag_y
+        stale = SAG_HIDDEN if flags & PARTIAL else SAG_STALE
+        off_axis = stale * math.hypot(track.sag_x, track.sag_y) if track.fitted > 0.0 else OFF_AXIS_SD * extent
+        bias = math.hypot(bias, off_axis)
+    if not known:
+        track.vx = track.vy = track.area = track.rate = track.fitted = track.sag_x = track.sag_y = 0.0
+    take(track, row, extent, row.level, flags & (PARTIAL | EDGE) and ratio < 1.0)
+    state(row, floor, bias, row.level, noise, report)
+    if row.fit > 0.0:
+        sag = 0.25 * math.pi * row.sag
+        track.fitted, track.sag_x, track.sag_y = 1.0, -row.axis_y * sag, row.axis_x * sag
+        widen_band(row.axis_x, row.axis_y, extent, report)
+    row.x, row.y = x, y  # as they were measured
+    report.quality *= ((min(ratio, 0.8) if flags & PARTIAL else 1.0) * (0.7 if flags & EDGE else 1.0)
+                       * (0.5 if flags & AMBIGUOUS else 1.0))
+    return flags
+
+
+@njit(cache=True)
+def _judge(track, row, ratio, known):
+    flags = 0
+    if row.at_border > 0.0:
+        flags |= EDGE
+    elongated = track.sphere > 0.0 and row.var_major > 1.7 * row.var_minor + 1.0
+    broken = track.band > 0.0 and track.fitted > 0.0 and row.fit == 0.0
+    if ratio < PARTIAL_AREA or row.fragments > 1.0 or elongated or (broken and ratio < 0.93):
+        flags |= PARTIAL
+    if row.rival_cost < row.cost + RIVAL_MARGIN or (known and ratio > JUMP_AREA):
+        flags |= AMBIGUOUS
+    return flags
+
+
+@njit(cache=True)
+def _plausible_bias(track, row, ratio, width, flags):
+    """Standard deviation, chroma px, of how far what is hidden or mistaken may have drawn the centroid."""
+    whole = max(math.sqrt(12.0 * row.var_major), track.extent)
+    if row.fit > 0.0 and not flags & PARTIAL:  # a band's rims are those of a whole one
+        bias = hidden_bias(math.sqrt(ratio), math.sqrt(12.0 * row.var_minor), row.area, width)
+    else:
+        bias = hidden_bias(ratio, whole, row.area, width)
+    if flags & PARTIAL:
+        bias = max(bias, 0.05 * whole)
+    if flags & EDGE:
+        bias = max(bias, 0.15 * whole)
+    if flags & AMBIGUOUS:
+        bias = max(bias, 0.3 * whole)
+    return bias
+
+
+@njit(cache=True)
+def take(track, place, extent, level, hidden):
+    """Take a measured place into a track: motion, and, unless something hides a part, size and its trend.
+
+    A track whose area is 0 knows nothing yet.
+    """
+    gap = track.missed + 1.0
+    if track.area > 0.0:
+        gain = VELOCITY_GAIN if track.alive > 0.0 else 1.0
+        track.vx += gain * ((place.x - track.x) / gap - track.vx)
+        track.vy += gain * ((place.y - track.y) / gap - track.vy)
+        if hidden:
+            track.area *= HIDDEN_DECAY
+            track.rate = 0.0
+        else:
+            surprise = math.log(place.area / track.area)
+            track.rate = min(max(track.rate + RATE_GAIN * surprise, -RATE_MAX), RATE_MAX)
+            track.area *= math.exp(AREA_GAIN * surprise + track.rate)
+            track.extent = extent
+    else:
+        track.area, track.extent = place.area, extent
+    track.x, track.y, track.level = place.x, place.y, level
+    track.alive, track.missed = 1.0, 0.0

@@ -1,1 +1,0 @@
-"""Markers from frame to frame: where each is expected, and the contour that is fitted to it."""
