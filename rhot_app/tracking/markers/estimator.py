@@ -227,6 +227,7 @@ class Estimator(Tracker):
 
     def _update(self, frame: MarkerFrame) -> None:
         """Associate a frame with the prediction, and weigh it."""
+        frame = copy.copy(frame)  # it may be weighed again, by another prediction
         t_s = self._filter.seconds(frame.t_ns)
         candidates = np.count_nonzero(frame.seen)
         prediction = self._filter.predict(t_s)
