@@ -6,15 +6,20 @@ that of a few unknowns and robust residuals. Sparse and reduced systems bring th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Generic, Protocol, Self, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
+from numba import njit
+from numba.extending import overload
 from numpy.typing import NDArray
 
+from rhot_app.estimation.linear import solve_in_box
 from rhot_app.estimation.quantiles import chi_squared
 from rhot_app.estimation.residual import Kernel, Rows, stack
+from rhot_app.estimation.se3 import retract
 
 Array = NDArray[np.float64]
 
@@ -126,3 +131,94 @@ def fit_linear(columns: Array, target: Array, kernel: Kernel, rounds: int, rcond
         variance = max(least_sd**2, float(np.median(squared)) / float(chi_squared(0.5, target.shape[1])), 1e-18)
         weights = kernel.weights(squared / variance, dimension)
     return solution, weights
+
+
+# -- compiled, within a box --------------------------------------------------------------------------------------------
+
+class Stop(NamedTuple):
+    """When a compiled descent ends: after `steps`; at a cost of `enough`; or with a step that is shorter than `still`
+    in every number, or that lowers the cost, or by the quadratic model would lower it (the Newton decrement; Boyd and
+    Vandenberghe 2004, 9.5.1), by less than `gain` times one plus the cost."""
+
+    steps: int
+    gain: float
+    still: float
+    enough: float
+
+
+def linearised(problem: Any, state: Array, matrix: Array, right: Array, low: Array, high: Array) -> float:
+    """The cost of a compiled problem at `state`. Fills the Gauss-Newton `matrix` H (n, n), the negative gradient
+    `right` (n,) and the bounds `low` and `high` (n,) of a step. Each record of a problem has its own (`implements`)."""
+    raise NotImplementedError
+
+
+def implements(record: type, compiled: Any) -> None:
+    """Let `linearised` of a `record`, a NamedTuple, be a compiled function of the same arguments. (A function cannot be
+    an argument of a compiled one that is kept on disk.)"""
+    @overload(linearised, strict=False, inline="always")
+    def _of_record(problem: Any, state: Any, matrix: Any, right: Any, low: Any, high: Any) -> Any:
+        if getattr(problem, "instance_class", None) is not record:
+            return None
+        return lambda problem, state, matrix, right, low, high: compiled(problem, state, matrix, right, low, high)
+
+
+@njit  # kept on disk with its callers: an index of its own would name records that may move
+def descend(problem: Any, state: Array, size: int, stop: Stop) -> tuple[float, int, bool]:
+    """(H + damping diag H) step = -gradient, low <= step <= high: `minimise`, compiled, in place on `state`.
+
+    `problem`: a record that implements `linearised`; `state`: a vector of `size` numbers, or a pose and more
+    (`estimation.se3`) with as many in its tangent space. Returns the cost, the steps taken, and whether it ended before
+    they were used up.
+    """
+    matrix, vectors = np.empty((3, size, size)), np.empty((7, size))
+    damped, step, here, damping = matrix[2], vectors[6], 0, DAMPING
+    cost = linearised(problem, state, matrix[0], vectors[0], vectors[2], vectors[3])
+    for taken in range(stop.steps):
+        if cost <= stop.enough:
+            return cost, taken, True
+        right, low, high, there = vectors[here], vectors[2 + 2 * here], vectors[3 + 2 * here], 1 - here
+        while True:
+            _damp(matrix[here], damping, damped)
+            solve_in_box(damped, right, low, high, step)
+            trial = retract(state, step) if len(state) > size else state + step
+            gain, longest = _promise(matrix[here], right, step)
+            if 0.0 <= gain < stop.gain * (1.0 + cost) or (math.isfinite(gain) and longest < stop.still):
+                state[:] = trial
+                return cost - gain, taken + 1, True
+            trial_cost = linearised(problem, trial, matrix[there], vectors[there], vectors[2 + 2 * there],
+                                    vectors[3 + 2 * there])
+            if trial_cost <= cost:
+                break
+            damping = max(TENFOLD * damping, DAMPING)
+            if damping > GREATEST_DAMPING:
+                return cost, taken, True
+        state[:], gain, cost, here = trial, cost - trial_cost, trial_cost, there
+        damping = max(damping / TENFOLD, LEAST_DAMPING)
+        if gain < stop.gain * (1.0 + cost):
+            return cost, taken + 1, True
+    return cost, stop.steps, False
+
+
+@njit(cache=True)
+def _damp(matrix: Array, damping: float, damped: Array) -> None:
+    """Fill `damped` (n, n); a number that shows in no residual is damped by the mean."""
+    size, mean = matrix.shape[0], 0.0
+    for i in range(size):
+        mean += matrix[i, i] / size
+        for j in range(size):
+            damped[i, j] = matrix[i, j]
+    for i in range(size):
+        damped[i, i] += damping * max(matrix[i, i], DAMPING * mean)
+
+
+@njit(cache=True)
+def _promise(matrix: Array, right: Array, step: Array) -> tuple[float, float]:
+    """By how much the quadratic model falls over a step, and the step's largest number."""
+    gain, longest = 0.0, 0.0
+    for i in range(step.shape[0]):
+        slope = right[i]
+        for j in range(step.shape[0]):
+            slope -= 0.5 * matrix[i, j] * step[j]
+        gain += step[i] * slope
+        longest = max(longest, abs(step[i]))
+    return gain, longest

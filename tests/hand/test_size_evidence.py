@@ -9,7 +9,8 @@ from rhot_app.hand.kinematics import TWIST, forward, move
 from rhot_app.hand.limits import PERSON_LIMIT_SD_RAD
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
-from rhot_app.tracking.markers.size_evidence import Fitting, Posture, implausibility, linearise
+from rhot_app.hand.solvers.pose_descent import linearise_pose, pose_state
+from rhot_app.tracking.markers.size_evidence import Posture, implausibility, pose_problem
 
 SIZE = TWIST + len(ANGLES)
 ROWS = [0, *range(len(JOINTS), len(JOINTS) + 5)]  # wrist and fingertips of the model's own points
@@ -43,6 +44,12 @@ def curve(model, pose, true_log_scale, grid):
     return values
 
 
+def linearised(problem, world, angles):
+    matrix, right = np.empty((SIZE, SIZE)), np.empty(SIZE)
+    cost = linearise_pose(problem, pose_state(world, angles), matrix, right, np.empty(SIZE), np.empty(SIZE))
+    return cost, matrix, right
+
+
 def plain_cost(model, places, information, scale, pose):
     off = np.nan_to_num(places - markers_of(model, pose, scale))
     away = pose.angles - model.pose_prior.mean
@@ -60,8 +67,7 @@ def test_cost_and_gradient_are_those_of_plain_numpy(model):
     places[2] = np.nan
     root = rng.normal(size=(6, 3, 3))
     information = 1e6 * (root @ root.transpose(0, 2, 1) + np.eye(3))
-    fitting = Fitting(np.empty((SIZE, SIZE)), np.empty(SIZE))
-    cost = linearise(posture, places, information, 1.07, world, angles, fitting)
+    cost, matrix, right = linearised(pose_problem(posture, places, information, 1.07), world, angles)
     assert cost == pytest.approx(plain_cost(model, places, information, 1.07, HandPose(world, angles)))
     slope, trial = np.empty(SIZE), (np.empty((4, 4)), np.empty(len(ANGLES)))
     for i in range(SIZE):
@@ -70,8 +76,8 @@ def test_cost_and_gradient_are_those_of_plain_numpy(model):
             move(world, angles, step, *trial)
             sides.append(plain_cost(model, places, information, 1.07, HandPose(trial[0].copy(), trial[1].copy())))
         slope[i] = (sides[0] - sides[1]) / 2e-6
-    np.testing.assert_allclose(fitting.right, -slope, rtol=1e-5, atol=1e-4 * np.abs(slope).max())
-    assert np.linalg.eigvalsh(fitting.matrix).min() > 0.0
+    np.testing.assert_allclose(right, -slope, rtol=1e-5, atol=1e-4 * np.abs(slope).max())
+    assert np.linalg.eigvalsh(matrix).min() > 0.0
 
 
 def test_evidence_is_that_of_the_most_plausible_pose_and_of_the_room_about_it(right_hand):
@@ -81,11 +87,11 @@ def test_evidence_is_that_of_the_most_plausible_pose_and_of_the_room_about_it(ri
     world[:3, :3] = Rotation.from_rotvec([0.1, -0.1, 0.1]).as_matrix() @ world[:3, :3]
     angles, places = neutral_pose().angles, markers_of(right_hand, true, 1.0)
     value, misfit = implausibility(posture_of(right_hand), places, INFORMATION, 0.05, world, angles)
-    fitting = Fitting(np.empty((SIZE, SIZE)), np.empty(SIZE))
-    cost = linearise(posture_of(right_hand), places, INFORMATION, np.exp(0.05), world, angles, fitting)
+    problem = pose_problem(posture_of(right_hand), places, INFORMATION, np.exp(0.05))
+    cost, matrix, right = linearised(problem, world, angles)
     assert misfit == pytest.approx(cost)
-    assert value == pytest.approx(cost + 0.5 * np.linalg.slogdet(fitting.matrix)[1])
-    assert fitting.right @ np.linalg.solve(fitting.matrix, fitting.right) < 1e-2  # nothing is left to gain
+    assert value == pytest.approx(cost + 0.5 * np.linalg.slogdet(matrix)[1])
+    assert right @ np.linalg.solve(matrix, right) < 1e-2  # nothing is left to gain
     assert np.linalg.norm(markers_of(right_hand, HandPose(world, angles), np.exp(0.05)) - places) < 5e-3
 
 

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 from rhot_app.hand.anatomy import DIP_PER_PIP
 from rhot_app.hand.limits import clamp_angle, wrap
-from rhot_app.hand.solvers.finger_chain import miss, status_of
-from rhot_app.hand.solvers.problem import assign, clamp, norm
+from rhot_app.hand.solvers.finger_chain import assign, clamp, miss, norm, status_of
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.solvers.finger_chain import distance
+from rhot_app.hand.solvers.finger_chain import assign, distance
 
 Array = NDArray[np.float64]
 
@@ -42,16 +42,16 @@ def solve_chain(joints: Array, target: Array, tolerance: float, max_iterations: 
         return 0, False
     root, before, moving = joints[0].copy(), joints.copy(), True
     for iteration in range(1, max_iterations + 1):
-        _copy(target, joints[bones])
+        assign(target, joints[bones])
         for k in range(bones - 1, -1, -1):
             _place(joints[k + 1], joints[k], lengths[k], directions[k], -1.0, joints[k])
-        _copy(root, joints[0])
+        assign(root, joints[0])
         for k in range(bones):
             _place(joints[k], joints[k + 1], lengths[k], directions[k], 1.0, joints[k + 1])
         moving = False
         for k in range(1, bones + 1):
             moving |= distance(joints[k], before[k]) > STILL * total
-            _copy(joints[k], before[k])
+            assign(joints[k], before[k])
         if distance(joints[bones], target) <= tolerance:
             return iteration, moving
     return max_iterations, moving
@@ -66,12 +66,6 @@ def _place(fixed: Array, towards: Array, length: float, direction: Array, sign: 
             direction[i] = sign * (towards[i] - fixed[i]) / apart
     for i in range(3):
         out[i] = fixed[i] + sign * length * direction[i]
-
-
-@njit(cache=True)
-def _copy(point: Array, out: Array) -> None:
-    for i in range(3):
-        out[i] = point[i]
 
 
 # -- joint angles from joint positions ---------------------------------------------------------------------------------

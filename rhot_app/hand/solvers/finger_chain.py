@@ -30,6 +30,21 @@ PLANE_MARGIN = 0.02
 
 
 @njit(cache=True)
+def to_finger(world_from_palm: Array, mirror: float, base: Array, base_rotation: Array, point: Array,
+              local: Array) -> None:
+    """Fill `local` (3,): a world point in one finger's base frame, mirrored into a right hand."""
+    palm = np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            palm[i] += world_from_palm[j, i] * (point[j] - world_from_palm[j, 3])
+    palm[1] *= mirror
+    for i in range(3):
+        local[i] = 0.0
+        for j in range(3):
+            local[i] += base_rotation[j, i] * (palm[j] - base[j])
+
+
+@njit(cache=True)
 def chain_points(angles: Array, lengths: Array, joints: Array, jacobian: Array) -> None:
     """Fill `joints` (4, 3) and `jacobian` (3, n): change of the last of them per angle."""
     ca, sa, cf, sf = math.cos(angles[0]), math.sin(angles[0]), math.cos(angles[1]), math.sin(angles[1])
@@ -69,15 +84,38 @@ def _turn(ax: float, ay: float, az: float, origin: Array, point: Array, out: Arr
 
 
 @njit(cache=True)
-def _copy(point: Array, out: Array) -> None:
-    for i in range(3):
-        out[i] = point[i]
-
-
-@njit(cache=True)
 def distance(a: Array, b: Array) -> float:
     """Distance of two points (3,)."""
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+
+
+@njit(cache=True)
+def norm(vector: Array) -> float:
+    """Length of a vector (3,)."""
+    return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+
+
+@njit(cache=True)
+def assign(values: Array, out: Array) -> None:
+    """Copy `values` (n,) into `out`. A slice assignment does the same, and takes ten times as long to compile."""
+    for k in range(values.shape[0]):
+        out[k] = values[k]
+
+
+@njit(cache=True)
+def clamp(angles: Array, limits: Array) -> None:
+    """Bring `angles` (n,) within `limits` (n, 2), in place."""
+    for k in range(angles.shape[0]):
+        angles[k] = min(max(angles[k], limits[k, 0]), limits[k, 1])
+
+
+@njit(cache=True)
+def linearise(angles: Array, lengths: Array, target: Array, joints: Array, jacobian: Array, error: Array) -> float:
+    """Fill `joints` (4, 3), `jacobian` (3, n) and `error` (3,), target less end; returns the error's length."""
+    chain_points(angles, lengths, joints, jacobian)
+    for i in range(3):
+        error[i] = target[i] - joints[3, i]
+    return distance(joints[3], target)
 
 
 @njit(cache=True)
@@ -174,12 +212,12 @@ def fabrik_thumb(angles: Array, lengths: Array, limits: Array, target: Array, to
     chain_points(angles, lengths, joints, jacobian)
     if distance(joints[0], target) >= lengths[0] + lengths[1] + lengths[2]:
         for k in range(1, 4):
-            _copy(target, joints[k])
+            assign(target, joints[k])
         _read_thumb(angles, joints, lengths, limits)
         return 0, False
     missed, idle = distance(joints[3], target), 0
     for iteration in range(1, max_iterations + 1):
-        _copy(target, joints[3])
+        assign(target, joints[3])
         for k in range(2, 0, -1):
             length = distance(joints[k + 1], joints[k])
             if length > 0.0:

@@ -12,9 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.linear import factorise, substitute
-from rhot_app.hand.solvers.finger_chain import status_of
-from rhot_app.hand.solvers.problem import assign, clamp, linearise, norm
+from rhot_app.estimation.linear import factorise, substitute
+from rhot_app.hand.solvers.finger_chain import assign, clamp, linearise, norm, status_of
 
 Array = NDArray[np.float64]
 

@@ -20,16 +20,19 @@ from rhot_app.hand.solvers.finger_chain import (
     REACHED,
     STALLED,
     UNREACHABLE,
+    assign,
     chain_points,
+    clamp,
     distance,
     fabrik_within,
     miss,
+    norm,
     status_of,
     within_reach,
 )
 from rhot_app.hand.solvers.inverse import follow_jacobian
 from rhot_app.hand.solvers.newton import solve_exactly
-from rhot_app.hand.solvers.problem import Problem, Solution, assign, clamp, norm
+from rhot_app.hand.solvers.problem import Problem, Solution
 
 Array = NDArray[np.float64]
 

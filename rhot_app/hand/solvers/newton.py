@@ -13,11 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.hand.linear import solve_in_box
+from rhot_app.estimation.linear import solve_in_box
 from rhot_app.hand.solvers.closed_form import solve_coupled
-from rhot_app.hand.solvers.finger_chain import REACHED, UNREACHABLE, status_of
+from rhot_app.hand.solvers.finger_chain import REACHED, UNREACHABLE, assign, clamp, linearise, norm, status_of
 from rhot_app.hand.solvers.inverse import DAMPED, follow_jacobian
-from rhot_app.hand.solvers.problem import assign, clamp, linearise, norm
 
 Array = NDArray[np.float64]
 
@@ -32,11 +31,12 @@ FLOOR = 1e-9
 
 
 @njit(cache=True)
-def descend(second_order: bool, angles: Array, lengths: Array, limits: Array, target: Array, tolerance: float,
-            max_iterations: int) -> tuple[float, int, int]:
+def descend_finger(second_order: bool, angles: Array, lengths: Array, limits: Array, target: Array, tolerance: float,
+                   max_iterations: int) -> tuple[float, int, int]:
     """One finger, in place on `angles` (4,) or (5,); returns residual, m, iterations, and status.
 
-    Newton with the `second_order`, Levenberg-Marquardt without.
+    Newton with the `second_order`, Levenberg-Marquardt without. It is not `estimation.least_squares.descend`: damping
+    by the squared error is calmer at the stretched pose, and takes half the time (`python benchmarks/solvers.py`).
     """
     count = angles.shape[0]
     clamp(angles, limits)
@@ -188,7 +188,8 @@ def solve_exactly(rule: int, angles: Array, lengths: Array, limits: Array, targe
         if rule == DAMPED:
             missed, taken, ended = follow_jacobian(DAMPED, trial, lengths, limits, target, tolerance, max_iterations)
         else:
-            missed, taken, ended = descend(rule == NEWTON, trial, lengths, limits, target, tolerance, max_iterations)
+            missed, taken, ended = descend_finger(rule == NEWTON, trial, lengths, limits, target, tolerance,
+                                                  max_iterations)
         iterations += taken
         if missed < residual:
             residual, status = missed, ended

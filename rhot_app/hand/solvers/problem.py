@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.hand.solvers.finger_chain import chain_points, distance
-from rhot_app.hand.solvers.finger_ik import to_finger
+from rhot_app.hand.solvers.finger_chain import to_finger
 
 Array = NDArray[np.float64]
 
@@ -54,32 +52,3 @@ def make_problem(model: HandModel, start: HandPose, targets: Array) -> Problem:
         to_finger(start.world_from_palm, model.mirror, model.base[finger], model.base_rotation[finger],
                   np.asarray(targets[finger], dtype=np.float64), local[finger])
     return Problem(model.chain, model.limits, np.array(start.angles, dtype=np.float64), local)
-
-
-@njit(cache=True)
-def assign(values: Array, out: Array) -> None:
-    """Copy `values` (n,) into `out`. A slice assignment does the same, and takes ten times as long to compile."""
-    for k in range(values.shape[0]):
-        out[k] = values[k]
-
-
-@njit(cache=True)
-def clamp(angles: Array, limits: Array) -> None:
-    """Bring `angles` (n,) within `limits` (n, 2), in place."""
-    for k in range(angles.shape[0]):
-        angles[k] = min(max(angles[k], limits[k, 0]), limits[k, 1])
-
-
-@njit(cache=True)
-def linearise(angles: Array, lengths: Array, target: Array, joints: Array, jacobian: Array, error: Array) -> float:
-    """Fill `joints` (4, 3), `jacobian` (3, n) and `error` (3,), target less end; returns the error's length."""
-    chain_points(angles, lengths, joints, jacobian)
-    for i in range(3):
-        error[i] = target[i] - joints[3, i]
-    return distance(joints[3], target)
-
-
-@njit(cache=True)
-def norm(vector: Array) -> float:
-    """Length of a vector (3,)."""
-    return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)

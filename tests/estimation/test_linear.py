@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from rhot_app.hand.linear import factorise, solve_in_box, substitute
+from rhot_app.estimation.linear import factorise, solve_in_box, substitute
 
 
 def _positive(rng, count):
