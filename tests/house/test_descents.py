@@ -1,4 +1,4 @@
-"""The core has one damped descent in Python and one compiled one, and those of the solvers that docs/solvers.md compares."""
+"""The core has one damped descent in Python and one compiled one, beside those of the solvers that are compared."""
 
 import subprocess
 import sys

@@ -74,7 +74,7 @@ def fit_palm(model: HandModel, wrist: Array, tips: Array, previous: HandPose | N
 def start_poses(model: HandModel, wrist: Array, tips: Array) -> list[HandPose]:
     """Hands to begin from when nothing is known: open, relaxed, closing and closed, laid on the markers (Kabsch)."""
     markers = np.vstack([wrist, tips])
-    seen = np.isfinite(markers).all(axis=1)
+    seen = np.logical_and.reduce(np.isfinite(markers), axis=1)
     poses = []
     for closing in range(4):
         angles = neutral_pose().angles.copy()
