@@ -38,10 +38,11 @@ from rhot_app.hand.solvers.methods import (
     COARSE,
     EFFORT,
     Method,
+    Problem,
+    make_problem,
     solve,
     solve_arrays,
 )
-from rhot_app.hand.solvers.problem import Problem, make_problem
 from rhot_node.files import resource_path
 
 Array = NDArray[Any]

@@ -11,7 +11,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, neutral_pose
 from rhot_app.hand.skeleton import JOINT_SLICES, HandPose
-from rhot_app.hand.solvers.palm_before_camera import palms_before_camera
+from rhot_app.hand.solvers.palm_fit import palms_before_camera
 from rhot_app.handfit.state import Anchor, Instant
 from rhot_app.progress import Progress
 from rhot_node.landmarks.networks import open_hand_networks

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.diagnostics import Diagnostics, Part
 from rhot_app.estimation.filter import FilteredState, Knot
 from rhot_app.estimation.layout import pose_matrix
+from rhot_app.estimation.quantiles import chi_squared
 from rhot_app.estimation.residual import Residual
 from rhot_app.estimation.se3 import difference
 from rhot_app.estimation.track import PREDICTED_NS, Life, TrackFilter
@@ -40,7 +41,7 @@ from rhot_node.wire.messages import FAMILIES
 
 Array = NDArray[np.float64]
 
-GATE_2, GATE_6 = 13.816, 22.458
+GATE_2, GATE_6 = (float(chi_squared(0.999, numbers)) for numbers in (2, 6))
 """Squared Mahalanobis distance of an innovation of 2 and of 6 numbers from which on it is rejected: 99.9 % quantiles of
 chi-squared."""
 

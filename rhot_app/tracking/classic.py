@@ -19,9 +19,8 @@ from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.places import with_markers
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, FINGER_OF_ANGLE, JOINT_SLICES, JOINTS, HandPose
 from rhot_app.hand.solvers.finger_ik import FABRIK_ITERATIONS, TOLERANCE, solve_fingers_arrays
-from rhot_app.hand.solvers.methods import Method, solve
+from rhot_app.hand.solvers.methods import Method, make_problem, solve
 from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, any_marker, fit_palm, track_arrays
-from rhot_app.hand.solvers.problem import make_problem
 from rhot_app.project import IkMethod, Rig
 from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
 from rhot_app.tracking.association import MarkerAssociation

@@ -15,9 +15,9 @@ from rhot_app.hand.solvers.finger_chain import Status
 from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint, excess, shape_knuckles, slice_flexion, swing, unswing
 from rhot_app.hand.solvers.methods import (
     Method,
+    make_problem,
     solve,
 )
-from rhot_app.hand.solvers.problem import make_problem
 
 BOUNDS = np.radians([[-20.0, 35.0], [-30.0, 80.0]])
 ROUND = (Shape.CONE, Shape.PARABOLA)

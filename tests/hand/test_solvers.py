@@ -15,9 +15,8 @@ from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.hand.solvers.fabrik import solve_chain
 from rhot_app.hand.solvers.finger_chain import Status, chain_points
 from rhot_app.hand.solvers.inverse import damped_step, svd_step
-from rhot_app.hand.solvers.methods import COARSE, EFFORT, Effort, Method, solve
+from rhot_app.hand.solvers.methods import COARSE, EFFORT, Effort, Method, make_problem, solve
 from rhot_app.hand.solvers.newton import chain_axes
-from rhot_app.hand.solvers.problem import make_problem
 
 MICROMETRE = 1e-6
 TENTH_DEGREE = np.radians(0.1)

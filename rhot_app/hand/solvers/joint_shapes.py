@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rhot_app.hand.limits import clamp_angle
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
 from rhot_app.hand.solvers.finger_chain import fold_abduction
-from rhot_app.hand.solvers.problem import Problem
+from rhot_app.hand.solvers.methods import Problem
 
 Array = NDArray[np.float64]
 

@@ -11,13 +11,12 @@ from scipy.ndimage import median_filter
 
 from rhot_app.estimation.least_squares import fit_linear
 from rhot_app.estimation.quantiles import chi_squared_isf
-from rhot_app.estimation.residual import student
 from rhot_app.estimation.se3 import skew
 from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.alignment.alignment_file import Alignment
-from rhot_app.objects.alignment.fit import LASTING_M, LASTING_S
-from rhot_app.objects.alignment.model import GAP_S
-from rhot_app.objects.alignment.motion_stream import MotionStream
+from rhot_app.objects.alignment.fit import KERNEL, LASTING_M, LASTING_S
+from rhot_app.objects.alignment.model import GAP_S, OFFSET, POINT, POINTS, ROTATION, TRANSLATION
+from rhot_app.objects.alignment.motion_stream import SAMPLES, MotionStream
 
 Array = NDArray[np.float64]
 
@@ -28,9 +27,7 @@ millimetre show."""
 FALSE_ALARM = 1e-6
 """Probability of a test to call a true alignment stale: with one test a second, once in twelve days."""
 
-SAMPLES = 50
-_DRIFT = np.array([0, 1, 2, 3, 4, 5, 9])  # columns that may drift: rig_from_foreign and the time offset
-_KERNEL = student(4.0)
+_DRIFT = np.r_[TRANSLATION, ROTATION, OFFSET]  # what may drift: rig_from_foreign and the time offset
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +62,7 @@ class DriftMonitor:
             self._pairs.popleft()
 
     def test(self) -> Drift | None:
-        """Test the window; None while it holds less than half of its time or 50 pairs.
+        """Test the window; None while it holds less than half of its time or too few pairs.
 
         It is a score test (Rao 1948) of a change of rig_from_foreign and of the time offset. The innovations have white
         noise, a lasting error of LASTING_M, and the covariance of the alignment.
@@ -90,9 +87,9 @@ class DriftMonitor:
         moved = drift @ step
         distance_m = float(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
         stale = statistic > limit
-        clock_m = float(np.sqrt(np.mean(np.sum((drift[:, :, 6] * step[6]) ** 2, axis=1))))
-        sentence = _sentence(distance_m, float(step[6]), clock_m, duration_s) if stale else ""
-        return Drift(stale, statistic, limit, distance_m, float(step[6]), sentence)
+        clock_m = float(np.sqrt(np.mean(np.sum((drift[:, :, -1] * step[-1]) ** 2, axis=1))))
+        sentence = _sentence(distance_m, float(step[-1]), clock_m, duration_s) if stale else ""
+        return Drift(stale, statistic, limit, distance_m, float(step[-1]), sentence)
 
     @classmethod
     def test_streams(cls, alignment: Alignment, foreign: MotionStream, rig: MotionStream) -> Drift | None:
@@ -119,16 +116,16 @@ class DriftMonitor:
         turned = (poses[:, :3, 3] + poses[:, :3, :3] @ body[:3, 3]) @ rig[:3, :3].T
         predicted = turned + rig[:3, 3]
         speed = np.gradient(median_filter(predicted, (5, 1)), times, axis=0)  # outliers would have the largest speeds
-        jacobian = np.zeros((len(times), 3, 10))
-        jacobian[:, :, 0:3], jacobian[:, :, 3:6] = np.eye(3), -skew(turned)
-        jacobian[:, :, 6:9], jacobian[:, :, 9] = rig[:3, :3] @ poses[:, :3, :3], -speed
+        jacobian = np.zeros((len(times), 3, POINTS))
+        jacobian[:, :, TRANSLATION], jacobian[:, :, ROTATION] = np.eye(3), -skew(turned)
+        jacobian[:, :, POINT], jacobian[:, :, OFFSET.start] = rig[:3, :3] @ poses[:, :3, :3], -speed
         return observed - predicted, jacobian
 
 
 def _robust(innovation: Array, drift: Array, noise_m: float) -> tuple[Array, Array]:
     """Weights (N,) of the innovations under the drift (7,) that explains them best, and that drift."""
     size = np.maximum(np.linalg.norm(drift.reshape(-1, drift.shape[2]), axis=0), 1e-12)
-    step, weights = fit_linear(drift / size, innovation, _KERNEL, rounds=10, rcond=1e-6, least_sd=noise_m)
+    step, weights = fit_linear(drift / size, innovation, KERNEL, rounds=10, rcond=1e-6, least_sd=noise_m)
     return weights, step / size
 
 

@@ -27,8 +27,8 @@ from rhot_app.estimation.quantiles import chi_squared
 from rhot_app.estimation.residual import Rows, student
 from rhot_app.estimation.se3 import skew
 from rhot_app.geometry.transforms import best_rotation, rigid
-from rhot_app.objects.alignment.model import GAP_S, ROTATION, TRANSLATION, AlignmentEstimate, AlignmentModel
-from rhot_app.objects.alignment.motion_stream import MotionStream
+from rhot_app.objects.alignment.model import GAP_S, OFFSET, ROTATION, TRANSLATION, AlignmentEstimate, AlignmentModel
+from rhot_app.objects.alignment.motion_stream import SAMPLES, MotionStream
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -49,13 +49,27 @@ LASTING_M = 0.5e-3
 LASTING_S = 1.0
 """s: correlation time of that error (`hand.motion.hand_process.BIAS_S`)."""
 
-INLIER_GATE = float(chi_squared(0.999, 3))
+AXES = 3
+"""Numbers of a position's error, and of a rotation's."""
+
+INLIER_GATE = float(chi_squared(0.999, AXES))
 """Squared Mahalanobis distance of an inlier: 99.9 % of Gaussian errors."""
 
-_KERNEL = student(4.0)
-_NU, _DIMENSION = 4.0, 3
-_GAUSSIAN_SQUARES = chi_squared((np.arange(1000) + 0.5) / 1000.0, _DIMENSION)
-_GAUSSIAN_SHARE = float(np.mean(_KERNEL.weights(_GAUSSIAN_SQUARES, np.full(1000, 3.0)) * _GAUSSIAN_SQUARES)) / 3.0
+KERNEL = student(4.0)
+"""Heavy tails: either tracker fails now and then."""
+
+
+
+def _weights(squared: Array) -> Array:
+    return KERNEL.weights(squared, np.full(len(squared), float(AXES)))
+
+
+def _weighted_square(squared: Array) -> float:
+    """Of an axis, by squared Mahalanobis distances (N,) of three."""
+    return float(np.mean(_weights(squared) * squared)) / AXES
+
+
+_GAUSSIAN = _weighted_square(np.asarray(chi_squared((np.arange(1000) + 0.5) / 1000.0, AXES)))  # at unit variance
 _LEVER_M = 0.1  # of the start: a rotation counts as the motion of a point this far away
 _START_ROWS = 500
 _ITERATIONS, _CONVERGED = 50, 1e-8
@@ -131,7 +145,7 @@ def align(foreign: MotionStream, rig: MotionStream, search_s: float = SEARCH_S,
         estimate, scales = _solve(model, estimate, scales)
         model.select(estimate.offset_s)
         progress("refining the alignment", part)
-    if model.count < 50:
+    if model.count < SAMPLES:
         raise _no_overlap(foreign, rig)
     kept = (len(model.foreign.times_s) + 4) / len(foreign.times_s) * (len(model.rig.times_s) + 4) / len(rig.times_s)
     return _finished(model, estimate, scales, kept), found
@@ -145,7 +159,7 @@ def search(model: AlignmentModel, search_s: float, progress: Callable[[str, floa
     for number, offset_s in enumerate(offsets):
         model.select(offset_s)
         model.thin(_START_ROWS)
-        if model.count >= 50:
+        if model.count >= SAMPLES:
             starts[number] = linear_start(model, float(offset_s))
             median[number] = starts[number][1]
         progress("searching the time offset", 0.7 * number / len(offsets))
@@ -178,7 +192,7 @@ def linear_start(model: AlignmentModel, offset_s: float) -> tuple[AlignmentEstim
         for axis in range(3):
             more[:, axis, 3 * axis:3 * axis + 3] = body
         columns, target = np.concatenate([columns, more]), np.concatenate([target, turn])
-    solution, _ = fit_linear(columns, target, _KERNEL, rounds=4, rcond=1e-3)
+    solution, _ = fit_linear(columns, target, KERNEL, rounds=4, rcond=1e-3)
     inverse = solution[:9].reshape(3, 3)
     sizes = np.linalg.svd(inverse, compute_uv=False)
     rotation = best_rotation(inverse.T)
@@ -197,8 +211,8 @@ def _rows(model: AlignmentModel, scales: tuple[float, float], estimate: Alignmen
     rows = []
     for each, slopes, scale in ((error, jacobian, scales[0]), (turned, by, scales[1])):
         if len(each):
-            rows.append(Rows(each.ravel() / scale, slopes.reshape(-1, model.size) / scale, np.ones(()), _KERNEL,
-                             np.arange(0, each.size, 3)))
+            rows.append(Rows(each.ravel() / scale, slopes.reshape(-1, model.size) / scale, np.ones(()), KERNEL,
+                             np.arange(0, each.size, AXES)))
     return rows
 
 
@@ -220,8 +234,7 @@ def _rescaled(model: AlignmentModel, estimate: AlignmentEstimate, scales: tuple[
     out = []
     for rows, scale in zip(_rows(model, scales, estimate), scales, strict=False):
         squared = np.sum(rows.error.reshape(-1, 3) ** 2, axis=1)
-        share = float(np.mean(_KERNEL.weights(squared, np.full(len(squared), 3.0)) * squared)) / 3.0
-        out.append(max(scale * math.sqrt(share / _GAUSSIAN_SHARE), 1e-9))
+        out.append(max(scale * math.sqrt(_weighted_square(squared) / _GAUSSIAN), 1e-9))
     return out[0], out[1] if len(out) > 1 else scales[1]
 
 
@@ -241,7 +254,7 @@ def _finished(model: AlignmentModel, estimate: AlignmentEstimate, scales: tuple[
         rigid(estimate.rotation, estimate.centre - offset), rigid(estimate.body, estimate.point), estimate.offset_s,
         change @ covariance @ change.T, change @ lasting @ change.T, estimate.centre,
         (covariance + lasting)[TRANSLATION, TRANSLATION], scales[0], scales[1] if model.poses else math.nan, error,
-        inlier, kept, -jacobian[:, :, 9], places, device, model.duration_s, model.poses)
+        inlier, kept, -jacobian[:, :, OFFSET.start], places, device, model.duration_s, model.poses)
 
 
 def _covariance(rows: list[Rows], size: int) -> tuple[Array, Array]:
@@ -251,8 +264,8 @@ def _covariance(rows: list[Rows], size: int) -> tuple[Array, Array]:
     for each in rows:
         error, slopes = each.error.reshape(-1, 3), each.jacobian.reshape(-1, 3, size)
         squared = np.sum(error**2, axis=1)
-        weights = _KERNEL.weights(squared, np.full(len(squared), 3.0))
-        bend = np.where(weights < 1.0, 2.0 * weights**2 / (_NU + _DIMENSION), 0.0)
+        weights = _weights(squared)
+        bend = np.where(weights < 1.0, 2.0 * weights**2 / (KERNEL.parameter + AXES), 0.0)
         along = np.einsum("ni,nij->nj", error, slopes)
         hessian += np.einsum("n,nij,nik->jk", weights, slopes, slopes) - np.einsum("n,nj,nk->jk", bend, along, along)
         scores += weights[:, None] * along

@@ -23,8 +23,7 @@ from rhot_app.hand.motion.hand_state import STATE, TANGENT
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
 from rhot_app.hand.solvers.finger_ik import solve_fingers
-from rhot_app.hand.solvers.palm_before_camera import palms_before_camera
-from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, fit_palm
+from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, fit_palm, palms_before_camera
 from rhot_app.tracking.locate import locate_paired, rig_table
 from rhot_app.tracking.markers.marker_model import MarkerModel
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
