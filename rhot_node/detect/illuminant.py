@@ -38,8 +38,12 @@ SWITCHED = 0.12  # of warmth in one frame: no lamp drifts so fast
 STRENGTH_LEAST = 0.3  # of the chroma that a paint should show in this light: less is something else, or deep shade
 MAGNITUDE_MIN = 8.0  # grey levels of chroma below which a paint shows no hue
 
-RGB_FROM_YCC = np.array([[1.0, 0.0, 1.402], [1.0, -0.344136, -0.714136], [1.0, 1.772, 0.0]])
-YCC_FROM_RGB = np.array([[0.299, 0.587, 0.114], [-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]])
+KR, KB = 0.299, 0.114
+"""Shares of red and blue in luma (ITU-R BT.601)."""
+
+_LUMA = np.array([KR, 1.0 - KR - KB, KB])
+YCC_FROM_RGB = np.array([_LUMA, (np.eye(3)[2] - _LUMA) / (2.0 - 2.0 * KB), (np.eye(3)[0] - _LUMA) / (2.0 - 2.0 * KR)])
+RGB_FROM_YCC = np.linalg.inv(YCC_FROM_RGB)
 
 
 def gains_of(temperature_shift: float) -> Array:

@@ -1,4 +1,5 @@
-"""The record of an object's pose that another tracker measured: time, pose and covariance as bytes. docs/log.md."""
+"""Poses of objects that another tracker measured; no node sends them. Their record is docs/log.md's: time, pose and
+covariance as bytes. Their residual is `objects.motion.PoseResidual`."""
 
 from __future__ import annotations
 
