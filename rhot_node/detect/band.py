@@ -21,11 +21,8 @@ CROSS_MOMENT_MIN = 0.92
 """Least normalised cross moment E[u^2 w^2] / (E[u^2] E[w^2]) of a band. It is 1 for a rectangle, 2/3 for an ellipse and
 at most 0.84 for a capsule of any length."""
 
-# The wrist band's sag (`band_center`): a measured value within so many standard deviations of the last one is
-# taken in with this gain, any other as it is.
-SAG_GAIN, SAG_STEADY = 0.25, 5.0
 SAG_MOST = 0.3  # of half the band's length: what the sag may change before the outline is straightened anew
-SAG_SETTLE, SAG_JUMP = 4.0, 0.35  # frames that say what is no sag; px that it may jump in them
+SAG_SETTLE = 4.0  # frames that say what is no sag
 GAUSS_AT = 0.5 + 0.5 * np.polynomial.legendre.leggauss(4)[0]
 GAUSS_WEIGHT = 0.5 * np.polynomial.legendre.leggauss(4)[1]
 
@@ -184,8 +181,8 @@ def _band_result(region, coverage, gain, half_width, inverse, solution, result):
 # -- from frame to frame ----------------------------------------------------------------------------------------------
 
 @njit(**c.FAST)
-def mend_band(outline, noise, fitted, track):
-    """Place a band on its axis: by what its sag, smoothed, differs from that which its outline is straightened by.
+def mend_band(outline, fitted, track):
+    """Place a band on its axis: by what its sag differs from that which its outline is straightened by.
 
     The corners, which the outline rounds, look like a bend of their own: that is what the first frames measure, and
     it is taken off. False when the sag differs too much.
@@ -196,20 +193,16 @@ def mend_band(outline, noise, fitted, track):
     measured = sag_of(outline)
     outline.sag_frames += 1.0
     if outline.sag_frames <= SAG_SETTLE:
-        if outline.sag_frames > 1.0 and abs(measured - outline.sag_zero) > SAG_JUMP:
-            return False
         outline.sag_zero += (measured - outline.sag_zero) / outline.sag_frames
-    away = measured - outline.sag_zero - outline.sag
-    steady = SAG_STEADY * noise * math.sqrt(outline.sag_variance)
-    if outline.sag_frames > SAG_SETTLE:
-        outline.sag += (SAG_GAIN if abs(away) < steady else 1.0) * away
+    else:
+        outline.sag = measured - outline.sag_zero
     rest = 0.25 * math.pi * outline.sag
     sag = 0.25 * math.pi * (outline.bend + outline.sag)
     fitted.x += ay * rest
     fitted.y -= ax * rest
     track.sag_x, track.sag_y = -ay * sag, ax * sag
-    # (pi / 4)^2 of the smoothed sag's, and of that which was there at first, which no later frame tells anew.
-    along = 0.6 * outline.sag_variance * (1.0 + 1.0 / SAG_SETTLE + SAG_GAIN)
+    # Of the sag in this frame, of that which was there at first, and of its share that the first frames' mean has.
+    along = (0.25 * math.pi) ** 2 * outline.sag_variance * (2.0 + 1.0 / SAG_SETTLE)
     fitted.v_xx += ay * ay * along
     fitted.v_xy -= ax * ay * along
     fitted.v_yy += ax * ax * along

@@ -125,7 +125,7 @@ def follow(image, tracks, outlines, noises, work, reports):
         fitted.y += outline.axis_x * rest
         if not _outline(image, track, outline, noise, work):
             continue
-        if outline.rims > 0.0 and not mend_band(outline, noise, fitted, track):
+        if outline.rims > 0.0 and not mend_band(outline, fitted, track):
             continue
         _state(track, fitted, outline, noise, report)
         _learn_noise_inside(image, fitted, noises)

@@ -8,9 +8,9 @@ that `install` names. Its pixels are kept: a region is sampled without half a pi
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable
+import timeit
 from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -51,9 +51,6 @@ OVERLAP: Final = 0.3
 SAME: Final = 0.125
 """Part of a region's side: two palms that are less apart are one hand. It is a quarter of a hand's extent."""
 
-TRIES: Final = 5
-"""Of which the quickest is the cost."""
-
 HAND_SIGMA: Final = 0.004
 """Standard deviation of a landmark's own error, per axis, as a part of its region's side
 (`python benchmarks/hand_networks.py`)."""
@@ -63,10 +60,30 @@ NEXT_REGION: Final = 2.0, 0.1
 """Side of the region of a palm's box, and of landmarks, by the box's longer side; and by which part of its height the
 region is moved towards the fingers (MediaPipe's `RectTransformationCalculator`)."""
 
-PALM_LANDMARKS: Final = (0, 5, 9, 13, 17, 1, 2)
+
+class Landmark(IntEnum):
+    """MediaPipe's numbers of the landmarks that a hand's next region lies about: no outer joints, no fingertips."""
+
+    WRIST = 0
+    THUMB_CMC = 1
+    THUMB_MCP = 2
+    THUMB_IP = 3
+    INDEX_MCP = 5
+    INDEX_PIP = 6
+    MIDDLE_MCP = 9
+    MIDDLE_PIP = 10
+    RING_MCP = 13
+    RING_PIP = 14
+    LITTLE_MCP = 17
+    LITTLE_PIP = 18
+
+
+PALM_LANDMARKS: Final = (Landmark.WRIST, Landmark.INDEX_MCP, Landmark.MIDDLE_MCP, Landmark.RING_MCP,
+                         Landmark.LITTLE_MCP, Landmark.THUMB_CMC, Landmark.THUMB_MCP)
 """The landmarks that the palm detector finds, too, in its order."""
 
-_STEADY = (0, 1, 2, 3, 5, 6, 9, 10, 13, 14, 17, 18)  # the landmarks of the next region: no fingertips
+_PALM_BOX, _PALM_POINTS = 2, len(PALM_LANDMARKS)  # rows of two of the palm detector: centre and size, then points
+_ANCHORS = ((24, 2), (12, 6))  # of the palm detector: cells of a grid along a side, and anchors in each
 _SAMPLED_PX = 4.0  # a region of more px of the picture per px of the network is averaged before it is sampled
 _SMALLEST_PX = 8.0  # a region of less shows nothing
 
@@ -145,17 +162,10 @@ class HandNetworks:
 
     def cost_s(self, picture: Picture) -> tuple[float, float]:
         """How long a search for palms in such a picture takes, and the landmarks of one hand, s: the quickest of
-        `TRIES`, because whatever else the machine does makes it longer."""
+        several, because whatever else the machine does makes it longer."""
         whole = _whole(picture)
-
-        def quickest(work: Callable[[], object]) -> float:
-            times = []
-            for _ in range(TRIES):
-                begun = time.perf_counter()
-                work()
-                times.append(time.perf_counter() - begun)
-            return min(times)
-        return quickest(lambda: self._palms(picture, whole)), quickest(lambda: landmarks_in(self._hand, picture, whole))
+        return (min(timeit.repeat(lambda: self._palms(picture, whole), number=1)),
+                min(timeit.repeat(lambda: landmarks_in(self._hand, picture, whole), number=1)))
 
     def _add(self, hands: list[DetectedHand], picture: Picture, region: Region) -> None:
         """Add the hand of a region, if there is one, and if it is another one than those before."""
@@ -175,15 +185,16 @@ class HandNetworks:
         likely = np.flatnonzero(probability >= LEAST_PROBABILITY)
         likely = likely[np.argsort(-probability[likely], kind="stable")]
         # rows of centre, size and seven points, px of the input about the anchor
-        points = boxes.reshape(-1, 9, 2)[likely].astype(np.float64)
-        points[:, [0, *range(2, 9)]] += PALM_PX * self._anchors[likely][:, None]
+        points = boxes.reshape(-1, _PALM_BOX + _PALM_POINTS, 2)[likely].astype(np.float64)
+        placed = np.arange(points.shape[1]) != 1  # all but the size
+        points[:, placed] += PALM_PX * self._anchors[likely][:, None]
         into, palms = view.from_input(PALM_PX), []
         while len(likely):
             one = _overlaps(points[:, 0], points[:, 1]) > OVERLAP
             one[0] = True
             mean = np.average(points[one], axis=0, weights=probability[likely[one]])
             palms.append(_palm_region(mean[1] * view.side / PALM_PX,
-                                      mean[[0, *range(2, 9)]] @ into[:, :2].T + into[:, 2]))
+                                      mean[placed] @ into[:, :2].T + into[:, 2]))
             points, likely = points[~one], likely[~one]
         return palms
 
@@ -215,11 +226,12 @@ def landmarks_in(hand: Network, picture: Picture, region: Region) -> tuple[Array
 
 def next_region(landmarks: Array) -> Region:
     """The region in which the next picture shows the hand of these landmarks (21, 2) px."""
-    knuckles = 0.25 * (landmarks[5] + landmarks[13]) + 0.5 * landmarks[9]
-    x, y = knuckles - landmarks[0]
+    knuckles = (0.25 * (landmarks[Landmark.INDEX_MCP] + landmarks[Landmark.RING_MCP])
+                + 0.5 * landmarks[Landmark.MIDDLE_MCP])
+    x, y = knuckles - landmarks[Landmark.WRIST]
     turn = math.atan2(x, -y)
     c, s = math.cos(turn), math.sin(turn)
-    upright = landmarks[list(_STEADY)] @ np.array([[c, -s], [s, c]])
+    upright = landmarks[list(Landmark)] @ np.array([[c, -s], [s, c]])
     low, high = upright.min(axis=0), upright.max(axis=0)
     centre = np.array([[c, -s], [s, c]]) @ (0.5 * (low + high))
     return _region(centre, high - low, turn, *NEXT_REGION)
@@ -306,10 +318,9 @@ def _sampled(picture: Picture, region: Region, size: int) -> Tensor:
 
 
 def _anchors() -> Array:
-    """(2016, 2): centres of the palm detector's anchors, as a part of its input: two on a grid of 24 x 24, and six on
-    one of 12 x 12."""
+    """(2016, 2): centres of the palm detector's anchors, as a part of its input."""
     grids = []
-    for size, count in ((24, 2), (12, 6)):
+    for size, count in _ANCHORS:
         y, x = (np.mgrid[:size, :size] + 0.5) / size
         grids.append(np.repeat(np.stack([x, y], -1).reshape(-1, 2), count, axis=0))
     return np.concatenate(grids)
