@@ -127,7 +127,7 @@ PRIVATE_HOMES = ("/home", "/root")
 def run_command(command: Sequence[str]) -> str | None:
     """Run `command`; None when it succeeds, else what it complained of."""
     try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=START_S + 60)
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=START_S + WATCHDOG_S)
     except (OSError, subprocess.TimeoutExpired) as exc:
         return str(exc)
     return None if done.returncode == 0 else (done.stderr or done.stdout).strip()

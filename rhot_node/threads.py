@@ -17,6 +17,9 @@ T = TypeVar("T")
 FOREIGN: Final = (Exception, SystemExit)
 """What somebody else's program may raise: one that calls exit() must not end the thread that called it."""
 
+ANSWER_S: Final = 3.0
+"""How long another program may take to answer, to be connected to, or to end. Chosen."""
+
 HANG_S: Final = 2.0
 """A turn that takes longer hangs."""
 

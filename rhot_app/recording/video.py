@@ -27,15 +27,16 @@ from rhot_node.errors import NodeError, printable
 from rhot_node.files import MIB, decode_message, free_bytes, replacing
 from rhot_node.keys import KeyPair, connect_with
 from rhot_node.network.context import Context
+from rhot_node.threads import ANSWER_S
 from rhot_node.video.avi import read_stamps
 from rhot_node.video.recorder import READ_MAX, VideoInfo, VideoName
 
 PATIENCE_S: Final = 30.0
 """How long a node may be silent before its video is given up until the next try."""
 
-_ANSWER_S = 3.0
 _ANSWER_MAX = 8 * MIB  # bytes; the longest honest answer is a list of some ten thousand videos
 _LOOK_S = 0.5
+_PAUSE_S = 0.1  # before a connection is made anew
 
 COLUMNS = ("frame_number", "t_node_ns", "exposure_ns", "row_time_ns")
 
@@ -153,7 +154,7 @@ def _fetch(channel: _Channel, info: VideoInfo, target: Path, progress: Progress)
             have += len(data)
         file.flush()
         os.fsync(file.fileno())
-        progress(f"checking the video of {channel.node.name}", 0.99)
+        progress(f"checking the video of {channel.node.name}", 1.0)
         if _digest(part) != info.sha256:
             part.unlink()
             raise RecordingError(f"the video of node {channel.node.name} did not come as the node has it, so what came "
@@ -222,7 +223,7 @@ class _Channel:
         end_s = time.monotonic() + self._patience_s
         while True:
             try:
-                parts = self._ask_once(msgspec.json.encode(request), max(end_s - time.monotonic(), 0.1))
+                parts = self._ask_once(msgspec.json.encode(request), max(end_s - time.monotonic(), _PAUSE_S))
                 break
             except _SilentError:
                 if time.monotonic() >= end_s:
@@ -242,11 +243,11 @@ class _Channel:
         self._socket = socket
         with contextlib.suppress(zmq.ZMQError):
             socket.send(data, zmq.DONTWAIT)
-            if socket.poll(round(1e3 * min(_ANSWER_S, left_s))):
+            if socket.poll(round(1e3 * min(ANSWER_S, left_s))):
                 return socket.recv_multipart()
         socket.close()
         self._socket = None
-        time.sleep(min(0.1, left_s))
+        time.sleep(min(_PAUSE_S, left_s))
         raise _SilentError
 
     def _connect(self) -> zmq.Socket[bytes]:

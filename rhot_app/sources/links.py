@@ -18,7 +18,7 @@ from rhot_app.project import Rig
 from rhot_app.recording.raw_log import RecordKind, RecordSink
 from rhot_app.sources.key_exchange import KeyExchange
 from rhot_app.sources.lost_nodes import LostNodes
-from rhot_app.sources.node_link import NodeLink
+from rhot_app.sources.node_link import NodeLink, RigLinks
 from rhot_app.sources.poses.followed import FollowedObjects
 from rhot_app.sources.poses.open_source import why
 from rhot_app.sources.receiver import DatagramSink, Deliver, NodeReceiver, open_data_socket
@@ -267,7 +267,7 @@ class NodeLinks:
 # -- live nodes --------------------------------------------------------------------------------------------------------
 # A port and a thread for each, one more for clocks, start and stop.
 
-class UdpNodes:
+class UdpNodes(RigLinks):
     """`ObservationSource` of the rig's nodes. Receives as soon as it is made; admits frames once started."""
 
     live = True
@@ -276,8 +276,7 @@ class UdpNodes:
     def __init__(self, rig: Rig, own: KeyPair | None = None) -> None:
         """Open all ports; `own`: the master's keys, which paired nodes ask for. Raises SourceError when a port is taken
         or keys are missing; nothing stays open then."""
-        self.links = tuple(NodeLink(rig, camera) for camera in range(len(rig.nodes)))
-        self._starts = 0
+        super().__init__(rig)
         with contextlib.ExitStack() as stack:
             sockets = []
             for node in rig.nodes:
@@ -294,11 +293,6 @@ class UdpNodes:
         self._followed.start()
         self._commands.start_thread()
 
-    @property
-    def changes(self) -> int:
-        """Starts so far, and clocks that were set or came anew."""
-        return self._starts + sum(link.clock_changes for link in self.links)
-
     def deliver_to(self, deliver: Deliver) -> None:
         """Hand frames to `deliver` from now on, each camera's in its own thread."""
         for receiver in self.receivers:
@@ -309,17 +303,11 @@ class UdpNodes:
         """What is wrong with the trackers that follow objects. Links and receivers speak for themselves."""
         return self._followed.notices()
 
-    def configure(self, rig: Rig) -> None:
-        """Expect what `rig` says about markers and images; the network is as it was."""
-        for camera, link in enumerate(self.links):
-            link.node = rig.nodes[camera]
-            link.door.configure(rig, camera)
-
     def start(self, session: int) -> None:
         """Admit `session` and tell every node to stream it."""
         for link in self.links:
             link.want(session, time.monotonic_ns())
-        self._starts += 1
+        self.starts += 1
         self._commands.start(session)
 
     def stop(self) -> None:

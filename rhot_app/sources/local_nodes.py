@@ -28,13 +28,13 @@ from rhot_node.config import NodeSettings, load_settings, save_settings
 from rhot_node.errors import NodeError, SettingsError, system_sentence
 from rhot_node.keys import keys_path, pair_beforehand
 from rhot_node.logs import cut_log, log_to_stderr
+from rhot_node.threads import ANSWER_S
 
 log = logging.getLogger(__name__)
 
 READY_TIMEOUT_S = 300.0
 """The first start of all compiles the detector, minutes on a busy machine; later ones take about two seconds."""
 
-_END_TIMEOUT_S = 3.0
 _CLOSING_S = 0.5
 
 
@@ -126,7 +126,7 @@ class LocalNode:
         if self.alive:
             self._process.terminate()
             try:
-                self._process.wait(_END_TIMEOUT_S)
+                self._process.wait(ANSWER_S)
             except subprocess.TimeoutExpired:
                 self._process.kill()
         self._process.wait()

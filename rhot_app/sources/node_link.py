@@ -152,3 +152,22 @@ class NodeLink:
         """Whether neither an answer nor an accepted datagram came lately."""
         heard_ns = max(self.last_reply_ns or 0, self.door.last_t_receive_ns)
         return heard_ns == 0 or now_ns - heard_ns > SILENT_NS
+
+
+class RigLinks:
+    """What is known of all nodes of a rig, in its order. `starts`: sessions that began."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.links = tuple(NodeLink(rig, camera) for camera in range(len(rig.nodes)))
+        self.starts = 0
+
+    @property
+    def changes(self) -> int:
+        """Starts so far, and clocks that were set or came anew: the tracker must then forget."""
+        return self.starts + sum(link.clock_changes for link in self.links)
+
+    def configure(self, rig: Rig) -> None:
+        """Expect what `rig` says about markers and images; the network is as it was."""
+        for camera, link in enumerate(self.links):
+            link.node = rig.nodes[camera]
+            link.door.configure(rig, camera)

@@ -15,7 +15,7 @@ from rhot_app.barehand.observations import SliceRequest
 from rhot_app.errors import RecordingError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, RecordSink
-from rhot_app.sources.node_link import CLOCK_REPLY, NodeLink
+from rhot_app.sources.node_link import CLOCK_REPLY, RigLinks
 from rhot_app.sources.receiver import Deliver, NodeReceiver, to_nobody
 from rhot_app.tracking.kinds.poses import decode_pose
 from rhot_app.tracking.tracker import CameraFrame
@@ -26,14 +26,13 @@ from rhot_node.wire.codec import decode_verified
 from rhot_node.wire.messages import ClockReply, ClockRequest, Slices, Start
 
 
-class LogValidator:
+class LogValidator(RigLinks):
     """Takes records in the order written and gives the frames that live nodes would have given."""
 
     def __init__(self, rig: Rig) -> None:
-        self.links = tuple(NodeLink(rig, camera) for camera in range(len(rig.nodes)))
+        super().__init__(rig)
         self.unknown_nodes = 0  # records of nodes that the rig does not have
         self.gaps = 0  # records that the disk was too slow for
-        self.starts = 0
         self._by_id = {link.node.node_id: link for link in self.links}
         for link in self.links:
             link.door.open = decode_verified
@@ -45,11 +44,6 @@ class LogValidator:
         self.starts += 1
         for link in self.links:
             link.clock.reset()
-
-    @property
-    def changes(self) -> int:
-        """Sessions so far, and clocks that were set: the tracker must then forget."""
-        return self.starts + sum(link.clock_changes for link in self.links)
 
     def feed(self, record: Record) -> CameraFrame | None:
         """Take one record in; a frame when it holds one that is admitted."""
@@ -101,13 +95,14 @@ class LogValidator:
                 asked.take_reply(message, record.t_master_ns)
 
 
-class LogReplay:
+class LogReplay(LogValidator):
     """`ObservationSource` of a log. `speed` 1 is real time; None is as fast as the tracker takes the frames."""
 
     live = False
 
     def __init__(self, path: Path, rig: Rig, speed: float | None = 1.0) -> None:
         """Open the log; raises RecordingError when it is none."""
+        super().__init__(rig)
         self.over = False  # the log was played as far as it can be read
         self.failure = ""  # why that is not its end
         self.played_s = 0.0  # of the log's own time, from its first datagram
@@ -117,16 +112,9 @@ class LogReplay:
         LogReader(path).close()
         self._path = path
         self._speed = speed
-        self._door = LogValidator(rig)
-        self.links = self._door.links
         self._notice = ""
         self._ending = threading.Event()
         self._task: OneShotThread | None = None
-
-    @property
-    def changes(self) -> int:
-        """Sessions in the log so far, and clocks that were set."""
-        return self._door.changes
 
     def deliver_to(self, deliver: Deliver) -> None:
         """Hand frames to `deliver` from now on, in the replay's own thread."""
@@ -136,19 +124,13 @@ class LogReplay:
         """That the log is over, damaged or torn."""
         return [self._notice] if self._notice else []
 
-    def configure(self, rig: Rig) -> None:
-        """Go on with another calibration."""
-        for camera, link in enumerate(self.links):
-            link.node = rig.nodes[camera]
-            link.door.configure(rig, camera)
-
     def start(self, session: int) -> None:
         """Replay from the beginning; the log brings its own sessions, so `session` is not looked at."""
         self.stop()
         self._notice = self.failure = ""
         self.over = False
         self._ending.clear()
-        self._door.rewind()
+        self.rewind()
         self._task = OneShotThread("replays the log", self._run)
 
     def stop(self) -> None:
@@ -199,7 +181,7 @@ class LogReplay:
                 return False
             if record.kind is RecordKind.DATAGRAM:
                 self.played_s = 1e-9 * elapsed_ns
-            frame = self._door.feed(record)
+            frame = self.feed(record)
             if frame is not None:
                 self._deliver([frame])
         return True

@@ -22,7 +22,7 @@ from rhot_app.sources.poses.open_source import open_source
 from rhot_app.sources.poses.source import ForeignPose, PoseSource
 from rhot_app.sources.receiver import Deliver, to_nobody
 from rhot_app.tracking.kinds.poses import encode_pose
-from rhot_node.threads import FOREIGN, Worker
+from rhot_node.threads import ANSWER_S, FOREIGN, Worker
 
 log = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ OpenSource = Callable[[str, str], PoseSource]
 POLL_S = 4e-3
 """s between two looks: half of the period of a tracker of 125 Hz."""
 
-AGAIN_S = 3.0
+AGAIN_S = ANSWER_S
 """s after which a source that failed or ended is opened again."""
 
 

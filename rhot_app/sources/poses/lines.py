@@ -65,7 +65,7 @@ def parse_line(line: bytes) -> PoseLine | None:
         raise ValueError("a number that is not finite")
     if max(map(abs, numbers[:3])) > FARTHEST_M:
         raise ValueError("a place beyond 1 km; metres are needed")
-    if not 0.9 < math.hypot(*numbers[3:]) < 1.1:
+    if abs(math.hypot(*numbers[3:]) - 1.0) > 0.1:
         raise ValueError("a quaternion that is not of length 1")
     return PoseLine(t_s, words[1], rigid(rotation_from_quaternion(numbers[3:]), numbers[:3]))
 

@@ -18,6 +18,7 @@ from rhot_app.sources.poses.lines import LinePoses
 from rhot_app.sources.poses.source import FilePoses, PoseSource
 from rhot_node.errors import printable
 from rhot_node.files import KIB
+from rhot_node.threads import ANSWER_S
 from rhot_node.wire.messages import PORT_MAX
 
 LIBSURVIVE: tuple[str, ...] = ("survive-cli", "--record-stdout", "1", "--record-rawlight", "0", "--record-imu", "0",
@@ -26,8 +27,6 @@ LIBSURVIVE: tuple[str, ...] = ("survive-cli", "--record-stdout", "1", "--record-
 
 _READ_BYTES = 64 * KIB
 _READS = 16  # of one call: what comes faster than a mebibyte a call waits for the next
-_END_S = 2.0
-_CONNECT_S = 3.0
 
 
 def why(exc: OSError | ValueError) -> str:
@@ -77,14 +76,14 @@ class ProgramLines:
         return b"".join(parts)
 
     def close(self) -> None:
-        """End the program, and insist after two seconds."""
+        """End the program, and insist after `ANSWER_S`."""
         if self._errors.closed:
             return
         self._end = self._end or f"{self.name} was ended."
         if self._process.poll() is None:
             self._process.terminate()
             try:
-                self._process.wait(_END_S)
+                self._process.wait(ANSWER_S)
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
@@ -93,7 +92,7 @@ class ProgramLines:
 
     def _why_ended(self) -> str:
         try:
-            code: int | None = self._process.wait(_END_S)
+            code: int | None = self._process.wait(ANSWER_S)
         except subprocess.TimeoutExpired:
             return f"{self.name} has closed its standard output. Start it again."
         self._errors.seek(max(0, self._errors.seek(0, os.SEEK_END) - 1000))
@@ -109,7 +108,7 @@ class TcpLines:
         """Connect. Raises SourceError when nobody answers in three seconds."""
         self.name, self.end = f"tcp:{host}:{port}", ""
         try:
-            self._socket = socket.create_connection((host, port), _CONNECT_S)
+            self._socket = socket.create_connection((host, port), ANSWER_S)
         except (OSError, ValueError) as exc:  # ValueError: a name that no host can have
             raise SourceError(f"{printable(self.name)}: nobody answers ({why(exc)}). Start the program that serves "
                               "poses there.") from exc
