@@ -25,8 +25,8 @@ import msgspec
 import numpy as np
 
 from rhot_app.errors import RecordingError, note_loss
-from rhot_app.project import Rig, parse_rig
-from rhot_node.files import JSON_BYTES_MAX, KIB, MIB, decode_json, open_input
+from rhot_app.project import Rig, load_rig, parse_rig
+from rhot_node.files import JSON_BYTES_MAX, KIB, MIB, decode_json, open_input, replacing
 from rhot_node.terminal import add_examples
 from rhot_node.wire.fields import TIME_MAX_NS, UDP_MAX
 
@@ -484,11 +484,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write every sound record, also those of kinds that this version does not know. Raises RecordingError."""
-    from rhot_app.errors import RecordingError
-    from rhot_app.project import load_rig
-    from rhot_app.recording.raw_log import END, LogReader, encode_header
-    from rhot_node.files import replacing
-
     if args.out.exists():
         raise RecordingError(f"{args.out}: exists already; a log is never written over. Choose another name.")
     rig = None if args.rig is None else load_rig(args.rig)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import RecordingError
-from rhot_node.capture.paced import IMAGE_SUFFIXES
+from rhot_node.capture.paced import image_files
 from rhot_node.capture.yuv import HEADER_NAME, YuvHeader, read_header, read_images
 from rhot_node.detect.image import to_bgr
 from rhot_node.errors import CameraError, PictureError, VideoError
@@ -51,8 +51,7 @@ def recorded_pictures(path: Path) -> RecordedPictures:
             header = read_header(path)
             next(read_images(path))
             return RecordedPictures(path, (header.width, header.height), len(header.times_ns), header=header)
-        files = tuple(sorted(path.iterdir())) if path.is_dir() else (path,)
-        if files := tuple(one for one in files if one.suffix.lower() in IMAGE_SUFFIXES):
+        if files := image_files(path):
             height, width = read_picture(files[0]).shape[:2]
             return RecordedPictures(path, (width, height), len(files), files=files)
         if path.is_dir():

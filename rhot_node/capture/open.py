@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Reporting, Rewindable
-from rhot_node.capture.paced import IMAGE_SUFFIXES, ImageFiles, ImageSource, PacedCamera, VideoFile
+from rhot_node.capture.paced import IMAGE_SUFFIXES, ImageFiles, ImageSource, PacedCamera, VideoFile, image_files
 from rhot_node.capture.stream import StreamCamera
 from rhot_node.capture.webcam import NetworkCamera, Webcam
 from rhot_node.capture.yuv import YuvRecording
@@ -94,15 +94,13 @@ def data_set_settings(spec: str) -> bool:
 
 
 def _files(path: Path, spec: str) -> ImageSource:
-    if path.is_dir():
-        images = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in IMAGE_SUFFIXES)
-        if not images:
-            raise CameraError(f"{path}: a folder without images ({', '.join(sorted(IMAGE_SUFFIXES))}). "
-                              "A yuv recording is opened as yuv:FOLDER.")
-        return ImageFiles(images)
     if not path.exists():
         raise CameraError(f"camera {spec!r}: no such file or folder. See rhot-node --help for what a camera may be.")
-    return ImageFiles([path]) if path.suffix.lower() in IMAGE_SUFFIXES else VideoFile(path)
+    images = image_files(path)
+    if path.is_dir() and not images:
+        raise CameraError(f"{path}: a folder without images ({', '.join(sorted(IMAGE_SUFFIXES))}). A yuv recording is "
+                          "opened as yuv:FOLDER.")
+    return ImageFiles(images) if images else VideoFile(path)
 
 
 def _split_options(text: str, spec: str, *known: str) -> tuple[str, dict[str, str]]:

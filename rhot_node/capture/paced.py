@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -16,6 +17,12 @@ from rhot_node.errors import CameraError, PictureError
 from rhot_node.pictures import open_video, read_picture
 
 IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp"})
+
+
+def image_files(path: Path) -> tuple[Path, ...]:
+    """The images that a path names: itself, or those of a folder in the order of their names."""
+    files = sorted(path.iterdir()) if path.is_dir() else (path,)
+    return tuple(one for one in files if one.suffix.lower() in IMAGE_SUFFIXES)
 
 
 class ImageSource(Protocol):
@@ -45,7 +52,7 @@ class ImageFiles:
 
     fps: float | None = None
 
-    def __init__(self, paths: list[Path]) -> None:
+    def __init__(self, paths: Sequence[Path]) -> None:
         self._paths = paths
         self._index = -1
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rhot_node.capture.paced import IMAGE_SUFFIXES, ImageFiles, ImageSource, VideoFile
+from rhot_node.capture.paced import IMAGE_SUFFIXES, ImageFiles, ImageSource, VideoFile, image_files
 from rhot_node.capture.yuv import HEADER_NAME, read_images
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import YuvImage, from_bgr
@@ -97,18 +97,14 @@ def detect_all(path: Path, markers: MarkerSet, detector_name: str, *, list_blobs
 
 def _open(path: Path) -> tuple[Iterator[NamedImage], bool]:
     """The images of `path`, and whether they follow each other in time."""
-    if path.is_dir():
-        if (path / HEADER_NAME).exists():
-            return ((None, image) for image in read_images(path)), True
-        files = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in IMAGE_SUFFIXES)
-        if not files:
-            raise CameraError(f"{path}: a folder without images ({', '.join(sorted(IMAGE_SUFFIXES))}).")
-        return _decoded(path, ImageFiles(files), [file.name for file in files]), False
     if not path.exists():
         raise CameraError(f"{path}: no such file or folder.")
-    if path.suffix.lower() in IMAGE_SUFFIXES:
-        return _decoded(path, ImageFiles([path]), [path.name]), False
-    return _decoded(path, VideoFile(path), []), True
+    if (path / HEADER_NAME).exists():
+        return ((None, image) for image in read_images(path)), True
+    files = image_files(path)
+    if path.is_dir() and not files:
+        raise CameraError(f"{path}: a folder without images ({', '.join(sorted(IMAGE_SUFFIXES))}).")
+    return _decoded(path, ImageFiles(files) if files else VideoFile(path), [file.name for file in files]), not files
 
 
 def _decoded(path: Path, source: ImageSource, names: list[str]) -> Iterator[NamedImage]:
