@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 RESTART_AFTER: Final = 10
 """Failures in a row after which a part begins anew, as it may be in any state: five frame periods of two cameras, after
-which a hand counts as lost (`estimator.LOST_AFTER_PERIODS`)."""
+which a hand counts as lost (`estimation.track.LOST_PERIODS`)."""
 
 
 @dataclass(slots=True)

@@ -31,7 +31,7 @@ finger's breadth."""
 
 RELOCALISATION_LOG_ODDS = 7.0
 """Log odds by which another pose must be better than the predicted one: what the surface's own error changes them by.
-By estimate, that is 0.5 mm along each side of a finger and 1 mm along the palm (`contour_residual.COMMON`), at 0.5 m
+By estimate, that is 0.5 mm along each side of a finger and 1 mm along the palm, at 0.5 m
 before two cameras with a twelfth of the image foreground."""
 
 LOCAL_SEARCH_S = 0.2

@@ -214,10 +214,11 @@ _PLAIN = ("states_per_s", "measured_share", "predicted_3_sd_share")
 def accuracy(track: TrackedStates, off: Deviations, truth: Truth, worn: WornMarkers) -> Figures:
     """The figures of one run.
 
-    `tip_visible`: fingertips whose marker both cameras truly see, whatever the tracker says of them; `tip_measured`:
-    those that it calls measured; `tip_all`: every state; `tip_display`: of the newest state at each tick of a display,
-    against the truth at the tick; `tip_predicted`: of what the tracker predicts at the tick, and which part of
-    its axes is within three of its stated standard deviations. `angles`: of the fingers that wear a marker.
+    ``tip_visible``: fingertips whose marker both cameras truly see, whatever the tracker says of them;
+    ``tip_measured``: those that it calls measured; ``tip_all``: every state; ``tip_display``: of the newest state at
+    each tick of a display, against the truth at the tick; ``tip_predicted``: of what the tracker predicts at the tick,
+    and which part of its axes is within three of its stated standard deviations. `angles`: of the fingers that wear a
+    marker.
     """
     tips = distances(off.tips)
     ahead, stated = predicted(track, truth, worn)

@@ -120,7 +120,7 @@ def list_devices(folder: Path = Path("/dev"), ioctl: Ioctl = fcntl.ioctl) -> tup
 @dataclass(frozen=True, slots=True)
 class Automatics:
     """What a driver says of its automatic modes now; None where it does not. `exposure`: the camera chooses its
-    exposure time, which may be longer than a frame in the dark (`exposure_dynamic_framerate`)."""
+    exposure time, which may be longer than a frame in the dark (V4L2's ``exposure_dynamic_framerate``)."""
 
     exposure: bool | None = None
     white_balance: bool | None = None

@@ -46,7 +46,7 @@ PART: Final = 0.6
 a small or far hand has too few px. Five of them cover it."""
 
 OVERLAP: Final = 0.3
-"""Intersection over union from which two boxes are of one palm (MediaPipe's `min_suppression_threshold`)."""
+"""Intersection over union from which two boxes are of one palm (MediaPipe's ``min_suppression_threshold``)."""
 
 SAME: Final = 0.125
 """Part of a region's side: two palms that are less apart are one hand. It is a quarter of a hand's extent."""
@@ -58,7 +58,7 @@ HAND_SIGMA: Final = 0.004
 PALM_REGION: Final = 2.6, 0.5
 NEXT_REGION: Final = 2.0, 0.1
 """Side of the region of a palm's box, and of landmarks, by the box's longer side; and by which part of its height the
-region is moved towards the fingers (MediaPipe's `RectTransformationCalculator`)."""
+region is moved towards the fingers (MediaPipe's ``RectTransformationCalculator``)."""
 
 
 class Landmark(IntEnum):

@@ -17,7 +17,7 @@ LEFT, NONE = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
 
 
 def pause(seconds: float) -> None:
-    """Let Qt run. `QTest.qWait` would block the other Python threads meanwhile."""
+    """Let Qt run. ``QTest.qWait`` would block the other Python threads meanwhile."""
     loop = QEventLoop()
     QTimer.singleShot(round(1000 * seconds), loop.quit)
     loop.exec()

@@ -179,7 +179,7 @@ def _search(gray: Gray, size: tuple[int, int], scale: float, flags: int) -> Arra
 
 
 def in_order(gray: Gray, grid: Array) -> Array:
-    """`grid` (rows, cols, 2) px counted as `board.Chessboard` says, whatever end the search began at."""
+    """`grid` (rows, cols, 2) px counted as `boards.Chessboard` says, whatever end the search began at."""
     if not _right_handed(grid):
         grid = grid[:, ::-1]
     turns = range(4) if grid.shape[0] == grid.shape[1] else (0, 2)

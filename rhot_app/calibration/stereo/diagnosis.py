@@ -2,7 +2,7 @@
 
 A plain chessboard cannot show by itself that a picture is mirrored: with one odd and one even number of corners it
 is its own mirror image, colours included. But one mirrored camera sees the board move as no rigid rig could, and turned
-back it fits; what two mirrored cameras show is in `stereo_checks`.
+back it fits; what two mirrored cameras show is in `stereo.checks`.
 """
 
 from __future__ import annotations

@@ -85,7 +85,7 @@ class ShotFigures:
 
 @dataclass(frozen=True, slots=True)
 class StereoFigures:
-    """All figures of a solved rig. `distances_px` (M,) of all corners; `error_m` expected in space at
+    """All figures of a solved rig. `rms_px` of all corners; `error_m` expected in space at
     `WORKING_DISTANCE_M`: by the calibration, and by `MARKER_NOISE_PX` in the pictures. `tilt_rad` the largest angle
     between two boards; `error_inflation` of the shots, 1 where independent corner errors explain all: it is in all
     standard deviations; `board_errors` how far the board is from its drawing, None when the pictures show nothing;

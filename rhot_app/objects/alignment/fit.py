@@ -80,7 +80,7 @@ class AlignmentFit:
     """A solved alignment.
 
     `covariance` (10, 10) or (13, 13), by the noise of the residuals, and `lasting`, by errors that last (LASTING_M), in
-    the order of `alignment_model.TRANSLATION`. `centre` (3,) m, rig frame, is the middle of the motion;
+    the order of `alignment.model.TRANSLATION`. `centre` (3,) m, rig frame, is the middle of the motion;
     `centre_covariance` (3, 3) m^2 of a position there, by both. `noise_m` and `noise_rad` (NaN without poses): standard
     deviation of an axis' residual. `errors` (N, 3) m, `inlier` (N,); `kept`: share of the samples that agree with their
     neighbours. `velocity` (N, 3) m/s and `places` (N, 3) m of the body, rig frame; `device` (N, 3, 3)

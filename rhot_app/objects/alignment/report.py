@@ -57,7 +57,7 @@ class Coverage:
 class AlignmentReport:
     """A solved alignment with its coverage and verdict.
 
-    `covariance` (n, n) in the order of `alignment_model.TRANSLATION`, by noise and by errors that last. Of it
+    `covariance` (n, n) in the order of `alignment.model.TRANSLATION`, by noise and by errors that last. Of it
     `place_sd_m`: of a position in the middle of the motion; `rotation_sd_rad`; `point_sd_m`: of tracker_from_body;
     `offset_sd_s`. `scale`: size of the foreign world in the rig's metres.
     """

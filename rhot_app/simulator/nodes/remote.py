@@ -149,7 +149,7 @@ class TwinRemote:
 
     def lamp(self, *, brightness: float | None = None, kelvin: float | None = None, mains_hz: float | None = None,
              flicker: float | None = None) -> TwinState:
-        """Change the room's lamp; see `lamp.Lamp`."""
+        """Change the room's lamp; see `camera_controls.Lamp`."""
         return self._ask(LampRequest(brightness, kelvin, mains_hz, flicker), ANSWER_S)
 
     def cover(self, *cameras: str) -> TwinState:

@@ -1,0 +1,76 @@
+"""Names and files that docstrings and comments refer to in backticks are there."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PROSE = re.compile(r'("""|\'\'\')(.*?)\1|#[^\n]*', re.DOTALL)
+REFERENCE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
+PATH = re.compile(r"(\./)?([\w.-]+/)+[\w.-]+\.(py|md|json|toml)")
+NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
+WORD = re.compile(r"[A-Za-z_]\w*")
+OTHERS = sys.stdlib_module_names | {"cv2", "msgspec", "numba", "numpy", "scipy", "zmq"}
+
+
+class Repository:
+    """Words of its code and data, of each module by the ends of its dotted path, and the ends of all files' paths."""
+
+    def __init__(self) -> None:
+        listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True,
+                                check=True).stdout.split()
+        self.words, self.modules, self.paths = set[str](), dict[str, set[str]](), set[str]()
+        self.texts: dict[str, str] = {}
+        for path in listed:
+            parts = path.split("/")
+            self.paths.update("/".join(parts[first:last]) for first in range(len(parts))
+                              for last in range(first + 1, len(parts) + 1))
+            self.words.update(WORD.findall(path))
+            if path.endswith((".py", ".json", ".toml", ".js", ".html")) and (ROOT / path).exists():
+                self._read(path, (ROOT / path).read_text(errors="ignore"))
+
+    def _read(self, path: str, text: str) -> None:
+        if not path.endswith(".py"):
+            self.words.update(WORD.findall(text))
+            return
+        words = set(WORD.findall(PROSE.sub(" ", text)))
+        self.words |= words
+        self.texts[path] = text
+        parts = path.removesuffix("/__init__.py").removesuffix(".py").split("/")
+        for first in range(len(parts)):
+            self.modules.setdefault(".".join(parts[first:]), set()).update(words)
+
+    def lacks(self, reference: str) -> bool:
+        """Whether it is a path or a name that is not there. Of `module.NAME` and `module.Class` the module has it."""
+        if PATH.fullmatch(reference):
+            return reference.removeprefix("./") not in self.paths
+        if not NAME.fullmatch(reference):
+            return False
+        prefix, _, last = reference.rpartition(".")
+        if reference.split(".")[0] in OTHERS:
+            return False
+        if any(len(word) > 2 and word not in self.words for word in reference.split(".")):
+            return True
+        return bool(prefix) and prefix.islower() and last[0].isupper() and last not in self.modules.get(prefix, ())
+
+
+def missing(repository: Repository, texts: dict[str, str]) -> list[str]:
+    """Where each reference stands that leads nowhere."""
+    return [f"{path}:{text.count(chr(10), 0, prose.start() + found.start()) + 1}: {found[1]}"
+            for path, text in texts.items() for prose in PROSE.finditer(text)
+            for found in REFERENCE.finditer(prose[0]) if repository.lacks(found[1].removesuffix("()"))]
+
+
+def test_what_is_referred_to_is_there() -> None:
+    repository = Repository()
+    assert len(repository.texts) > 1000
+    elsewhere = "geometry.camera.Outcome"
+    nowhere = "".join(("no", "thing_of", "_the_kind"))
+    stale = {"a.py": f'"""See `{nowhere}`, `triangulate`, `geometry.triangulate.Outcome`, `tracking/locate.py`."""\n'
+                     f"x = 1  # as `{elsewhere}`, `{nowhere}.triangulate`, `tracking/{nowhere}.py`\n"}
+    assert missing(repository, stale) == [f"a.py:1: {nowhere}", f"a.py:2: {elsewhere}",
+                                          f"a.py:2: {nowhere}.triangulate", f"a.py:2: tracking/{nowhere}.py"]
+    assert not missing(repository, repository.texts)
