@@ -36,10 +36,12 @@ PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", 
 """Names of a lens's parameters in their order; the distortion in OpenCV's."""
 LENS = len(PARAMETERS)
 """How many parameters a lens has."""
-PLAIN = 9
+PLAIN = PARAMETERS.index("k4")
 """How many of them a lens of the usual kind has: those of a wide one follow."""
-TANGENTIAL = (6, 7)
+TANGENTIAL = PARAMETERS.index("p1"), PARAMETERS.index("p2")
 """Where p1 and p2 stand."""
+_RADIAL = tuple((PARAMETERS.index(above), PARAMETERS.index(below))
+                for above, below in (("k1", "k4"), ("k2", "k5"), ("k3", "k6")))  # by their power of r2
 REACH = LENS
 """In a row of intrinsics, after the parameters: the squared radius x^2 + y^2 up to which the lens is invertible."""
 
@@ -228,7 +230,7 @@ def linearise_lenses(rays: Array, lenses: Array) -> tuple[Array, Array, Array]:
         by_lens[i, 0, 6], by_lens[i, 1, 6] = fx * 2.0 * x * y, fy * (r2 + 2.0 * y * y)
         by_lens[i, 0, 7], by_lens[i, 1, 7] = fx * (r2 + 2.0 * x * x), fy * 2.0 * x * y
         power = below
-        for above_at, below_at in ((4, 9), (5, 10), (8, 11)):
+        for above_at, below_at in _RADIAL:
             power *= r2
             by_lens[i, 0, above_at], by_lens[i, 1, above_at] = fx * x * power, fy * y * power
             by_lens[i, 0, below_at] = -fx * x * power * above * below

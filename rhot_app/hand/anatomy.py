@@ -107,7 +107,7 @@ class HandAnatomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if set(self.fingers) != set(FINGERS):
             raise ValueError(f"fingers must be exactly {', '.join(FINGERS)}; got {', '.join(sorted(self.fingers))}")
         for name, finger in self.fingers.items():
-            expected = 5 if name == "thumb" else 4
+            expected = sum(angle.startswith(name) for angle in ANGLES)
             if len(finger.limits_deg) != expected:
                 raise ValueError(f"fingers.{name}.limits_deg needs {expected} pairs, got {len(finger.limits_deg)}")
             if any(low > high for low, high in finger.limits_deg):

@@ -114,10 +114,12 @@ def hand_table(anatomy: HandAnatomy) -> HandTable:
         base = 1e-3 * np.array(finger.base_mm, dtype=np.float64)
         fixed, turn = rigid_rows(ROOT, len(rows), euler_zyx(*np.radians(finger.base_rotation_deg)), base)
         rows += fixed
-        moving = _thumb_rows if index == 0 else _finger_rows
-        finger_rows, joint_rows = moving(len(rows), ANGLE_SLICES[index].start, finger, turn)
-        joints += [(row, (0.0, 0.0, 0.0)) for row in (len(rows) - 1, *joint_rows)]
-        rows += finger_rows
+        joints.append((len(rows) - 1, (0.0, 0.0, 0.0)))
+        for angle, (length, twist) in enumerate(_links(name, finger), ANGLE_SLICES[index].start):
+            rows.append(DhRow(len(rows) - 1, theta=turn, a=length, alpha=twist, angle=angle))
+            turn = 0.0
+            if length > 0.0:
+                joints.append((len(rows) - 1, (0.0, 0.0, 0.0)))
         markers.append((len(rows) - 1, (1e-3 * (finger.marker_mm - finger.bones_mm[2]), 0.0, 0.0)))
     return HandTable(rows, joints, markers)
 
@@ -129,23 +131,14 @@ def _compile_hand(anatomy: HandAnatomy) -> DhArrays:
     return compile_table(rows, joints + markers)
 
 
-def _finger_rows(first: int, angle: int, finger: FingerAnatomy, turn: float) -> tuple[list[DhRow], list[int]]:
-    """Abduction about z, then three flexions about the common hinge axis; and the rows ending at PIP, DIP, tip."""
-    proximal, medial, distal = (1e-3 * bone for bone in finger.bones_mm)
-    return [DhRow(first - 1, theta=turn, alpha=-math.pi / 2, angle=angle),
-            DhRow(first, a=proximal, angle=angle + 1),
-            DhRow(first + 1, a=medial, angle=angle + 2),
-            DhRow(first + 2, a=distal, angle=angle + 3)], [first + 1, first + 2, first + 3]
-
-
-def _thumb_rows(first: int, angle: int, finger: FingerAnatomy, turn: float) -> tuple[list[DhRow], list[int]]:
-    """Two saddle joints (CMC, MCP) of abduction and flexion, then the IP hinge; rows ending at MCP, IP, tip."""
-    metacarpal, proximal, distal = (1e-3 * bone for bone in finger.bones_mm)
-    return [DhRow(first - 1, theta=turn, alpha=-math.pi / 2, angle=angle),
-            DhRow(first, a=metacarpal, alpha=math.pi / 2, angle=angle + 1),
-            DhRow(first + 1, alpha=-math.pi / 2, angle=angle + 2),
-            DhRow(first + 2, a=proximal, angle=angle + 3),
-            DhRow(first + 3, a=distal, angle=angle + 4)], [first + 1, first + 3, first + 4]
+def _links(name: str, finger: FingerAnatomy) -> list[tuple[float, float]]:
+    """Length, m, and twist, rad, of the row that each angle turns. A finger abducts about z, then flexes about its
+    common hinge axis. A thumb has two saddle joints (CMC, MCP) of abduction and flexion, then the IP hinge."""
+    first, second, last = (1e-3 * bone for bone in finger.bones_mm)
+    across = -0.5 * math.pi
+    if name == "thumb":
+        return [(0.0, across), (first, -across), (0.0, across), (second, 0.0), (last, 0.0)]
+    return [(0.0, across), (first, 0.0), (second, 0.0), (last, 0.0)]
 
 
 # -- variants with fewer degrees of freedom ----------------------------------------------------------------------------

@@ -63,16 +63,12 @@ def _view(model: ArticulatedModel, posed: PosedObject, view: Array) -> Image:
     low, high = flat.min(axis=0), flat.max(axis=0)
     scale = SIZE_PX / (MARGIN * max(*(high - low)[:2], 1e-3))  # px/m
     image: Image = np.full((SIZE_PX, SIZE_PX, 3), BACKGROUND, np.uint8)
-    painted = []
-    for index, body in enumerate(model.bodies):
-        outlines = list(_outlines(body, view @ posed.world_from(body)))
-        painted += [(outlines[0][0][:, 2].mean(), index, outlines)] if outlines else []
-    for _, index, outlines in sorted(painted, key=lambda one: one[0]):
+    bodies = [list(_outlines(body, view @ posed.world_from(body))) for body in model.bodies if body.shape is not None]
+    for outlines in sorted(bodies, key=lambda one: float(one[0][0][:, 2].mean())):
         for points, light in outlines:
             pixels = 0.5 * SIZE_PX + scale * (points - 0.5 * (low + high))[:, :2] * [1.0, -1.0]
             hull = cv2.convexHull(np.rint(pixels * (1 << _SUBPIXEL_BITS)).astype(np.int32))
-            shade = (1.0 - 0.1 * (index % 3)) * (0.4 + 0.6 * light)
-            cv2.fillConvexPoly(image, hull, (shade * SKIN_RGB).tolist(), cv2.LINE_8, _SUBPIXEL_BITS)
+            cv2.fillConvexPoly(image, hull, (0.5 * (1.0 + light) * SKIN_RGB).tolist(), cv2.LINE_8, _SUBPIXEL_BITS)
     return image
 
 

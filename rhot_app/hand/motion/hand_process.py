@@ -23,6 +23,7 @@ from rhot_app.estimation.se3 import PoseState, retract
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE, state_at
 from rhot_app.hand.motion.null_space import most_probable_pose
+from rhot_app.hand.skeleton import ANGLES
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,8 @@ the fastest one."""
 BIAS_S = 1.0
 """s: correlation time of the paint biases: hands turn so that other paint shows."""
 
-_GROUPS = np.array([0] * 3 + [1] * 3 + [2] * 21)
+_COUNT = len(ANGLES)
+_GROUPS = np.repeat((0, 1, 2), (3, 3, _COUNT))
 
 
 class HandProcess(PoseState):
@@ -156,11 +158,11 @@ def _rates(state, information, spread, slowest, fastest, out):
         total = speed / spread[group] ** 2 + math.sqrt(acceleration / 3.0) / spread[group]
         out[group] = min(math.sqrt(slowest[group] ** 2 + total), fastest[group])
     speed = acceleration = 0.0
-    for i in range(21):
-        for j in range(21):
+    for i in range(_COUNT):
+        for j in range(_COUNT):
             speed += v[6 + i] * information[i, j] * v[6 + j]
             acceleration += a[6 + i] * information[i, j] * a[6 + j]
-    total = 3.0 * speed / 21.0 + math.sqrt(max(acceleration, 0.0) / 21.0)
+    total = 3.0 * speed / _COUNT + math.sqrt(max(acceleration, 0.0) / _COUNT)
     out[2] = min(math.sqrt(slowest[2] ** 2 + total), fastest[2])
 
 
@@ -184,8 +186,8 @@ def _predict(state, covariance, dt, mean, pose_covariance, information, spread, 
                 for i in range(6):
                     group = _GROUPS[i]
                     covariance[POSE * a + i, POSE * b + i] += noise[group, a, b] * spread[group] ** 2
-                for i in range(21):
-                    for j in range(21):
+                for i in range(_COUNT):
+                    for j in range(_COUNT):
                         covariance[POSE * a + 6 + i, POSE * b + 6 + j] += noise[2, a, b] * pose_covariance[i, j]
     _decay_bias(state, covariance, np.repeat(np.exp(-dt / bias_s), 3), bias)
 
