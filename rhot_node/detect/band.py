@@ -21,6 +21,7 @@ CROSS_MOMENT_MIN = 0.92
 """Least normalised cross moment E[u^2 w^2] / (E[u^2] E[w^2]) of a band. It is 1 for a rectangle, 2/3 for an ellipse and
 at most 0.84 for a capsule of any length."""
 
+ARC = 0.25 * math.pi  # mean of sqrt(1 - u^2) over -1..1: a band's centroid lies so much of its sag off the axis
 SAG_MOST = 0.3  # of half the band's length: what the sag may change before the outline is straightened anew
 SAG_SETTLE = 4.0  # frames that say what is no sag
 GAUSS_AT = 0.5 + 0.5 * np.polynomial.legendre.leggauss(4)[0]
@@ -196,13 +197,13 @@ def mend_band(outline, fitted, track):
         outline.sag_zero += (measured - outline.sag_zero) / outline.sag_frames
     else:
         outline.sag = measured - outline.sag_zero
-    rest = 0.25 * math.pi * outline.sag
-    sag = 0.25 * math.pi * (outline.bend + outline.sag)
+    rest = ARC * outline.sag
+    sag = ARC * (outline.bend + outline.sag)
     fitted.x += ay * rest
     fitted.y -= ax * rest
     track.sag_x, track.sag_y = -ay * sag, ax * sag
     # Of the sag in this frame, of that which was there at first, and of its share that the first frames' mean has.
-    along = (0.25 * math.pi) ** 2 * outline.sag_variance * (2.0 + 1.0 / SAG_SETTLE)
+    along = ARC * ARC * outline.sag_variance * (2.0 + 1.0 / SAG_SETTLE)
     fitted.v_xx += ay * ay * along
     fitted.v_xy -= ax * ay * along
     fitted.v_yy += ax * ax * along

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_node.detect.image import YuvImage
+from rhot_node.detect.image import GREY, YuvImage
 from rhot_node.errors import SettingsError
 from rhot_node.markers import ChromaModel, MarkerSet
 
@@ -33,8 +33,8 @@ def colours_of(image: YuvImage, mask: NDArray[np.bool_]) -> Colours:
     """(N, 3) mean luma, Cb and Cr (minus 128) of the chroma pixels where `mask` (H/2, W/2) is True."""
     rows, columns = np.nonzero(mask)
     luma = sum(image.y[2 * rows + j, 2 * columns + i].astype(np.float32) for j in (0, 1) for i in (0, 1))
-    return np.stack([0.25 * np.asarray(luma), image.u[rows, columns] - np.float32(128.0),
-                     image.v[rows, columns] - np.float32(128.0)], axis=1)
+    return np.stack([0.25 * np.asarray(luma), image.u[rows, columns] - np.float32(GREY),
+                     image.v[rows, columns] - np.float32(GREY)], axis=1)
 
 
 def learn_chroma(image: YuvImage, boxes: list[Box]) -> ChromaModel:
@@ -107,7 +107,7 @@ def directions(markers: MarkerSet) -> NDArray[np.float64]:
 
 
 def _table(markers: MarkerSet, magnitude_min: list[float]) -> Table:
-    cb, cr = np.meshgrid(np.arange(256) - 128.0, np.arange(256) - 128.0, indexing="ij")
+    cb, cr = np.meshgrid(np.arange(256.0) - GREY, np.arange(256.0) - GREY, indexing="ij")
     angle, magnitude = np.arctan2(cr, cb), np.hypot(cb, cr)
     best = np.full((256, 256), np.inf)
     table = np.zeros((256, 256), dtype=np.uint8)

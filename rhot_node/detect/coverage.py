@@ -17,6 +17,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_node.detect.image import GREY
+
 RING = 2  # chroma pixels around the half level that an edge may reach (lens, 2x2 chroma mean, some motion)
 HOLES_MAX = 0.3  # holes (glints, noise) are filled up to this fraction of the component
 REACH = 5  # half-width of the neighbourhood that paint and surroundings are averaged over
@@ -304,7 +306,7 @@ def _paint_slopes(region, kind, colour, paint, center_x, center_y):
 
 @njit(cache=True)
 def _magnitude(colour, row, column):
-    return np.hypot(colour[row, column, 1] - 128.0, colour[row, column, 2] - 128.0)
+    return np.hypot(colour[row, column, 1] - GREY, colour[row, column, 2] - GREY)
 
 
 @njit(cache=True)
@@ -319,7 +321,7 @@ def _mean_outside(region, kind, colour, mean):
                 for channel in range(3):
                     mean[channel] += colour[row, column, channel]
     for channel in range(3):
-        mean[channel] = mean[channel] / count if count > 0 else 128.0
+        mean[channel] = mean[channel] / count if count > 0 else GREY
 
 
 @njit(cache=True)

@@ -236,9 +236,9 @@ class Finder:
     def _unexplained(self, blobs: list[Blob], seen: Iterable[int]) -> dict[int, list[Blob]]:
         """By marker, the blobs that are not too large and not where a track of the marker is."""
         tracked: list[list[tuple[float, float, float]]] = [[] for _ in self._markers]
+        xs, ys, extents = (self._tracks[name].tolist() for name in ("x", "y", "extent"))
         for slot in seen:
-            track = self._track(slot)
-            tracked[slot % self._count].append((track.x, track.y, track.extent))
+            tracked[slot % self._count].append((xs[slot], ys[slot], extents[slot]))
         found: dict[int, list[Blob]] = {}
         for blob in blobs:
             index, area = int(blob.label) - 1, blob.area

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from rhot_node.detect import outline_pixels as c
 from rhot_node.detect import track as t
-from rhot_node.detect.band import BLUR_VARIANCE, mend_band
-from rhot_node.detect.image import YuvImage, rows_of, table_of
+from rhot_node.detect.band import ARC, BLUR_VARIANCE, mend_band
+from rhot_node.detect.image import GREY, YuvImage, rows_of, table_of
 from rhot_node.detect.outline import fit
 from rhot_node.detect.outline_pixels import project, workspace
 from rhot_node.wire.messages import MarkerObservation
@@ -97,7 +97,7 @@ class Followed:
         """Track, and Y, Cb and Cr (minus 128) of its paint as the camera showed it, of the tracks of the last frame."""
         for slot in np.flatnonzero(self._reports["done"]).tolist():
             y, u, v = (self._outlines[name][slot].item() for name in ("paint_y", "paint_u", "paint_v"))
-            yield slot, (y, u - 128.0, v - 128.0)
+            yield slot, (y, u - GREY, v - GREY)
 
 
 # -- one frame --------------------------------------------------------------------------------------------------------
@@ -120,7 +120,7 @@ def follow(image, tracks, outlines, noises, work, reports):
         if not outline.gain * noise < NOISE_MOST or not _soft(image, track, outline, fitted):
             continue
         # The outline of a straightened band is written about its centroid.
-        rest = 0.25 * math.pi * outline.sag
+        rest = ARC * outline.sag
         fitted.x -= outline.axis_y * rest
         fitted.y += outline.axis_x * rest
         if not _outline(image, track, outline, noise, work):
@@ -252,8 +252,8 @@ def _axes_hold(outline, fitted):
 @njit(**c.FAST)
 def _state(track, fitted, outline, noise, report):
     """Report what was fitted, and take it into the track."""
-    extent = math.sqrt(6.0 * (fitted.m_xx + fitted.m_yy
-                              + math.hypot(fitted.m_xx - fitted.m_yy, 2.0 * fitted.m_xy)))
+    extent = t.length_of(0.5 * (fitted.m_xx + fitted.m_yy
+                                + math.hypot(fitted.m_xx - fitted.m_yy, 2.0 * fitted.m_xy)))
     bias = math.hypot(t.hidden_bias(fitted.area / track.area, max(extent, track.extent), fitted.area, t.SHARP),
                       t.smear_bias(outline.blur))
     bias = math.hypot(bias, outline.off_axis * extent)
@@ -276,7 +276,7 @@ def _state(track, fitted, outline, noise, report):
 # -- start of fast tracking --------------------------------------------------------------------------------------------
 
 START_AWAY, START_RATIO = 0.35, 1.15  # px, area: how well outline and careful measurement agree
-ARC_VARIANCE = 2.0 / 3.0 - (0.25 * math.pi) ** 2  # of sqrt(1 - u^2) over -1..1
+ARC_VARIANCE = 2.0 / 3.0 - ARC * ARC  # of sqrt(1 - u^2) over -1..1
 
 
 @njit(**c.FAST)
@@ -295,9 +295,9 @@ def start(image, tracks, outlines, slot, measured, noises, work):
     outline.axis_x, outline.axis_y = place.axis_x, place.axis_y
     outline.sag_variance, outline.sag = place.sag_variance, 0.0
     long2, high2 = max(place.var_major - BLUR_VARIANCE, 0.5), max(place.var_minor - BLUR_VARIANCE, 0.5)
-    away = 0.25 * math.pi * place.sag
-    if not _levels(image, place.x - away * place.axis_y, place.y + away * place.axis_x, math.sqrt(4.0 * long2),
-                   math.sqrt(4.0 * high2), outline):
+    away = ARC * place.sag
+    if not _levels(image, place.x - away * place.axis_y, place.y + away * place.axis_x, 2.0 * math.sqrt(long2),
+                   2.0 * math.sqrt(high2), outline):
         return False
     outline.bend, outline.width = place.sag, math.sqrt(3.0 * long2) if rims else 0.0
     _first_radii(outline, long2, max(high2 - ARC_VARIANCE * place.sag * place.sag, 0.5))
@@ -338,10 +338,10 @@ def _first_radii(outline, long2, high2):
 
 @njit(**c.FAST)
 def _levels(image, x, y_at, long, high, outline):
-    """Mean chroma of the inner half of the marker, and mean and covariance around it, by ellipses of
-    these half axes."""
+    """Mean chroma of the inner half of the marker, and mean and covariance around it, by ellipses of these half axes
+    and such that lie RING_NEAR and RING_FAR outside."""
     u, v, ax, ay = image.u, image.v, outline.axis_x, outline.axis_y
-    reach = int(long + 6.0)
+    reach = math.ceil(long + c.RING_FAR) + 1
     x0, x1 = max(int(x) - reach, 0), min(int(x) + reach + 1, u.shape[1] - 1)
     y0, y1 = max(int(y_at) - reach, 0), min(int(y_at) + reach + 1, u.shape[0] - 1)
     n = s_u = s_v = r_n = r_u = r_v = r_uu = r_uv = r_vv = 0.0
@@ -349,23 +349,23 @@ def _levels(image, x, y_at, long, high, outline):
         for column in range(x0, x1 + 1):
             dx, dy = column - x, row - y_at
             long_way, high_way = dx * ax + dy * ay, dy * ax - dx * ay
-            cu, cv = u[row, column] - 128.0, v[row, column] - 128.0
-            if (long_way / long) ** 2 + (high_way / high) ** 2 < 0.4:
+            cu, cv = u[row, column] - GREY, v[row, column] - GREY
+            if (long_way / long) ** 2 + (high_way / high) ** 2 < 0.5:
                 n += 1.0
                 s_u += cu
                 s_v += cv
-            elif (long_way / (1.1 * long + 2.0)) ** 2 + (high_way / (1.1 * high + 2.0)) ** 2 > 1.0 and (
-                    (long_way / (1.1 * long + 4.5)) ** 2 + (high_way / (1.1 * high + 4.5)) ** 2 < 1.0):
+            elif (long_way / (long + c.RING_NEAR)) ** 2 + (high_way / (high + c.RING_NEAR)) ** 2 > 1.0 and (
+                    (long_way / (long + c.RING_FAR)) ** 2 + (high_way / (high + c.RING_FAR)) ** 2 < 1.0):
                 r_n += 1.0
                 r_u += cu
                 r_v += cv
                 r_uu += cu * cu
                 r_uv += cu * cv
                 r_vv += cv * cv
-    if n < 4.0 or r_n < 10.0:
+    if n < c.INSIDE_MIN or r_n < c.NODES:
         return False
     m_u, m_v = r_u / r_n, r_v / r_n
-    outline.paint_u, outline.paint_v = 128.0 + s_u / n, 128.0 + s_v / n
-    outline.around_u, outline.around_v = 128.0 + m_u, 128.0 + m_v
+    outline.paint_u, outline.paint_v = GREY + s_u / n, GREY + s_v / n
+    outline.around_u, outline.around_v = GREY + m_u, GREY + m_v
     outline.c_uu, outline.c_uv, outline.c_vv = r_uu / r_n - m_u * m_u, r_uv / r_n - m_u * m_v, r_vv / r_n - m_v * m_v
     return True

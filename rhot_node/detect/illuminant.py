@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect.image import YuvImage
+from rhot_node.detect.image import GREY, YuvImage
 from rhot_node.detect.search import ColourGate
 from rhot_node.markers import Marker, MarkerSet
 
@@ -147,14 +147,14 @@ def balance(y, u, v, matrix, step, first, out_u, out_v):
         for column in range(u.shape[1]):
             luma = 0.25 * (np.float64(y[2 * row, 2 * column]) + y[2 * row, 2 * column + 1]
                            + y[2 * row + 1, 2 * column] + y[2 * row + 1, 2 * column + 1])
-            cb, cr = np.float64(u[row, column]) - 128.0, np.float64(v[row, column]) - 128.0
+            cb, cr = np.float64(u[row, column]) - GREY, np.float64(v[row, column]) - GREY
             out_u[row, column] = _byte(matrix[0, 0] * luma + matrix[0, 1] * cb + matrix[0, 2] * cr)
             out_v[row, column] = _byte(matrix[1, 0] * luma + matrix[1, 1] * cb + matrix[1, 2] * cr)
 
 
 @njit(cache=True)
 def _byte(chroma):
-    return min(max(int(np.floor(chroma + 128.5)), 0), 255)
+    return min(max(int(np.floor(chroma + GREY + 0.5)), 0), 255)
 
 
 @njit(cache=True)

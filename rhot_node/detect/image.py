@@ -12,6 +12,9 @@ from rhot_node.wire.messages import MarkerObservation
 
 Plane = NDArray[np.uint8]
 
+GREY = 128
+"""U and V of what has no colour."""
+
 
 def table_of(record: Any) -> np.dtype[Any]:
     """The dtype of an array of such records, all of whose fields are float64. Compiled code reads and writes its fields

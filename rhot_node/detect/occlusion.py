@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect.image import YuvImage
+from rhot_node.detect.image import GREY, YuvImage
 from rhot_node.wire.messages import MarkerObservation
 
 Array = NDArray[np.float64]
@@ -137,7 +137,7 @@ def _crossing(y, u, v, x, y_at, way_x, way_y, apart, unmix):
         i, j = math.floor(column), math.floor(row)
         if i < 0 or j < 0 or i + 1 >= u.shape[1] or j + 1 >= u.shape[0]:
             return -1.0
-        luma, cb, cr = 0.0, -128.0, -128.0
+        luma, cb, cr = 0.0, -float(GREY), -float(GREY)
         for down in range(2):
             for right in range(2):
                 weight = (1.0 - abs(column - i - right)) * (1.0 - abs(row - j - down))

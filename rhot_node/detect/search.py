@@ -18,13 +18,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_node.detect.colour import Table, acquisition_table
-from rhot_node.detect.image import YuvImage, rows_of, table_of
+from rhot_node.detect.image import GREY, YuvImage, rows_of, table_of
 from rhot_node.markers import Marker, MarkerSet
 
 AREA_MIN = 6  # chroma pixels; smaller blobs are specks (a marker of 5.5 px across)
 RUNS_MAX = 16384  # more runs than this is noise or foliage, not markers; the rest of the frame is not searched
 BLOBS_MAX = 512
-GREY = 128  # of U and V
 DULL_REACH = 60  # grey levels on either side of grey that the box of nobody's colours may reach
 
 WORD = np.uint64().nbytes  # pixels
@@ -109,6 +108,7 @@ class ColourGate:
                                     dtype=np.uint8)
         self._gate = _Gate(self.table, self.luma_limits, np.zeros(len(markers.markers) + 1, dtype=np.bool_),
                            np.array(dull_box(self.table), dtype=np.uint64))
+        self._indices: list[int] | range = range(0)  # of the markers that are wanted
         self._bright = np.zeros(0, dtype=np.uint64)
         self._runs = np.zeros(RUNS_MAX, dtype=_RUN)
         self._slots = np.zeros(RUNS_MAX, dtype=np.int32)
@@ -127,9 +127,11 @@ class ColourGate:
 
         A blob has at least `area_min` chroma pixels. Every `step`-th chroma row from `first` on stands for the others.
         """
-        self._gate.wanted[:] = False
-        for index in indices:
-            self._gate.wanted[index + 1] = True
+        if indices != self._indices:
+            self._indices = indices
+            self._gate.wanted[:] = False
+            for index in indices:
+                self._gate.wanted[index + 1] = True
         words_u = words_v = _NO_WORDS
         if image.u.shape[1] % WORD == 0 and image.u.strides[1] == image.v.strides[1] == 1:
             words_u, words_v = image.u.view(np.uint64), image.v.view(np.uint64)

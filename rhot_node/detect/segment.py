@@ -23,7 +23,7 @@ from rhot_node.detect.coverage import (
     mask_centroid,
     unmix,
 )
-from rhot_node.detect.image import table_of
+from rhot_node.detect.image import GREY, table_of
 
 ATTEMPTS = 5  # windows and levels tried before the marker counts as lost
 LEVEL_TOLERANCE = 0.08  # a local level further off than this from the assumed one is used for another attempt
@@ -148,7 +148,7 @@ def _place(image, window, count, request, scratch, result):
 
 @njit(cache=True)
 def _note_paint(paint, interior, result):
-    cb, cr = paint[1, 0] - 128.0, paint[2, 0] - 128.0
+    cb, cr = paint[1, 0] - GREY, paint[2, 0] - GREY
     result.paint_pixels, result.paint_y, result.paint_cb, result.paint_cr = interior, paint[0, 0], cb, cr
     square = max(cb * cb + cr * cr, 1.0)
     result.slope_x = (cb * paint[1, 1] + cr * paint[2, 1]) / square
@@ -243,8 +243,8 @@ def segment(image, paint, level, window, scratch):
     threshold = 0.5 * level
     for row in range(y0, y1 + 1):
         for column in range(x0, x1 + 1):
-            cb = np.float64(u[row, column]) - 128.0
-            cr = np.float64(v[row, column]) - 128.0
+            cb = np.float64(u[row, column]) - GREY
+            cr = np.float64(v[row, column]) - GREY
             belongs = (sector[u[row, column], v[row, column]] == label
                        and cb * direction[0] + cr * direction[1] >= threshold)
             mask[row, column] = _NEW if belongs else 0
@@ -313,7 +313,7 @@ def interior_level(image, direction, component, number, mask):
         for column in range(int(component.x_min) + 1, int(component.x_max)):
             if (mask[row, column] == own and mask[row - 1, column] == own and mask[row + 1, column] == own
                     and mask[row, column - 1] == own and mask[row, column + 1] == own):
-                total += ((np.float64(u[row, column]) - 128.0) * direction[0]
-                          + (np.float64(v[row, column]) - 128.0) * direction[1])
+                total += ((np.float64(u[row, column]) - GREY) * direction[0]
+                          + (np.float64(v[row, column]) - GREY) * direction[1])
                 count += 1
     return total / count if count > 0 else 0.0

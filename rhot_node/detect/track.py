@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_node.detect.band import ARC
 from rhot_node.detect.image import table_of
 from rhot_node.detect.search import Blob
 from rhot_node.markers import Shape
@@ -50,13 +51,22 @@ STEADY_AREA = 0.04  # relative change against the expectation beyond which the c
 SMEAR_AREA = 3.0  # more of such change per px of smear and of the square root of the area
 
 
+EVEN = 1.0 / 12.0  # variance of what is evenly spread over a length of one
+
+
+@njit(cache=True)
+def length_of(variance):
+    """Of a bar whose second moment along it is `variance`."""
+    return math.sqrt(variance / EVEN)
+
+
 @njit(cache=True)
 def mask_variance(area):
     """Variance, luma px^2 per axis, of the centroid of a disc of `area` chroma px^2 whose edge is rounded to pixels.
 
     Each of the edge's 2 pi r pixels is wrong by a uniformly distributed share, with a variance of 1/12 px^2.
     """
-    return 4.0 / (12.0 * math.sqrt(math.pi * area))
+    return 2.0 * 2.0 * EVEN / math.sqrt(math.pi * area)
 
 
 @njit(cache=True)
@@ -127,12 +137,12 @@ class Report(NamedTuple):
 def state(place, floor, bias, level, noise, report):
     """Write x, y, diameter, covariance and quality of a measured place (a record of chroma px, whose covariance is per
     unit variance of the noise) to a `Report`. `floor`, luma px^2, is what is added to it."""
-    scale = 4.0 * NOISE_INFLATION * noise**2
+    scale = NOISE_INFLATION * (2.0 * noise) ** 2
     if place.area < SMALL_AREA:
         floor += SMALL_VARIANCE
-    widened = floor + 4.0 * bias * bias
+    widened = floor + (2.0 * bias) ** 2
     report.x, report.y = 2.0 * place.x + 0.5, 2.0 * place.y + 0.5  # a chroma pixel is the mean of 2x2 of luma
-    report.diameter = 2.0 * math.sqrt(4.0 * place.area / math.pi)
+    report.diameter = 2.0 * 2.0 * math.sqrt(place.area / math.pi)
     report.cov_xx, report.cov_xy = scale * place.v_xx + widened, scale * place.v_xy
     report.cov_yy = scale * place.v_yy + widened
     report.quality = min(1.0, level / (15.0 * noise)) * min(1.0, place.area / 12.0)
@@ -255,7 +265,7 @@ def observe(tracks, slot, measured, noise, flags, floor, reports):
     track, row, report = tracks[slot], measured[0], reports[slot]
     known = track.missed < MEMORY_FRAMES and track.area > 0.0
     ratio = row.area / track.area if known else 1.0
-    extent = math.sqrt(12.0 * row.var_major)
+    extent = length_of(row.var_major)
     flags |= _judge(track, row, ratio, known)
     width = edge_width(row.soft, row.area, row.var_major, row.var_minor)
     limb_x, limb_y, limb = limb_shift(row.slope_x, row.slope_y, row.area)
@@ -273,7 +283,7 @@ def observe(tracks, slot, measured, noise, flags, floor, reports):
     take(track, row, extent, row.level, flags & (PARTIAL | EDGE) and ratio < 1.0)
     state(row, floor, bias, row.level, noise, report)
     if row.fit > 0.0:
-        sag = 0.25 * math.pi * row.sag
+        sag = ARC * row.sag
         track.fitted, track.sag_x, track.sag_y = 1.0, -row.axis_y * sag, row.axis_x * sag
         widen_band(row.axis_x, row.axis_y, extent, report)
     row.x, row.y = x, y  # as they were measured
@@ -299,9 +309,9 @@ def _judge(track, row, ratio, known):
 @njit(cache=True)
 def _plausible_bias(track, row, ratio, width, flags):
     """Standard deviation, chroma px, of how far what is hidden or mistaken may have drawn the centroid."""
-    whole = max(math.sqrt(12.0 * row.var_major), track.extent)
+    whole = max(length_of(row.var_major), track.extent)
     if row.fit > 0.0 and not flags & PARTIAL:  # a band's rims are those of a whole one
-        bias = hidden_bias(math.sqrt(ratio), math.sqrt(12.0 * row.var_minor), row.area, width)
+        bias = hidden_bias(math.sqrt(ratio), length_of(row.var_minor), row.area, width)
     else:
         bias = hidden_bias(ratio, whole, row.area, width)
     if flags & PARTIAL:
