@@ -6,6 +6,7 @@ and objects, and for markers, landmarks, contours and tags.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -13,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.estimation.filter import IteratedFilter, Knot
-from rhot_app.estimation.residual import Process
+from rhot_app.estimation.quantiles import chi_squared
+from rhot_app.estimation.residual import Process, Residual, stack
 
 Array = NDArray[np.float64]
 
@@ -28,6 +30,9 @@ LOST_PERIODS, WRONG_PERIODS = 5.0, 3.0
 
 WRONG_NS: Final = 100_000_000
 """ns in which most observations are rejected: the estimate is wrong."""
+
+GATE: Final = 0.999
+"""Probability with which an observation lies within the gate of `TrackFilter.weigh`."""
 
 PREDICTED_NS: Final = 100_000_000
 """ns without an accepted observation: the state is a prediction."""
@@ -107,6 +112,24 @@ class TrackFilter(IteratedFilter):
         for one in self.knots:
             self.release(one, covariance if one is self.knots[-1] else None)
         self.start(knot.t_s, knot.state, covariance)
+
+    def weigh(self, t_ns: int, residuals: Callable[[Array], Sequence[Residual]],
+              beside: Sequence[Residual] = ()) -> bool:
+        """Update by what is observed at `t_ns`, by the state predicted for then, and by `beside`; False when it is
+        outside the gate, or before the oldest knot."""
+        if self.forgot(t_ns):
+            return False
+        t_s = self.seconds(t_ns)
+        prediction = self.predict(t_s)
+        observed = residuals(prediction[0])
+        error, jacobian, variances, _, _ = stack([one.linearise(prediction[0]) for one in observed], self.process.size,
+                                                 weigh=False)
+        if len(error):
+            spread = jacobian @ prediction[1] @ jacobian.T + np.diag(variances)
+            if error @ np.linalg.solve(spread, error) > chi_squared(GATE, len(error)):
+                return False
+        self.add(t_s, [*observed, *beside], prediction)
+        return True
 
     def end(self) -> None:
         """The track has ended: all its knots are final."""

@@ -1,4 +1,6 @@
-"""Joint limits, and how the joints of a relaxed human hand move together.
+"""How hard joint limits are, and how the joints of a relaxed human hand move together.
+
+The limits themselves are of the hand file: `model.HandModel.limits`.
 
 The pose prior is a Gaussian on the 21 angles, for joints that no marker observes. Its couplings are soft, because
 people can break all of them; the standard deviations say how readily.

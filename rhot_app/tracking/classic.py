@@ -27,7 +27,7 @@ from rhot_app.tracking.association import MarkerAssociation
 from rhot_app.tracking.locate import Places, Views, empty_places, locate_all, rig_table, turn_band
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig, filter_settings
-from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, HandFrame, Tracker
 from rhot_app.tracking.trust import Targets, Verdicts, conclude, locate_inliers, no_tracks, no_verdicts, predict
 
 Array = NDArray[np.float64]
@@ -72,6 +72,8 @@ class ClassicTracker(Tracker):
         """Take one frame's markers in; about 10 µs."""
         if isinstance(frame, CameraObservations) and self._tracked_with[frame.camera]:
             self._pairing.ingest(self._association.select(frame, *self._predicted(frame)))
+        elif isinstance(frame, HandFrame):
+            self.diagnostics.warn("Only the estimator (tracker.kind) uses observations of kinds that are added.")
 
     def _predicted(self, frame: CameraObservations) -> tuple[Array, Array] | tuple[()]:
         """Where the markers are when the row of the principal point is exposed; nothing where nobody asks."""

@@ -29,7 +29,7 @@ from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.rig_arrays import rigs_of_hands
 from rhot_app.tracking.rig_objects import RigObjects, SmoothedObjects
 from rhot_app.tracking.smoothing import RECENT, Instant, RecordingEstimator
-from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker, may_be_due
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, HandFrame, Tracker, may_be_due
 from rhot_node.wire.messages import MarkerFlag
 
 Indices = NDArray[np.intp]
@@ -128,7 +128,7 @@ class Scene(Tracker):
             if self._objects is not None:
                 self._objects.ingest(frame)
         else:
-            self._hands[0].ingest(frame)
+            self._hands[frame.hand if isinstance(frame, HandFrame) else 0].ingest(frame)
 
     def _ingest_markers(self, frame: CameraObservations) -> None:
         last = self._newest[frame.camera]

@@ -79,11 +79,11 @@ class CameraObservations:
 
 
 class HandFrame:
-    """An observation of the rig's hand of a kind that the trackers do not know: residuals on the hand's state."""
+    """An observation of a hand of a kind that the trackers do not know: residuals on the hand's state."""
 
-    def __init__(self, camera: int, t_ns: int) -> None:
-        """`camera`: its index in the rig. `t_ns`: master time."""
-        self.camera, self.t_ns = camera, t_ns
+    def __init__(self, camera: int, t_ns: int, hand: int = 0) -> None:
+        """`camera`: its index in the rig. `t_ns`: master time. `hand`: 0 the rig's hand, 1 its other one."""
+        self.camera, self.t_ns, self.hand = camera, t_ns, hand
 
     def residuals(self, state: Array) -> Sequence[Residual]:
         """Those of a hand predicted to be in `state` (`hand.motion.hand_state`)."""

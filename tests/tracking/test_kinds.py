@@ -6,18 +6,20 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from modelled_hand import model_rig, moving, observations_of
 from synthetic_rig import EPOCH_NS, LOST
 
+from rhot_app.diagnostics import diagnostics_of
 from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.residual import Residual, Rows, student
 from rhot_app.estimation.se3 import retract
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.motion.hand_state import TANGENT, tangent_size
 from rhot_app.objects.observations import FiducialFrame
-from rhot_app.project import Rig
+from rhot_app.project import Rig, TrackerSettings
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.validation import DatagramValidator
 from rhot_app.state import HandState
@@ -141,6 +143,30 @@ def test_a_kind_is_added_by_one_class(registered: None) -> None:
     off = [np.linalg.norm(one.world_from_palm[:3, 3] - truth.world_from_palm[:3, 3]) for one in (without, with_tags)]
     sd = [np.sqrt(np.trace(one.palm_covariance[:3, :3])) for one in (without, with_tags)]
     assert sd[1] < 0.7 * sd[0] and off[1] < max(off[0], 2e-3)
+
+
+def test_what_contradicts_the_hand_is_outside_the_gate() -> None:
+    rig = model_rig()
+    model, found = CameraModel.from_rig(rig.nodes[1].intrinsics, rig.nodes[1].pose), []
+    for wrong_px in (None, 60.0):
+        tracker, states = make_tracker(rig), list[HandState]()
+        for frame in observations_of(rig, moving("grasp", 2.0), 1.0):
+            if wrong_px is not None and states and states[-1].tracked:
+                tracker.ingest(WristTagFrame(1, states[-1].t_master_ns, model,
+                                             seen(model, states[-1].world_from_palm) + wrong_px))
+            tracker.ingest(frame)
+            states += tracker.states()
+        found.append(states[-1].joint_positions)
+    np.testing.assert_allclose(found[0], found[1], atol=1e-9)
+
+
+def test_the_classic_tracker_says_that_it_does_not_use_it() -> None:
+    rig = model_rig()
+    tracker = make_tracker(msgspec.structs.replace(rig, tracker=TrackerSettings()))
+    tracker.ingest(WristTagFrame(1, EPOCH_NS, CameraModel.from_rig(rig.nodes[1].intrinsics, rig.nodes[1].pose),
+                                 np.zeros(2)))
+    warning, = diagnostics_of(tracker).all()
+    assert warning.level == "warning" and "estimator" in warning.sentence
 
 
 def test_it_takes_only_what_is_its_own(registered: None) -> None:

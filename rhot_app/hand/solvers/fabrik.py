@@ -1,4 +1,7 @@
-"""FABRIK for a chain without limits (Aristidou and Lasenby 2011), and joint angles from joint positions."""
+"""FABRIK for a chain without limits (Aristidou and Lasenby 2011), and joint angles from joint positions.
+
+FABRIK within limits is `finger_chain.fabrik_within`.
+"""
 
 from __future__ import annotations
 

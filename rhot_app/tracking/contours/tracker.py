@@ -243,11 +243,9 @@ class ContourEstimator(Tracker):
     def _weigh(self, frame: HandFrame) -> None:
         """Weigh what another kind observes of a hand that is tracked."""
         hand = self._hand
-        if self._tracking and not hand.filter.forgot(frame.t_ns):
-            t_s = hand.filter.seconds(frame.t_ns)
-            prediction = hand.filter.predict(t_s)
-            hand.prepare_update((), t_s)
-            hand.filter.add(t_s, [*frame.residuals(prediction[0]), *hand.constraints], prediction)
+        if self._tracking:
+            hand.prepare_update((), hand.filter.seconds(frame.t_ns))
+            hand.filter.weigh(frame.t_ns, frame.residuals, hand.constraints)
 
     def _take_edges(self, frame: EdgeFrame) -> bool:
         """Collect the edges of one frame, and update once all cameras have theirs: one camera alone measures depth

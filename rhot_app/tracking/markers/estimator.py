@@ -188,10 +188,8 @@ class Estimator(Tracker):
 
     def _weigh(self, frame: HandFrame) -> None:
         """Weigh what another kind observes of a hand that is tracked."""
-        if self._life.alive and not self._filter.forgot(frame.t_ns):
-            t_s = self._filter.seconds(frame.t_ns)
-            prediction = self._filter.predict(t_s)
-            self._filter.add(t_s, frame.residuals(prediction[0]), prediction)
+        if self._life.alive:
+            self._filter.weigh(frame.t_ns, frame.residuals)
 
     def _alone_with(self, frame: MarkerFrame) -> bool:
         """Whether this camera alone sees landmarks: another one would show how far they are."""
