@@ -149,12 +149,13 @@ def follow(tracker: BareHandTracker, cameras: list[CameraModel], films: list[lis
         away_mm.append(1e3 * np.median(np.linalg.norm(state.joint_positions - (places[:3] / places[3]).T, axis=1)))
         worst.append(np.max(errors))
         median.append(np.median(errors))
+    found = tracker.slice_counts.sum(axis=(0, 1))
     print(f"{way}: to the landmarks, px: median {np.median(pixels):.1f}, p95 {np.percentile(pixels, 95):.1f}, worst "
           f"{np.max(pixels):.1f}" + ("" if layered is None else f"; templates {len(layered.templates.templates)}"))
     print(f"to the triangulated landmarks, median joint, mm: median {np.median(away_mm):.1f}, p95 "
           f"{np.percentile(away_mm, 95):.1f}, worst {np.max(away_mm):.1f}")
     print(f"frames {len(worst)}, tracked {np.mean(np.array(worst) < 0.1):.0%}, worst joint {np.median(worst):.2f}, "
-          f"median joint {np.median(median):.3f}, contour found {np.nanmean(tracker.support):.2f}")
+          f"median joint {np.median(median):.3f}, contour found {np.divide(*found):.2f}")
     if arguments.overlay is not None:
         shown = [overlay(frames[arguments.last - 1], frame, tracker.filter.newest.state)
                  for frames, frame in zip(films, tracker.frames, strict=True) if frame is not None]

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.key_frames import KeyFrames
-from rhot_app.barehand.start import MAJORITY, MIN_DWELL_NS
+from rhot_app.barehand.start import MAJORITY, MIN_DWELL_NS, joints_on_foreground
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, no_hand
-from rhot_node.detect.foreground import Foreground, foreground_at, gain_of, learn_skin
+from rhot_node.detect.foreground import Foreground, learn_skin
 
 Image = NDArray[np.uint8]
 
@@ -69,7 +69,7 @@ class HandFollower:
             self._learn_skin(images)
         state = self.tracker.step(images, t_ns)
         if any(image is not None for image in images):
-            good = state.tracked and self._supported(images) and self._on_foreground(images, state, not following)
+            good = state.tracked and self._supported() and self._on_foreground(images, state, not following)
             self._image_ns = max(t_ns)
         else:
             good = max(t_ns) - self._image_ns < BLIND_NS
@@ -110,28 +110,21 @@ class HandFollower:
         self.tracker.foreground = [before if image is None else learn_skin(image)
                                    for image, before in zip(images, self.tracker.foreground, strict=True)]
 
-    def _supported(self, images: Sequence[Image | None]) -> bool:
-        """Whether most of the expected contour is found in these images."""
-        counts = np.sum([self.tracker.slice_counts[c].sum(axis=0)
-                         for c, image in enumerate(images) if image is not None], axis=0)
-        return bool(counts[0] > MAJORITY * counts[1])
+    def _supported(self) -> bool:
+        """Whether most of the expected contour is found in the last images."""
+        found, expected = self.tracker.slice_counts.sum(axis=(0, 1))
+        return bool(found > MAJORITY * expected)
 
     def _on_foreground(self, images: Sequence[Image | None], state: HandState, whole: bool) -> bool:
         """Whether most joints lie on foreground in every image in which most of them are. At least one camera must have
         such an image; with `whole`, every camera. Cameras with an uninformative foreground are not asked about it."""
         mostly_inside = []
-        for camera, image, model in zip(self.tracker.cameras, images, self.tracker.foreground, strict=True):
-            if image is None:
-                continue
-            places = camera.project(state.joint_positions)
-            with np.errstate(invalid="ignore"):
-                inside = np.all((places > -0.5) & (places < [camera.width - 0.5, camera.height - 0.5]), axis=1)
-            mostly_inside.append(bool(np.mean(inside) > MAJORITY))
-            if mostly_inside[-1] and model.informative:
-                gain = gain_of(image, model)
-                values = [foreground_at(image, row, column, model.hand, model.rest, model.mean, model.sd, gain)
-                          for column, row in np.round(places[inside]).astype(int)]
-                if np.mean(np.array(values) > 0.5) <= MAJORITY:
+        for camera, one, model in zip(self.tracker.cameras, self.tracker.maps_of(images), self.tracker.foreground,
+                                      strict=True):
+            if one is not None:
+                inside, share = joints_on_foreground(camera, state.joint_positions, one)
+                mostly_inside.append(inside > MAJORITY)
+                if mostly_inside[-1] and model.informative and share <= MAJORITY:
                     return False
         return all(mostly_inside) if whole else any(mostly_inside)
 

@@ -62,34 +62,41 @@ class Surface(NamedTuple):
     bone: Indices
 
 
+class _Capsule(NamedTuple):
+    """One capsule of a `Surface`."""
+
+    row: int
+    ends: tuple[Array, Array]
+    radii: tuple[float, float]
+    group: int
+    open_ends: tuple[bool, bool]
+
+
 def surface_of(model: HandModel) -> Surface:
     """The capsules of a hand."""
-    parts: list[tuple[int, Array, Array, float, float, int, bool, bool]] = []
-    bones = np.full(len(model.dh.parent), -1)
+    parts, bones = [], np.full(len(model.dh.parent), -1)
     for finger in range(5):
         radii = model.radii[finger]
         joints = [radii[0], 0.5 * (radii[0] + radii[1]), 0.5 * (radii[1] + radii[2]), TIP_TAPER * radii[2]]
         for k in range(3):
             row = int(model.dh.point_row[2 + 4 * finger + k])
             bones[row] = 3 * finger + k
-            end = -joints[3] if k == 2 else 0.0
-            parts.append((row, np.array([-model.bones[finger, k], 0.0, 0.0]), np.array([end, 0.0, 0.0]), joints[k],
-                          joints[k + 1], finger, k == 0, True))
-    parts += _palm(model)
+            start, end = np.array([[-model.bones[finger, k], 0.0, 0.0], [-joints[3] if k == 2 else 0.0, 0.0, 0.0]])
+            parts.append(_Capsule(row, (start, end), (joints[k], joints[k + 1]), finger, (k == 0, True)))
     dh = model.dh._replace(point_row=np.empty(0, np.int64), point_offset=np.empty((0, 3)))
-    return Surface(dh, np.array([part[0] for part in parts]), np.array([[part[1], part[2]] for part in parts]),
-                   np.array([[part[3], part[4]] for part in parts]), np.array([part[5] for part in parts]),
-                   np.array([[part[6], part[7]] for part in parts]), bones)
+    columns = (np.array(column) for column in zip(*parts, *_palm(model), strict=True))
+    return Surface(dh, *columns, bone=bones)
 
 
-def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, bool, bool]]:
+def _palm(model: HandModel) -> list[_Capsule]:
     """Capsules of palm, ball of the thumb and wrist, by the dimensions of `hand.shape`."""
     anatomy, mirror = model.anatomy, np.array([1.0, model.mirror, 1.0])
     thick, knuckles, thumb = 0.5e-3 * anatomy.palm_thickness_mm, model.base[1:], model.base[0]
-    parts, roots = [], []
+    parts: list[_Capsule] = []
+    roots = []
 
     def add(start: Array, end: Array, first: float, second: float, group: int = PALM) -> None:
-        parts.append((ROOT, mirror * start, mirror * end, first, second, group, group == PALM, group == PALM))
+        parts.append(_Capsule(ROOT, (mirror * start, mirror * end), (first, second), group, (group == PALM,) * 2))
 
     for k in range(4):
         radius = thick * (1.0 - (1.0 - FLESH.ulnar_taper) * k / 3.0)
@@ -105,7 +112,7 @@ def _palm(model: HandModel) -> list[tuple[int, Array, Array, float, float, int, 
     add(carpal + ulnar, carpal + 0.7 * (roots[3] - carpal) + ulnar, radius, 0.9 * radius)
     heel = np.array([FLESH.carpal_x_m, FLESH.thenar_spread * thumb[1], FLESH.thenar_z_m])
     add(heel, thumb, thick, float(model.radii[0, 0]))
-    add(thumb, 0.5 * (parts[0][1] * mirror + knuckles[0]), FLESH.web_thickness * thick, thick)
+    add(thumb, 0.5 * (parts[0].ends[0] * mirror + knuckles[0]), FLESH.web_thickness * thick, thick)
     wide, flat = 0.5e-3 * anatomy.wrist_breadth_mm, 0.5e-3 * anatomy.wrist_thickness_mm
     side = max(wide - flat, 0.0)
     for y in (side, -side):

@@ -36,7 +36,7 @@ from rhot_app.barehand.start import (
     shown_pose,
     taken_pose,
 )
-from rhot_app.barehand.surface import FOREARM, FOREARM_RADIUS, HAND_SIZE, PALM, THICKNESS, surface_of
+from rhot_app.barehand.surface import FOREARM_RADIUS, HAND_SIZE, PALM, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import Knot, Partial, update
 from rhot_app.estimation.residual import Residual
@@ -315,13 +315,6 @@ class BareHandTracker:
         """(C, GROUPS, 2): of the last image of each camera, and of each finger, the palm and the forearm, the slices on
         which the expected contour was found, and all."""
         return np.array([np.zeros((GROUPS, 2)) if frame is None else frame.slice_counts for frame in self.frames])
-
-    @property
-    def support(self) -> Array:
-        """(6,) part of the contour of each finger and of the palm that was found by all cameras; NaN where none is
-        expected."""
-        found, total = self.slice_counts[:, :FOREARM].sum(axis=0).T
-        return np.asarray(found / np.where(total > 0.0, total, np.nan))
 
     def state(self, begun: float | None = None, markers: tuple[str, ...] = ()) -> HandState:
         """The hand at the newest instant, with nothing known of `markers`."""

@@ -7,7 +7,6 @@ but zero; the root's translation, m; the angles, rad. A hand's 21 angles make it
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from rhot_app.estimation.se3 import fill_rotation
 from rhot_app.hand.articulated import Articulated, ArticulatedFrame, Box, Capsule
-from rhot_app.hand.dh import FIXED, ROOT, DhArrays, DhRow, compile_table, riding_points
+from rhot_app.hand.dh import FIXED, ROOT, DhArrays, DhRow, compile_table
 from rhot_app.hand.kinematics import TWIST, empty_frames, forward_arrays, jacobian_arrays
 from rhot_app.hand.model import Variant, linear_variant
 
@@ -51,13 +50,6 @@ class ArticulatedModel:
     limits: Array
     rest: Array
     coupled: Variant
-
-    def riding(self, points: Sequence[tuple[str, tuple[float, float, float]]]) -> ArticulatedModel:
-        """The same object with other points: (root's or frame's name, offset in it, m). Raises KeyError for a name
-        that is neither."""
-        rows = {name: row for row, name in enumerate(self.row_names)} | {self.document.root.name: ROOT}
-        placed = [(rows[name], offset) for name, offset in points]
-        return replace(self, dh=riding_points(self.dh, placed), point_names=tuple(name for name, _ in points))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand import key_frames
 from rhot_app.barehand.surface import (
     FINGER_SIZE,
     FOREARM_RADIUS,
@@ -23,7 +24,6 @@ from rhot_app.barehand.surface import (
     Surface,
     surface_of,
 )
-from rhot_app.barehand.tracker import FOREARM_SD, LENGTH_SD, RADIUS_SD, SIZE_SD
 from rhot_app.calibration.hand.marker_places import BASE_SD_M
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel, build_model
@@ -36,8 +36,7 @@ ROOTS = FOREARM_TURN
 
 SIZE = ROOTS + 15
 
-SHAPE_SD = np.concatenate([SIZE_SD, np.full(15, LENGTH_SD), np.full(15, RADIUS_SD), FOREARM_SD[:1],
-                           np.full(15, BASE_SD_M)])
+SHAPE_SD = np.append(key_frames.SHAPE_SD, np.full(SIZE - ROOTS, BASE_SD_M))
 """(SIZE,) standard deviations of the numbers in adults, relative to the base hand."""
 
 SHAPE_LIMIT = 4.0 * SHAPE_SD

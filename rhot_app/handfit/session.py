@@ -17,10 +17,8 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel, neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, JOINT_SLICES, JOINTS, HandPose
-from rhot_app.handfit.contour_search import fit_to_contours
 from rhot_app.handfit.hand_shape import SIZE, Shapes
-from rhot_app.handfit.history import History
-from rhot_app.handfit.landmark_anchors import landmark_anchors, poses_of
+from rhot_app.handfit.picture_search import fit_to_contours, landmark_anchors, poses_of
 from rhot_app.handfit.pictures import require_calibrated, require_size
 from rhot_app.handfit.quantities import Number, numbers_of, sd_of, value_of, with_value
 from rhot_app.handfit.solve import (
@@ -35,7 +33,7 @@ from rhot_app.handfit.solve import (
     Solver,
     free_numbers,
 )
-from rhot_app.handfit.state import Anchor, FitState, Image, Instant, bare_state
+from rhot_app.handfit.state import Anchor, FitState, History, Image, Instant, bare_state
 from rhot_app.progress import Progress
 from rhot_app.project import CameraCalibration, Rig
 

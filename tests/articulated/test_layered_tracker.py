@@ -7,8 +7,7 @@ from painted_object import meshes_of, picture
 from pictures import look_at, wall
 
 from rhot_app.articulated.bodies import ANGLES
-from rhot_app.articulated.process import ConstantVelocity, free_of, rest_of
-from rhot_app.articulated.tracker import LayeredTracker
+from rhot_app.articulated.tracker import ConstantVelocity, LayeredTracker, free_of, rest_of
 from rhot_app.errors import TrackingError
 
 PACE_HZ = 0.75

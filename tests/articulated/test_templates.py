@@ -9,8 +9,8 @@ from pictures import look_at, wall
 from rhot_app.articulated.bodies import ANGLES, camera_rays, place, root_of
 from rhot_app.articulated.layered import LayeredFrame, chain_rows
 from rhot_app.articulated.outline import outline_of
-from rhot_app.articulated.process import ConstantVelocity
 from rhot_app.articulated.templates import TemplateSet, filtered, noise_gain
+from rhot_app.articulated.tracker import ConstantVelocity
 from rhot_app.articulated.visibility import NONE, segment, visibility
 
 ANGLES_DEG = np.array([20.0, 30.0, 60.0, 50.0])

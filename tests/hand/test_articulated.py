@@ -145,9 +145,8 @@ def test_any_other_tree(tmp_path):
     state = some_state(model, 7)
     assert [body.name for body in model.bodies] == ["foot", "pole", "arm"]
     np.testing.assert_allclose(forward_state(model, state).points, points_of(document, state), atol=1e-12)
-    elsewhere = model.riding([("arm", (-0.1, 0.0, 0.02)), ("foot", (0.0, 0.0, 0.1))])
-    numerical = jacobian_of(lambda moved: forward_state(elsewhere, moved).points, state)
-    np.testing.assert_allclose(state_jacobian(elsewhere, state), numerical, atol=1e-8)
+    numerical = jacobian_of(lambda moved: forward_state(model, moved).points, state)
+    np.testing.assert_allclose(state_jacobian(model, state), numerical, atol=1e-8)
 
 
 def test_saved_files_read_back_and_the_shipped_one_is_as_saved(tmp_path):

@@ -386,7 +386,7 @@ def test_a_hand_is_found_by_its_landmarks(monkeypatch, cameras):
     fit = begun()
     joints = forward(build_model(rig.hand), pose).joints
     networks = ShownHands(camera.project(joints) for camera in fit.cameras[:cameras])
-    monkeypatch.setattr("rhot_app.handfit.landmark_anchors.open_hand_networks", lambda: networks)
+    monkeypatch.setattr("rhot_app.handfit.picture_search.open_hand_networks", lambda: networks)
     fit.take(fit.with_found_hand(lambda text, part: None), "finding the hand")
     assert np.median(errors_m(fit, rig.hand, pose)) < (3e-3 if cameras == 2 else 2e-2)
     assert len(fit.instant.anchors) == 21 * cameras
@@ -398,7 +398,7 @@ def test_only_finding_the_hand_needs_networks(monkeypatch):
     def missing():
         raise KeypointError("the hand networks are not installed.")
 
-    monkeypatch.setattr("rhot_app.handfit.landmark_anchors.open_hand_networks", missing)
+    monkeypatch.setattr("rhot_app.handfit.picture_search.open_hand_networks", missing)
     rig, _, _ = drawn()
     warm_up(rig, contours=True)
     with pytest.raises(KeypointError, match="not installed"):
@@ -409,7 +409,7 @@ def test_no_hand_of_the_rigs_side_is_said_and_changes_nothing(monkeypatch):
     fit = begun()
     before = fit.state
     joints = [camera.project(fit.solver.places(before.shape, fit.instant)[0]) for camera in fit.cameras]
-    monkeypatch.setattr("rhot_app.handfit.landmark_anchors.open_hand_networks", lambda: ShownHands(joints, 0.1))
+    monkeypatch.setattr("rhot_app.handfit.picture_search.open_hand_networks", lambda: ShownHands(joints, 0.1))
     with pytest.raises(CalibrationError, match="No right hand"):
         fit.with_found_hand(lambda text, part: None)
     assert fit.state is before

@@ -1,4 +1,5 @@
-"""Searches pictures of an instant for the hand's contours, as the bare hand's tracker does.
+"""Searches pictures of an instant for the hand: for its joints by the landmark networks, whose anchors suggest poses to
+begin a fit from, and for its contours, as the bare hand's tracker does.
 
 Images of one instant are weighed once. Each pass halves how far from the contour an edge may be.
 """
@@ -18,15 +19,51 @@ from rhot_app.barehand.start import START_SD
 from rhot_app.barehand.surface import FOREARM_TURN
 from rhot_app.barehand.tracker import START_PASSES, BareHandTracker
 from rhot_app.errors import CalibrationError
+from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.kinematics import forward
+from rhot_app.hand.model import HandModel, neutral_pose
 from rhot_app.hand.motion.hand_state import MOTION, POSE, SHAPE
+from rhot_app.hand.skeleton import JOINT_SLICES, HandPose
+from rhot_app.hand.solvers.palm_fit import palms_before_camera
 from rhot_app.handfit.solve import Evidence, Freedom, Solver, free_numbers
-from rhot_app.handfit.state import Contour, FitState, Instant, bare_state
+from rhot_app.handfit.state import Anchor, Contour, FitState, Instant, bare_state
+from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_node.detect.edges import find_edges, noise_of
 from rhot_node.detect.foreground import Foreground, learn_skin
+from rhot_node.landmarks.networks import open_hand_networks
 
 Array = NDArray[np.float64]
+
+_PALM = [0, *(joints.start for joints in JOINT_SLICES)]  # the wrist and each digit's root
+
+
+def landmark_anchors(instant: Instant, right: bool, progress: Progress) -> tuple[Anchor, ...]:
+    """Where each picture of an instant shows the joints of a right or left hand; those of pictures with such a hand.
+    Raises KeypointError without networks."""
+    networks, found = open_hand_networks(), []
+    for number, (camera, image) in enumerate(sorted(instant.images.items())):
+        progress("looking for the hand", number / len(instant.images))
+        hands = [hand for hand in networks.find(np.ascontiguousarray(image[..., ::-1])) if (hand.right >= 0.5) == right]
+        if hands:
+            places = max(hands, key=lambda hand: hand.presence).landmarks
+            height, width = image.shape[:2]
+            found += [Anchor(camera, joint, (float(x), float(y))) for joint, (x, y) in enumerate(places)
+                      if 0.0 <= x <= width - 1 and 0.0 <= y <= height - 1]
+    return tuple(found)
+
+
+def poses_of(anchors: Sequence[Anchor], model: HandModel, cameras: Sequence[CameraModel]) -> list[HandPose]:
+    """Open hands whose palm lies where the anchors of one camera show it."""
+    own, found = forward(model, neutral_pose(np.eye(4))).joints, []
+    for camera in sorted({one.camera for one in anchors}):
+        seen = {one.joint: one.pixel for one in anchors if one.camera == camera and one.joint in _PALM}
+        if len(seen) > 3:
+            rays = cameras[camera].undistort(np.array(list(seen.values())))
+            found += [neutral_pose(place) for place in palms_before_camera(
+                own[list(seen)], rays, cameras[camera].camera_from_world[:3])]
+    return found
 
 
 def fit_to_contours(solver: Solver, rig: Rig, state: FitState, instants: Sequence[int], freedom: Freedom,
