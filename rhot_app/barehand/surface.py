@@ -84,8 +84,8 @@ def surface_of(model: HandModel) -> Surface:
             start, end = np.array([[-model.bones[finger, k], 0.0, 0.0], [-joints[3] if k == 2 else 0.0, 0.0, 0.0]])
             parts.append(_Capsule(row, (start, end), (joints[k], joints[k + 1]), finger, (k == 0, True)))
     dh = model.dh._replace(point_row=np.empty(0, np.int64), point_offset=np.empty((0, 3)))
-    columns = (np.array(column) for column in zip(*parts, *_palm(model), strict=True))
-    return Surface(dh, *columns, bone=bones)
+    rows, ends, thick, groups, opened = (np.array(column) for column in zip(*parts, *_palm(model), strict=True))
+    return Surface(dh, rows, ends, thick, groups, opened, bones)
 
 
 def _palm(model: HandModel) -> list[_Capsule]:
