@@ -15,6 +15,7 @@ from rhot_node.config import CameraSettings, NodeSettings
 from rhot_node.detect.image import Detector
 from rhot_node.errors import CameraError
 from rhot_node.foreground_store import ForegroundStore
+from rhot_node.frame_search import frame_head
 from rhot_node.health.camera import RateMeter, brightness, camera_troubles
 from rhot_node.health.checks import BLACK_PICTURE, Check, is_black
 from rhot_node.landmark_search import LandmarkSearch
@@ -118,8 +119,8 @@ class NodeDaemon:
         """State, for the control channel."""
         stream, camera = self.sessions.current, self._camera
         said: dict[str, Any] = camera.report() if isinstance(camera, Reporting) else {}
-        return {"node_id": self._settings.node_id, "name": self._settings.name, "state": self.state.name.lower(),
-                "message": self._hangs() or self._message, "session": stream.session if stream else 0,
+        return {**self.introduce(), "message": self._hangs() or self._message,
+                "session": stream.session if stream else 0,
                 "width": self._size[0], "height": self._size[1], "detector": self._settings.detector,
                 "tags": list(self._settings.tags.sought),
                 "foreground": self.foreground.report(*self._size),
@@ -216,13 +217,8 @@ class NodeDaemon:
               sender: ObservationSender) -> None:
         if stream.session != self._session:
             self._session, self._sequence = stream.session, 0
-        width, height = frame.image.size
-        t_send_node_ns = self._clock.now_ns()
-        processing_ns = min(max(t_send_node_ns - frame.t_available_node_ns, 0), U32_MAX)
-        observations = Observations(
-            self._settings.node_id, stream.session, self._sequence, frame.t_node_ns, t_send_node_ns, processing_ns,
-            frame.exposure_ns, frame.row_time_ns, width, height, frame.number & U32_MAX,
-            self._settings.markers.checksum, markers)
+        head = frame_head(frame, self._settings.node_id, stream.session, self._sequence, self._clock.now_ns())
+        observations = Observations(*head, self._settings.markers.checksum, markers)
         self._sequence = (self._sequence + 1) & U32_MAX
         if sender.send(observations, stream):
             self.counters.sent += 1

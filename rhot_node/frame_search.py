@@ -19,6 +19,13 @@ from rhot_node.wire.messages import U32_MAX, FrameHead, FrameMessage
 Work = TypeVar("Work")
 
 
+def frame_head(frame: Frame, node_id: int, session: int, sequence: int, t_send_node_ns: int) -> FrameHead:
+    """What a message about a frame begins with that is sent at `t_send_node_ns`."""
+    processing_ns = min(max(t_send_node_ns - frame.t_available_node_ns, 0), U32_MAX)
+    return (node_id, session, sequence, frame.t_node_ns, t_send_node_ns, processing_ns, frame.exposure_ns,
+            frame.row_time_ns, *frame.image.size, frame.number & U32_MAX)
+
+
 class SearchSender(Protocol):
     """Where what is found goes; the UDP link or a fake."""
 
@@ -95,11 +102,7 @@ class FrameSearch(Generic[Work]):
             self._session, self._sequences = session, {}
         sequence = self._sequences.get(kind, 0)
         self._sequences[kind] = (sequence + 1) & U32_MAX
-        t_send_node_ns = self._clock.now_ns()
-        processing_ns = min(max(t_send_node_ns - frame.t_available_node_ns, 0), U32_MAX)
-        width, height = frame.image.size
-        return (self._node_id, session, sequence, frame.t_node_ns, t_send_node_ns, processing_ns, frame.exposure_ns,
-                frame.row_time_ns, width, height, frame.number & U32_MAX)
+        return frame_head(frame, self._node_id, session, sequence, self._clock.now_ns())
 
     def send(self, message: FrameMessage, waiting: Waiting[Work]) -> None:
         """Send what was found in a frame."""

@@ -29,6 +29,7 @@ from rhot_node.wire.fields import IMAGE_SIZE_MAX
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
+    FrameHead,
     HandLandmarks,
     LandmarkedHand,
     MarkerFlag,
@@ -146,7 +147,8 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable]) ->
 
     def frames(node: RigNode, table: LandmarkTable, times_ns: Times) -> Iterator[Record]:
         for number, t_ns in enumerate(times_ns.tolist()):
-            yield _datagram(node, rig, number, t_ns, _observations(node, order, table, number))
+            yield Record(RecordKind.DATAGRAM, node.node_id, t_ns, encode(Observations(
+                *_head(node, number, t_ns), rig.markers.checksum, _observations(node, order, table, number))))
 
     return _write(path, rig, [table.times_s for table in tables],
                   lambda c, times_ns: frames(rig.nodes[c], tables[c], times_ns))
@@ -156,12 +158,9 @@ def write_hand_log(path: Path, rig: Rig, films: Sequence[HandFilm], about: Mappi
     """Write what networks find in one film per node as their nodes would send it; returns the number of frames.
     `about`: what the header says beside. Raises RecordingError when the file cannot be written."""
     def frames(node: RigNode, film: HandFilm, times_ns: Times) -> Iterator[Record]:
-        lens = node.intrinsics
         for number, t_ns in enumerate(times_ns.tolist()):
-            yield Record(RecordKind.DATAGRAM, node.node_id, t_ns, encode(HandLandmarks(
-                node_id=node.node_id, session=_SESSION, sequence=number, t_frame_node_ns=t_ns, t_send_node_ns=t_ns,
-                processing_ns=0, exposure_ns=0, row_time_ns=0, width=lens.width, height=lens.height,
-                frame_number=number, hands=film.hands[number])))
+            yield Record(RecordKind.DATAGRAM, node.node_id, t_ns,
+                         encode(HandLandmarks(*_head(node, number, t_ns), film.hands[number])))
 
     return _write(path, rig, [film.times_s for film in films],
                   lambda c, times_ns: frames(rig.nodes[c], films[c], times_ns), about)
@@ -207,12 +206,9 @@ def _exchange(node: RigNode, sequence: int, t_ns: int) -> list[Record]:
             Record(RecordKind.CLOCK_REPLY, node.node_id, t_ns + 2 * _BOUND_NS, encode(reply))]
 
 
-def _datagram(node: RigNode, rig: Rig, number: int, t_ns: int, markers: tuple[MarkerObservation, ...]) -> Record:
+def _head(node: RigNode, number: int, t_ns: int) -> FrameHead:
     lens = node.intrinsics
-    return Record(RecordKind.DATAGRAM, node.node_id, t_ns, encode(Observations(
-        node_id=node.node_id, session=_SESSION, sequence=number, t_frame_node_ns=t_ns, t_send_node_ns=t_ns,
-        processing_ns=0, exposure_ns=0, row_time_ns=0, width=lens.width, height=lens.height, frame_number=number,
-        marker_checksum=rig.markers.checksum, markers=markers)))
+    return node.node_id, _SESSION, number, t_ns, t_ns, 0, 0, 0, lens.width, lens.height, number
 
 
 def _observations(node: RigNode, order: list[int], table: LandmarkTable, number: int) -> tuple[MarkerObservation, ...]:

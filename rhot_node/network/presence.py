@@ -190,25 +190,15 @@ class Announcer:
         return tuple(str(interface.ip) for interface in own_interfaces() if not interface.is_loopback)
 
 
-class _Service:
-    """One registered service and the responder that answers for it."""
-
-    def __init__(self, presence: Presence, addresses: Sequence[str]) -> None:
-        from zeroconf import IPVersion, ServiceInfo, Zeroconf
-        info = ServiceInfo(SERVICE, instance_of(presence), port=presence.udp_port, properties=properties_of(presence),
-                           addresses=[socket.inet_aton(address) for address in addresses], server=host_of(presence))
-        self._zeroconf = Zeroconf(interfaces=list(addresses), ip_version=IPVersion.V4Only)
-        try:
-            self._zeroconf.register_service(info, allow_name_change=True)
-        except BaseException:
-            self._zeroconf.close()
-            raise
-
-    def close(self) -> None:
-        """Say goodbye and end the responder."""
-        self._zeroconf.close()
-
-
 def announce_by_zeroconf(presence: Presence, addresses: Sequence[str]) -> Announced:
     """Register the service and answer for it. Waits a second or so; raises ImportError, OSError, zeroconf's errors."""
-    return _Service(presence, addresses)
+    from zeroconf import IPVersion, ServiceInfo, Zeroconf
+    info = ServiceInfo(SERVICE, instance_of(presence), port=presence.udp_port, properties=properties_of(presence),
+                       addresses=[socket.inet_aton(address) for address in addresses], server=host_of(presence))
+    zeroconf = Zeroconf(interfaces=list(addresses), ip_version=IPVersion.V4Only)
+    try:
+        zeroconf.register_service(info, allow_name_change=True)
+    except BaseException:
+        zeroconf.close()
+        raise
+    return zeroconf

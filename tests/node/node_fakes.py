@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +57,7 @@ class FakeCamera:
         t = self.began_ns + item * self.period_ns if self.period_ns else self.clock.now_ns()
         image = grey_image()
         if self.luma is not None:
-            image = replace(image, y=self.luma)
+            image = image._replace(y=self.luma)
         return Frame(image, item, min(t, self.clock.now_ns()), self.clock.now_ns(), 4_000_000, 48_000)
 
     def rewind(self) -> None:
