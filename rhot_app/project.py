@@ -325,9 +325,7 @@ class ObjectPoses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     translation_m: tuple[Metres, Metres, Metres] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        norm = sum(q * q for q in self.rotation_wxyz)
-        if not 0.998 < norm < 1.002:
-            raise ValueError(f"rotation_wxyz is not a unit quaternion (its squared norm is {norm:.4f})")
+        CameraPose(self.rotation_wxyz, self.translation_m)
 
 
 class RigObject(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):

@@ -12,11 +12,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from rhot_app.estimation.quantiles import chi_squared
-from rhot_app.geometry.camera import pixels_per_metre, project_with_slope, undistort_points
+from rhot_app.estimation.track import PREDICTED_NS
+from rhot_app.geometry.camera import pixels_per_metre, project_with_slope
+from rhot_app.geometry.triangulate import cast, empty_rays, triangulate
 from rhot_app.tracking.locate import GATE_FLOOR_PX
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.tracker import CameraObservations, Candidates
@@ -30,9 +33,6 @@ GATE = float(chi_squared(0.999, 2))
 
 AMBIGUITY_MARGIN = 4.0
 """Difference of squared Mahalanobis distances: a likelihood ratio of e^2. Candidates closer than that are ambiguous."""
-
-FRAME_SKEW_MAX_NS = 100_000_000
-"""ns: frames of two cameras that are further apart in time are not compared by their rays."""
 
 HAND_SPEED = 2.0
 """m/s: a hand's motion between the frames of two cameras, by which their rays may miss each other."""
@@ -77,6 +77,8 @@ class MarkerAssociation:
         self._on_hand = finite.any(axis=1)
         # Standard deviation, m, of a marker's position about the mean of the others.
         self._hand_sd_m = 0.5 * np.max(np.where(finite, rig.reach, 0.0), axis=1, initial=0.0)
+        _intersect(np.empty((0, 2, 2)), np.empty((0, 2, 2, 2)), rig.intrinsics, rig.cameras, np.empty((0, 3)),
+                   np.empty(0))  # compiled before a frame needs it
         self.reset()
 
     def reset(self) -> None:
@@ -157,13 +159,12 @@ class MarkerAssociation:
         second = first.copy()
         for row in range(len(listed.markers) - 1, -1, -1):
             second[listed.markers[row]], first[listed.markers[row]] = first[listed.markers[row]], row
-        rays = undistort_points(listed.pixels, self._rig.intrinsics[frame.camera])
         best, undecided, best_count = first, second, 1
         for other in self._frames:
             if other is None or other.camera == frame.camera or \
-                    abs(other.t_row0_master_ns - frame.t_row0_master_ns) > FRAME_SKEW_MAX_NS:
+                    abs(other.t_row0_master_ns - frame.t_row0_master_ns) > PREDICTED_NS:
                 continue
-            rows, points = self._intersections(frame, listed, rays, other)
+            rows, points = self._intersections(frame, listed, other)
             cluster = self._largest_cluster(listed.markers[rows], points)
             count = len(set(listed.markers[rows[cluster]].tolist()))
             if count > best_count:
@@ -175,27 +176,20 @@ class MarkerAssociation:
                     best[m] = row
         return best, undecided
 
-    def _intersections(self, frame: CameraObservations, listed: Candidates, rays: Array,
-                       other: CameraObservations) -> tuple[Indices, Array]:
+    def _intersections(self, frame: CameraObservations, listed: Candidates, other: CameraObservations
+                       ) -> tuple[Indices, Array]:
         """Points (H, 3) m, world frame, where the rays of candidates of the same marker meet in two cameras, and (H,)
-        the rows of the candidates in `listed`. `rays` (N, 2): normalised coordinates of `listed`."""
-        rig, others = self._rig, _list_candidates(other)
+        the rows of the candidates in `listed`."""
+        rig, others, pair = self._rig, _list_candidates(other), [frame.camera, other.camera]
         rows, columns = np.nonzero(listed.markers[:, None] == others.markers[None])
-        other_rays = undistort_points(others.pixels, rig.intrinsics[other.camera])[columns]
-        cameras = rig.cameras[[frame.camera, other.camera]]
-        # (x p3 - p1) X = 0 and (y p3 - p2) X = 0 for both cameras
-        observed = np.stack([rays[rows], other_rays], axis=1)[..., None]
-        planes = (observed * cameras[None, :, 2:3] - cameras[None, :, :2]).reshape(-1, 4, 4)
-        normal = np.einsum("hki,hkj->hij", planes[..., :3], planes[..., :3]) + 1e-12 * np.eye(3)
-        side = -np.einsum("hki,hk->hi", planes[..., :3], planes[..., 3])
-        points = np.linalg.solve(normal, side[..., None])[..., 0]
-        expected, slopes = project_with_slope(points, cameras[0], rig.intrinsics[frame.camera])
-        off_px = np.abs(np.hstack([
-            expected - listed.pixels[rows],
-            project_with_slope(points, cameras[1], rig.intrinsics[other.camera])[0] - others.pixels[columns]]))
+        points, errors_px = np.empty((len(rows), 3)), np.empty(len(rows))
+        _intersect(np.stack([listed.pixels[rows], others.pixels[columns]], axis=1),
+                   np.stack([listed.covariances[rows], others.covariances[columns]], axis=1),
+                   rig.intrinsics[pair], rig.cameras[pair], points, errors_px)
+        _, slopes = project_with_slope(points, rig.cameras[frame.camera], rig.intrinsics[frame.camera])
         moved_m = HAND_SPEED * 1e-9 * abs(other.t_row0_master_ns - frame.t_row0_master_ns)
         moved_px = moved_m * np.array([pixels_per_metre(slope) for slope in slopes])
-        meet = off_px.max(axis=1, initial=0.0) < GATE_FLOOR_PX + moved_px  # NaN, so false, behind a camera
+        meet = errors_px < GATE_FLOOR_PX + moved_px  # NaN, so false, behind a camera
         return rows[meet], points[meet]
 
     def _largest_cluster(self, markers: Indices, points: Array) -> Indices:
@@ -246,3 +240,15 @@ def _list_candidates(frame: CameraObservations) -> Candidates:
     further = [getattr(frame.further, name) for name in _COLUMNS]
     return Candidates(np.concatenate([found, frame.further.markers]),
                    *(np.concatenate(both) for both in zip(columns, further, strict=True)))
+
+
+@njit(cache=True)
+def _intersect(pixels: Array, covariances: Array, intrinsics: Array, cameras: Array, points: Array, errors_px: Array
+               ) -> None:
+    """Triangulate H pairs of `pixels` (H, 2, 2) px with `covariances` (H, 2, 2, 2) px^2 in two cameras: `points` (H, 3)
+    m and `errors_px` (H,), by which the rays miss each other, NaN where they do not meet."""
+    rays, used, spread = empty_rays(2), np.empty(2, np.bool_), np.empty((3, 3))
+    for h in range(pixels.shape[0]):
+        used[:] = True
+        cast(pixels[h], covariances[h], intrinsics, used, rays)
+        errors_px[h], _ = triangulate(rays, cameras, used, points[h], spread)
