@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rhot_app.estimation.se3 import fill_rotation
 from rhot_app.hand.articulated import Articulated, ArticulatedFrame, Box, Capsule
 from rhot_app.hand.dh import FIXED, ROOT, DhArrays, DhRow, compile_table
-from rhot_app.hand.kinematics import TWIST, empty_frames, forward_arrays, jacobian_arrays
+from rhot_app.hand.kinematics import TWIST, empty_frames, forward_arrays, point_jacobian
 from rhot_app.hand.model import Variant, linear_variant
 
 Array = NDArray[np.float64]
@@ -161,11 +161,16 @@ def state_jacobian_arrays(dh: DhArrays, state: Array, root: Array, frames: Array
     """
     w, x, y, z = state[0], state[1], state[2], state[3]
     s = 2.0 / (w * w + x * x + y * y + z * z)
-    jacobian_arrays(dh, root, frames, points, out[:, :, STATE_ROOT - TWIST:])
+    by_twist = np.empty((3, TWIST + state.shape[0] - STATE_ROOT))
     for point in range(points.shape[0]):
+        by_twist[:] = 0.0
+        point_jacobian(dh, root, frames, dh.point_row[point], points[point, 0], points[point, 1], points[point, 2],
+                       by_twist)
         for i in range(3):
-            row = out[point, i]
-            tx, ty, tz, rx, ry, rz = row[1], row[2], row[3], s * row[4], s * row[5], s * row[6]
+            one, row = by_twist[i], out[point, i]
+            rx, ry, rz = s * one[3], s * one[4], s * one[5]
             row[0], row[1] = -x * rx - y * ry - z * rz, w * rx + z * ry - y * rz
             row[2], row[3] = w * ry + x * rz - z * rx, y * rx - x * ry + w * rz
-            row[4], row[5], row[6] = tx, ty, tz
+            row[4], row[5], row[6] = one[0], one[1], one[2]
+            for angle in range(STATE_ROOT, state.shape[0]):
+                row[angle] = one[angle - STATE_ROOT + TWIST]

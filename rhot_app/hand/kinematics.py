@@ -97,19 +97,18 @@ def point_jacobian(dh: DhArrays, world_from_root: Array, frames: Array, row: int
     as `jacobian` says. The Jacobian of a unit vector d fixed to a row is that of the point p + d less that of p.
     """
     rx, ry, rz = x - world_from_root[0, 3], y - world_from_root[1, 3], z - world_from_root[2, 3]
-    out[0, 0], out[1, 1], out[2, 2] = out[0, 0] + 1.0, out[1, 1] + 1.0, out[2, 2] + 1.0
-    out[0, 4], out[0, 5] = out[0, 4] + rz, out[0, 5] - ry
-    out[1, 3], out[1, 5] = out[1, 3] - rz, out[1, 5] + rx
-    out[2, 3], out[2, 4] = out[2, 3] + ry, out[2, 4] - rx
+    for i in range(3):
+        out[i, i] += 1.0
+    _add_turn(out, 3, 1.0, 0.0, 0.0, rx, ry, rz)
+    _add_turn(out, 4, 0.0, 1.0, 0.0, rx, ry, rz)
+    _add_turn(out, 5, 0.0, 0.0, 1.0, rx, ry, rz)
     while row >= 0:
-        base = world_from_root if dh.parent[row] < 0 else frames[dh.parent[row]]
+        parent = dh.parent[row]
         if dh.angle[row] >= 0:
-            vx, vy, vz = _turned(base, x, y, z)
-            column, sign = TWIST + dh.angle[row], dh.sign[row]
-            out[0, column] += sign * vx
-            out[1, column] += sign * vy
-            out[2, column] += sign * vz
-        row = dh.parent[row]
+            base, sign = world_from_root if parent < 0 else frames[parent], dh.sign[row]
+            _add_turn(out, TWIST + dh.angle[row], sign * base[0, 2], sign * base[1, 2], sign * base[2, 2],
+                      x - base[0, 3], y - base[1, 3], z - base[2, 3])
+        row = parent
 
 
 @njit(cache=True, inline="always")
@@ -124,18 +123,22 @@ def chain_row(dh: DhArrays, world_from_root: Array, frames: Array, row: int, x: 
     out[0], out[1], out[2] = out[0] + gx, out[1] + gy, out[2] + gz
     out[3], out[4], out[5] = out[3] + ry * gz - rz * gy, out[4] + rz * gx - rx * gz, out[5] + rx * gy - ry * gx
     while row >= 0:
-        base = world_from_root if dh.parent[row] < 0 else frames[dh.parent[row]]
+        parent = dh.parent[row]
         if dh.angle[row] >= 0:
-            vx, vy, vz = _turned(base, x, y, z)
-            out[TWIST + dh.angle[row]] += dh.sign[row] * (gx * vx + gy * vy + gz * vz)
-        row = dh.parent[row]
+            base = world_from_root if parent < 0 else frames[parent]
+            ax, ay, az = base[0, 2], base[1, 2], base[2, 2]
+            rx, ry, rz = x - base[0, 3], y - base[1, 3], z - base[2, 3]
+            out[TWIST + dh.angle[row]] += dh.sign[row] * (gx * (ay * rz - az * ry) + gy * (az * rx - ax * rz)
+                                                          + gz * (ax * ry - ay * rx))
+        row = parent
 
 
-@njit(cache=True, inline="always")
-def _turned(base: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Velocity of a point that turns about the z axis of a frame `base` (3, 4) by 1 rad/s."""
-    rx, ry, rz = x - base[0, 3], y - base[1, 3], z - base[2, 3]
-    return (base[1, 2] * rz - base[2, 2] * ry, base[2, 2] * rx - base[0, 2] * rz, base[0, 2] * ry - base[1, 2] * rx)
+@njit(cache=True)
+def _add_turn(out: Array, column: int, ax: float, ay: float, az: float, rx: float, ry: float, rz: float) -> None:
+    """Add axis x lever to a column: the velocity of a point at a lever from an axis of unit angular speed."""
+    out[0, column] += ay * rz - az * ry
+    out[1, column] += az * rx - ax * rz
+    out[2, column] += ax * ry - ay * rx
 
 
 @njit(cache=True)
