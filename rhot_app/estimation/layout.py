@@ -1,4 +1,4 @@
-"""Where the named parts of a state lie, and of its tangent space: no other code knows an index.
+"""Slices of the named parts of a state, and of its tangent space.
 
 A part is a pose, SE3, with 12 numbers and 6 of tangent space (`estimation.se3`), or a vector, with as many of both.
 """

@@ -1,7 +1,8 @@
 """The life of a track: when it is predicted only, wrong, or lost; and its filter, in master time.
 
-A track begins with a measured state and lasts as long as observations are accepted. The rules are the same for hands
-and objects, and for markers, landmarks, contours and tags.
+A track begins with a measured state and lasts as long as observations are accepted. `Life` has the rules for objects
+and for hands tracked by markers or landmarks; contours have their own, from the same limits
+(`tracking.contours.evidence`).
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ SESSION_NS: Final = 1_000_000_000
 
 
 def comes_late(t_ns: int, newest_ns: int) -> bool:
-    """Whether a frame comes after a newer one of its camera, in the same session."""
+    """Whether `t_ns` is at or before `newest_ns`, in the same session."""
     return 0 <= newest_ns - t_ns < SESSION_NS
 
 
@@ -107,11 +108,12 @@ class TrackFilter(IteratedFilter):
         self.begun_ns = t_ns
         self.start(0.0, state, covariance)
 
-    def restart(self, knot: Knot, covariance: Array) -> None:
-        """Go on from a knot with a larger covariance, so that no late frame undoes it."""
+    def restart(self, covariance: Array) -> None:
+        """Go on from the newest knot with a larger covariance, so that no late frame undoes it."""
+        newest = self.newest
         for one in self.knots:
-            self.release(one, covariance if one is self.knots[-1] else None)
-        self.start(knot.t_s, knot.state, covariance)
+            self.release(one, covariance if one is newest else None)
+        self.start(newest.t_s, newest.state, covariance)
 
     def weigh(self, t_ns: int, residuals: Callable[[Array], Sequence[Residual]],
               beside: Sequence[Residual] = ()) -> bool:

@@ -209,7 +209,7 @@ class ObjectTrack:
             return None
         best = self._hypotheses[0].filter
         knot = best.newest
-        return best.newest_ns, FilteredState(knot.t_s, knot.state, knot.covariance, self._process, id(best))
+        return best.newest_ns, FilteredState(knot.t_s, knot.state, knot.covariance, self._process, best)
 
     def _start(self, measurement: Measurement) -> bool:
         modes = measurement.modes()

@@ -1,4 +1,4 @@
-"""The door of one node: every datagram, live or from a log, is verified here and counted, or becomes observations.
+"""Validates the datagrams of one node, live or from a log: each is dropped and counted, or becomes observations.
 
 No sockets and no threads. Nothing in a datagram raises past `DatagramValidator.admit`.
 """
@@ -158,13 +158,15 @@ class DatagramValidator:
         message = self.open(data)
         if not isinstance(message, FrameMessage):
             return "kind"
+        kind = self._kind_of(message)
+        if kind is None:
+            return "kind"
         sequence = self._sequences[type(message)]
         reason = self._not_of_the_stream(message, sequence)
         if reason is not None:
             return reason
         sequence.take(message.sequence)  # also what is refused now has come: it is not lost
         self.taken += 1
-        kind = next(one for one in self._takers[type(message)] if one.accepts(message))
         reason = kind.refusal(message)
         if reason is not None:
             return reason
@@ -184,6 +186,12 @@ class DatagramValidator:
         times = FrameTimes(t_row0_ns, t_send_ns, t_receive_ns, bound_s)
         collected = kind.collect(message, times)
         return None if collected is None else (kind, collected, times)
+
+    def _kind_of(self, message: FrameMessage) -> Kind | None:
+        for kind in self._takers.get(type(message), ()):
+            if kind.accepts(message):
+                return kind
+        return None
 
     def _not_of_the_stream(self, message: FrameMessage, sequence: SequenceWindow) -> str | None:
         """Why this message is not a new one of the stream that we asked for; None when it is."""

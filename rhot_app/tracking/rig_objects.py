@@ -1,4 +1,6 @@
-"""The tracked objects of a rig beside its hand: fed with fiducial tags and colour markers, published with the hand.
+"""The tracked objects of a rig, and their contacts with its hands.
+
+They take fiducial tags, colour markers and poses of other trackers.
 
 A state's objects are those at the hand's instant, by everything that has come until then.
 """
@@ -201,7 +203,7 @@ class _History:
         del self._filtered[:first]
         runs: list[list[FilteredState]] = []
         for one in self._filtered:
-            if runs and one.label == runs[-1][-1].label and one.t_s - runs[-1][-1].t_s < 1e-9 * LOST_NS:
+            if runs and one.label is runs[-1][-1].label and one.t_s - runs[-1][-1].t_s < 1e-9 * LOST_NS:
                 runs[-1].append(one)
             else:
                 runs.append([one])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.barehand.start import LATERAL_M
-from rhot_app.diagnostics import Diagnostics, diagnostics_of
+from rhot_app.diagnostics import Diagnostics
 from rhot_app.errors import RigError
 from rhot_app.estimation.track import NEVER, comes_late
 from rhot_app.objects.observations import FiducialFrame, MeasuredPose
@@ -86,7 +86,9 @@ class Scene(Tracker):
         their parts of images. Raises RigError when the mesh of an object cannot be used."""
         self._hands, self._columns = [hand for hand, _ in hands], [columns for _, columns in hands]
         self._images, self.key_frames = images, self._hands[0].key_frames
-        self.diagnostics = Diagnostics() if len(hands) > 1 else diagnostics_of(self._hands[0])
+        self.diagnostics = Diagnostics()
+        for hand in self._hands:
+            hand.diagnostics = self.diagnostics
         self._ids, self._cameras = rig.markers.ids, tuple(node.name for node in rig.nodes)
         self._of_objects = [(number, self._ids.index(marker.marker), 1e-3 * np.array(marker.position_mm))
                             for number, model in enumerate(rig.models) for marker in model.markers]
@@ -127,8 +129,11 @@ class Scene(Tracker):
         elif isinstance(frame, FiducialFrame | MeasuredPose):
             if self._objects is not None:
                 self._objects.ingest(frame)
+        elif isinstance(frame, HandFrame):
+            for hand in self._hands[frame.hand:frame.hand + 1]:  # a rig may have no other one
+                hand.ingest(frame)
         else:
-            self._hands[frame.hand if isinstance(frame, HandFrame) else 0].ingest(frame)
+            self._hands[0].ingest(frame)
 
     def _ingest_markers(self, frame: CameraObservations) -> None:
         last = self._newest[frame.camera]
@@ -255,7 +260,7 @@ class SmoothedScene(Scene):
         return SmoothedObjects(rig, self.diagnostics)
 
     def reset(self) -> None:
-        """Forget everything but the states that are not taken yet: a new session, or a clock was set."""
+        """End the hands' tracks: a new session, or a clock was set. Objects and states that are not taken yet stay."""
         for hand in self._hands:
             hand.reset()
 

@@ -13,7 +13,7 @@ from rhot_app.estimation.filter import ChunkedSmoother, FilteredState, Knot
 from rhot_app.estimation.track import FinalKnot
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, no_hand
-from rhot_app.tracking.markers.estimator import Estimator, Weighed
+from rhot_app.tracking.markers.estimator import Estimator, Weighed, copied
 from rhot_app.tracking.markers.estimator_state import EstimatorStates
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations
 
@@ -135,19 +135,21 @@ class RecordingEstimator(Estimator):
                 self._conclude(self._smoother.finish())
                 for key in [key for key, instant in self._instants.items() if instant.weighed is not None]:
                     del self._instants[key]  # so late that they have no knot of their own
-            elif one.knot.label is not None:
-                self._add(one, one.knot.label)
+            elif one.knot.residuals:
+                self._add(one)
         for knot in self._filter.knots:
             self._note(knot.label)
         if None in history:
             self._release(self._count)
 
-    def _add(self, final: FinalKnot, weighed: Weighed) -> None:
-        knot, instant = final.knot, self._note(weighed)
+    def _add(self, final: FinalKnot) -> None:
+        """A knot of a frame, or of what another kind observes."""
+        knot, weighed = final.knot, final.knot.label
+        instant, process = self._note(weighed), copied(self._process) if weighed is None else weighed.process
         if instant is not None:
             instant.knot, instant.t_ns = knot, final.t_ns
         self._conclude(self._smoother.add(FilteredState(
-            knot.t_s, knot.state, knot.covariance, weighed.process, instant, final.inflated,
+            knot.t_s, knot.state, knot.covariance, process, instant, final.inflated,
             residuals=knot.residuals)))
 
     def _conclude(self, estimates: list[FilteredState]) -> None:

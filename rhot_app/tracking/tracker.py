@@ -104,6 +104,9 @@ class Tracker:
     smooths: ClassVar[bool] = False
     """Whether its states use the whole recording; they come late, by `states` and `finish` only."""
 
+    diagnostics: Diagnostics
+    """What it fails over and warns of."""
+
     key_frames: KeyFrames | None = None
     """The frames that tell most of a bare hand's shape; None for a tracker without contours. Any thread may read."""
 

@@ -104,10 +104,10 @@ def datagram(rig: Rig, number: int, t_ns: int, pixel: np.ndarray, tag: int = WRI
                             (Fiducial(16, tag, tuple(map(float, corners)), (1.0, 0.0, 1.0) * 4),)))
 
 
-def states_of(rig: Rig, tags: bool) -> list[HandState]:
+def states_of(rig: Rig, tags: bool, smooth: bool = False) -> list[HandState]:
     """The hand before two cameras, of which the second one sees no marker since BLIND_NS; with its `tags`, the
     wrist's tag."""
-    truth, tracker, found = moving("grasp", 2.0), make_tracker(rig), list[HandState]()
+    truth, tracker, found = moving("grasp", 2.0), make_tracker(rig, smooth=smooth), list[HandState]()
     model = CameraModel.from_rig(rig.nodes[1].intrinsics, rig.nodes[1].pose)
     door = DatagramValidator(rig, 1, clock())
     door.expect_session(SESSION)
@@ -123,9 +123,8 @@ def states_of(rig: Rig, tags: bool) -> list[HandState]:
                 assert isinstance(observed, HandFrame), door.dropped
                 tracker.ingest(observed)
         tracker.ingest(frame)
-        if (state := tracker.solve()) is not None:
-            found.append(state)
-    return found
+        found += tracker.states()
+    return [*found, *tracker.finish()]
 
 
 def _undisturbed(rig: Rig) -> list[HandState]:
@@ -143,6 +142,14 @@ def test_a_kind_is_added_by_one_class(registered: None) -> None:
     off = [np.linalg.norm(one.world_from_palm[:3, 3] - truth.world_from_palm[:3, 3]) for one in (without, with_tags)]
     sd = [np.sqrt(np.trace(one.palm_covariance[:3, :3])) for one in (without, with_tags)]
     assert sd[1] < 0.7 * sd[0] and off[1] < max(off[0], 2e-3)
+
+
+def test_recordings_are_smoothed_with_it(registered: None) -> None:
+    rig, sd = model_rig(), []
+    for tags in (False, True):
+        blind = [state for state in states_of(rig, tags, smooth=True) if state.t_master_ns > BLIND_NS + 10**8]
+        sd.append(np.mean([np.sqrt(np.trace(state.palm_covariance[:3, :3])) for state in blind]))
+    assert sd[1] < 0.8 * sd[0]
 
 
 def test_what_contradicts_the_hand_is_outside_the_gate() -> None:

@@ -20,9 +20,10 @@ SHAPE = 36
 class HandParts(NamedTuple):
     """Where the parts of a hand's state lie, or of its tangent space.
 
-    `palm` world_from_palm, m and rad along the world's axes, `angles` (21,) rad, both together `pose`; its `velocity`
-    and `acceleration` (27,); all these are the `motion`. What follows is `lasting`: a bare hand's `shape` and then the
-    `biases` of M markers, m along the world's axes; of a hand without a shape, the biases.
+    `palm`: world_from_palm, m and rad along the world's axes. `angles` (21,) rad. `pose`: both. `velocity` and
+    `acceleration` (27,). `motion`: all of these. `lasting`: everything after them. In a bare hand's state that is the
+    `shape` (36,), then the `biases` of M markers, m along the world's axes. The state of a hand without a shape has the
+    biases alone, in `lasting`; `shape` and `biases` are not for it.
     """
 
     palm: slice

@@ -245,7 +245,10 @@ class ContourEstimator(Tracker):
         hand = self._hand
         if self._tracking:
             hand.prepare_update((), hand.filter.seconds(frame.t_ns))
-            hand.filter.weigh(frame.t_ns, frame.residuals, hand.constraints)
+            try:
+                hand.filter.weigh(frame.t_ns, frame.residuals, hand.constraints)
+            except np.linalg.LinAlgError:  # the observations contradict the estimate
+                self.drop_track()
 
     def _take_edges(self, frame: EdgeFrame) -> bool:
         """Collect the edges of one frame, and update once all cameras have theirs: one camera alone measures depth

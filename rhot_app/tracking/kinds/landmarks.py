@@ -21,10 +21,10 @@ from rhot_node.wire.messages import HandLandmarks, LandmarkedHand, MarkerFlag
 Array = NDArray[np.float64]
 
 DIAMETER_PX = 1.0
-"""A landmark has none."""
+"""A landmark has no diameter; 1 px stands for it."""
 
 SIDE_S: Final = 0.2
-"""s: over which the networks' word on a hand's side is averaged, so that a flicker turns no hand into the other one.
+"""s: time constant of the averaged side of a hand, so that a flicker turns no hand into the other one.
 Chosen: it holds against four wrong frames of 30 a second, and is turned round within half a second."""
 
 PROBABILITY_MAX: Final = 0.98
@@ -126,9 +126,9 @@ class LandmarkKind(Kind):
             diameters=diameters, qualities=qualities, flags=flags)
 
     def _assigned(self, found: Sequence[LandmarkedHand], t_ns: int) -> list[LandmarkedHand | None]:
-        """Which hand of a frame is which of the rig's: the likeliest by their sides, and by what they were before.
-        None: rather none of them. Where two hands lie on each other, one of which the networks say that it is of the
-        other side than before is none: they take parts of the one before it for it."""
+        """Which hand of a frame is which of the rig's: the assignment with the greatest sum of log odds of their sides,
+        in favour of what they were before. None where no hand is likelier than none. While two hands overlap, one whose
+        side contradicts its track is left out: the network may have fitted it to the hand in front."""
         tracks = self._followed(found, t_ns)
         mistaken = set()
         for k, (one, track) in enumerate(zip(found, tracks, strict=True)):

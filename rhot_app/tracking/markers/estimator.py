@@ -21,7 +21,7 @@ from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.track import LOST_NS, SESSION_NS, Life, TrackFilter
 from rhot_app.hand.landmarks import LASTING_S
 from rhot_app.hand.motion.hand_process import HandProcess
-from rhot_app.hand.motion.hand_state import STATE
+from rhot_app.hand.motion.hand_state import STATE, TANGENT
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
@@ -68,7 +68,7 @@ class Weighed:
     by_one: bool
 
 
-def _copied(original: Kept) -> Kept:
+def copied(original: Kept) -> Kept:
     """A copy with arrays of its own."""
     out = copy.copy(original)
     for name, value in vars(original).items():
@@ -188,8 +188,12 @@ class Estimator(Tracker):
 
     def _weigh(self, frame: HandFrame) -> None:
         """Weigh what another kind observes of a hand that is tracked."""
-        if self._life.alive:
-            self._filter.weigh(frame.t_ns, frame.residuals)
+        if not self._life.alive:
+            return
+        try:
+            self._filter.weigh(frame.t_ns, frame.residuals, [] if self._plane is None else [self._plane])
+        except np.linalg.LinAlgError:  # the estimate contradicts itself
+            self._give_up()
 
     def _alone_with(self, frame: MarkerFrame) -> bool:
         """Whether this camera alone sees landmarks: another one would show how far they are."""
@@ -242,14 +246,14 @@ class Estimator(Tracker):
             return
         inliers = self._observations.accept(frame, knot.state, knot.weights)
         if self._filter.history is not None:
-            knot.label = Weighed(frame.observations, _copied(self._observations), _copied(self._process), self._scale,
+            knot.label = Weighed(frame.observations, copied(self._observations), copied(self._process), self._scale,
                                  self._by_one)
         wrong = self._rejections.wrong(frame, inliers, distances, self._observations.periods_s[frame.camera])
         if wrong:
-            inflated = knot.covariance.copy()
+            inflated = self._filter.newest.covariance.copy()
             for part, factor in wrong:
                 self._process.inflate(inflated, part, factor)
-            self._filter.restart(knot, inflated)
+            self._filter.restart(inflated)
         accepted = int(np.count_nonzero(inliers))
         self._life.observe(frame.t_ns, accepted=accepted > 0, plausible=bool(2 * accepted >= candidates))
 
@@ -280,7 +284,8 @@ class Rejections:
         for m in np.flatnonzero((rejected >= enough) & (distances > GATE)):
             finger = self._markers.finger[m]
             angles = ANGLE_SLICES[finger]
-            found.append((slice(6 + angles.start, 6 + angles.stop) if finger >= 0 else slice(0, 6),
+            first = TANGENT.angles.start
+            found.append((slice(first + angles.start, first + angles.stop) if finger >= 0 else TANGENT.palm,
                           0.5 * float(distances[m])))
         return found
 
