@@ -60,6 +60,27 @@ def test_nobody_asks_a_tracker_what_it_is() -> None:
     assert not asked, "give `tracking.tracker.Tracker` what they need, with a default"
 
 
+def test_parts_of_a_state_have_names() -> None:
+    """`estimation.layout`. The state of an articulated file is read by one function of its own."""
+    own = ("rhot_app/estimation/layout.py", "rhot_app/estimation/se3.py", "rhot_app/hand/articulated_model.py")
+    bare = [f"{path.relative_to(ROOT)}:{node.lineno} {ast.unparse(node)}" for path in CORE
+            if str(path.relative_to(ROOT)) not in own for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "state"
+            and not isinstance(node.slice, ast.Tuple)  # channels beside each other
+            and any(isinstance(one, ast.Constant) and type(one.value) is int and one.value > 1
+                    for one in ast.walk(node.slice))]
+    assert not bare, "name them (`hand.motion.hand_state`, `objects.motion`)"
+
+
+def test_kinds_of_observations_are_registered_once() -> None:
+    found = [name for name, node in ((f"{path.relative_to(ROOT)}:{node.name}", node) for path in CORE
+             for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ClassDef))
+             if "Kind" in _bases(node)]
+    registered = (ROOT / "rhot_app/tracking/kinds/registry.py").read_text()
+    assert len(found) >= 4
+    assert all(one.startswith("rhot_app/tracking/kinds/") and one.split(":")[1] in registered for one in found), found
+
+
 @pytest.mark.parametrize("ns", [500_000_000, 1_000_000_000])
 def test_when_a_track_is_lost_and_a_session_over_is_said_once(ns: int) -> None:
     """`estimation.track`; other constants of the same length are of clocks and nodes."""
