@@ -128,7 +128,10 @@ def read_samples(path: Path, columns: Sequence[str], error: type[Exception]) -> 
         raise error(f"{path}: this is no text. Give a CSV file with the header {','.join(columns)}.") from exc
     except (OSError, ValueError) as exc:
         raise error(f"{path}: cannot be read ({why(exc)}).") from exc
-    lines = csv.reader(text.splitlines())
+    try:
+        lines = iter(list(csv.reader(text.splitlines())))
+    except csv.Error as exc:
+        raise error(f"{path}: this is no table ({exc}). Give a CSV file with the header {','.join(columns)}.") from exc
     header = [cell.strip() for cell in next(lines, [])]
     if any(header.count(name) != 1 for name in columns):
         raise error(f"{path}, line 1: the header is {printable(','.join(header), 80)!r}. Let the first line be "

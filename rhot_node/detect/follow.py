@@ -84,9 +84,8 @@ class Followed:
 
     def observations(self) -> dict[int, MarkerObservation]:
         """By track: the observations of the last frame."""
-        count = self._markers
-        return {slot: MarkerObservation(slot % count, x, y, diameter, xx, xy, yy, quality)
-                for slot, (x, y, diameter, xx, xy, yy, quality, done) in enumerate(self._rows.tolist()) if done}
+        return {slot: MarkerObservation(slot % self._markers, *self._rows[slot].tolist()[:-1])
+                for slot, done in enumerate(self._reports["done"].tolist()) if done}
 
     def start(self, image: YuvImage, slot: int, measured: NDArray[np.void]) -> bool:
         """Follow a track, which was `measured` (1,) in plain view in this picture. Returns whether its outline was
