@@ -8,7 +8,6 @@ and for hands tracked by markers or landmarks; contours have their own, from the
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -139,7 +138,7 @@ class TrackFilter(IteratedFilter):
             for one in self.knots:
                 self.release(one)
             self.history.append(None)
-            self.knots = [replace(one, label=None) for one in self.knots[-1:]]
+            self.knots = [Knot(one.t_s, one.state, one.covariance) for one in self.knots[-1:]]
 
     def release(self, knot: Knot, inflated: Array | None = None) -> None:
         """Keep a final knot in the history."""

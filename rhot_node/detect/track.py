@@ -338,9 +338,9 @@ def take(track, place, extent, level, hidden):
             track.area *= HIDDEN_DECAY
             track.rate = 0.0
         else:
-            surprise = math.log(place.area / track.area)
-            track.rate = min(max(track.rate + RATE_GAIN * surprise, -RATE_MAX), RATE_MAX)
-            track.area *= math.exp(AREA_GAIN * surprise + track.rate)
+            log_growth = math.log(place.area / track.area)
+            track.rate = min(max(track.rate + RATE_GAIN * log_growth, -RATE_MAX), RATE_MAX)
+            track.area *= math.exp(AREA_GAIN * log_growth + track.rate)
             track.extent = extent
     else:
         track.area, track.extent = place.area, extent
