@@ -19,12 +19,15 @@ from __future__ import annotations
 import gc
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fabrik_variants import COARSE, EFFORT, Fabrik, solve
+from fabrik_variants import solve_arrays as variant_arrays
+from joint_shapes import Shape, clamp_joint, shape_knuckles
 from numpy.typing import NDArray
 from solvers_chart import draw_chart
 from tables import arguments, publish, table
@@ -33,22 +36,13 @@ from rhot_app.hand.anatomy import DIP_PER_PIP, load_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, build_model, neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
-from rhot_app.hand.solvers.joint_shapes import Shape, clamp_joint, shape_knuckles
-from rhot_app.hand.solvers.methods import (
-    COARSE,
-    EFFORT,
-    Method,
-    Problem,
-    make_problem,
-    solve,
-    solve_arrays,
-)
+from rhot_app.hand.solvers.methods import Method, Problem, make_problem, solve_arrays
 from rhot_node.files import resource_path
 
 Array = NDArray[Any]
 
 EXACT_MM = 1e-3
-BUDGET_US = {Method.DAMPED: 25.0, Method.LEVENBERG: 25.0, Method.CLOSED_FORM: 15.0, Method.FABRIK: 40.0}
+BUDGET_US = {Method.DAMPED: 25.0, Method.LEVENBERG: 25.0, Method.CLOSED_FORM: 15.0, Fabrik.FABRIK: 40.0}
 EXACT = (Method.DAMPED, Method.NEWTON, Method.LEVENBERG, Method.CLOSED_FORM)
 VIOLATION_DEG = 0.1
 INDEX = 1
@@ -85,23 +79,26 @@ def problems(model: HandModel, case: str, count: int, rng: np.random.Generator,
     return found
 
 
-def measure(method: Method, cases: list[Problem]) -> dict[str, float]:
+def measure(method: Method | Fabrik, cases: list[Problem]) -> dict[str, float]:
     """The figures of one method over many hands."""
-    tolerance, most = EFFORT[method]
-    room = (np.empty(5), np.empty(5, np.int64), np.empty(5, np.uint8), np.empty(5, np.bool_), np.empty((5, 4, 3)))
+    effort, handed_over = EFFORT[method], np.zeros(5, np.bool_)
+    room: tuple[Array, ...] = (np.empty(5), np.empty(5, np.int64), np.empty(5, np.uint8))
+    arrays: Callable[..., None] = solve_arrays
+    if isinstance(method, Fabrik):
+        room, arrays = (*room, np.empty((5, 4, 3)), handed_over), variant_arrays
     times, residuals, iterations, excess, handed = [], [], [], [], []
     gc.disable()
     for problem in cases:
         angles = problem.start.copy()
         before = time.perf_counter_ns()
-        solve_arrays(int(method), angles, problem.lengths, problem.limits, problem.targets, tolerance, most, *room)
+        arrays(int(method), angles, problem.lengths, problem.limits, problem.targets, effort, *room)
         times.append(1e-3 * (time.perf_counter_ns() - before))
         residuals.append(1e3 * room[0])
         iterations.append(room[1].copy())
-        handed.append(room[3].copy())
+        handed.append(handed_over.copy())
         excess.append(np.maximum(problem.limits[:, 0] - angles, angles - problem.limits[:, 1]).max())
     gc.enable()
-    missed = np.array(residuals) > max(EXACT_MM, 1e3 * tolerance)
+    missed = np.array(residuals) > max(EXACT_MM, 1e3 * effort.tolerance)
     return {"median_us": float(np.median(times)), "p99_us": float(np.percentile(times, 99)),
             "iterations": float(np.median(iterations)), "most_iterations": float(np.max(iterations)),
             "residual_mm": float(np.median(residuals)), "worst_mm": float(np.max(residuals)),
@@ -124,7 +121,7 @@ def axis_path(model: HandModel) -> Iterator[Array]:
         yield np.array([abs(along), 0.2 * along, -depth])
 
 
-def follow(method: Method, model: HandModel, path: Iterator[Array]) -> dict[str, float]:
+def follow(method: Method | Fabrik, model: HandModel, path: Iterator[Array]) -> dict[str, float]:
     """Largest change of a joint of the index finger in one step, and largest distance from what can be reached."""
     rows, reach = ANGLE_SLICES[INDEX], model.chain[INDEX].sum()
     angles, jumps, misses, first = neutral_pose().angles.copy(), [], [], True
@@ -147,13 +144,13 @@ def all_figures(model: HandModel, hands: int) -> dict[str, dict[str, dict[str, f
     shaped = {f"FABRIK, {shape.name.lower()} knuckles":
               {case: problems(model, case, hands, np.random.default_rng(2), shape) for case in cases}
               for shape in (Shape.CONE, Shape.PARABOLA)}
-    for method in Method:
+    for method in (*Method, *Fabrik):
         solve(method, cases["near"][0])  # compiled, or read from the cache
         figures[method.name] = {case: measure(method, drawn) for case, drawn in cases.items()}
         figures[method.name]["stretch"] = follow(method, model, stretch_path(model))
         figures[method.name]["axis"] = follow(method, model, axis_path(model))
     for name, drawn in shaped.items():
-        figures[name] = {case: measure(Method.FABRIK, own) for case, own in drawn.items()}
+        figures[name] = {case: measure(Fabrik.FABRIK, own) for case, own in drawn.items()}
     return figures
 
 
@@ -169,7 +166,7 @@ def shortfalls(figures: dict[str, dict[str, dict[str, float]]]) -> list[str]:
                   for case in (("near", "far") if coupled_only else ("near", "far", "any"))
                   if figures[method.name][case]["worst_mm"] > EXACT_MM]
     lines += [f"{name} {case}: {row[case]['excess_deg']:.2f} degrees beyond a limit"
-              for name, row in figures.items() if name != Method.FABRIK_FREE.name
+              for name, row in figures.items() if name != Fabrik.FABRIK_FREE.name
               for case in ("near", "far", "any") if row[case]["excess_deg"] > VIOLATION_DEG]
     return lines
 

@@ -1,11 +1,16 @@
 """FABRIK against the paper's own pseudocode, written down a second time in plain numpy."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhot_app.hand.solvers.fabrik import solve_chain
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+from fabrik_variants import solve_chain
 
 
 def published(joints, target, tolerance, iterations):

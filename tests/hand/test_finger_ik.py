@@ -10,7 +10,8 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.limits import clamp_angle
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
-from rhot_app.hand.solvers.finger_chain import Status, chain_points, fabrik_finger, fabrik_thumb, to_finger
+from rhot_app.hand.solvers.fabrik import fabrik_finger, fabrik_thumb
+from rhot_app.hand.solvers.finger_chain import Status, chain_points, to_finger
 from rhot_app.hand.solvers.finger_ik import solve_fingers
 
 HUNDREDTH_DEGREE = np.radians(0.01)

@@ -1,6 +1,8 @@
 """The solvers side by side: targets met, limits kept, what stopped them said, formulas as numpy has them."""
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,16 +14,20 @@ from rhot_app.hand.anatomy import DIP_PER_PIP
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
-from rhot_app.hand.solvers.fabrik import solve_chain
 from rhot_app.hand.solvers.finger_chain import Status, chain_points
 from rhot_app.hand.solvers.inverse import damped_step, svd_step
-from rhot_app.hand.solvers.methods import COARSE, EFFORT, Effort, Method, make_problem, solve
+from rhot_app.hand.solvers.methods import Effort, Method, make_problem
 from rhot_app.hand.solvers.newton import chain_axes
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+from fabrik_variants import COARSE, EFFORT, Fabrik, solve, solve_chain
 
 MICROMETRE = 1e-6
 TENTH_DEGREE = np.radians(0.1)
 EXACT = (Method.DAMPED, Method.NEWTON, Method.LEVENBERG)
-LIMITED = tuple(method for method in Method if method is not Method.FABRIK_FREE)
+ALL = (*Method, *Fabrik)
+LIMITED = tuple(method for method in ALL if method is not Fabrik.FABRIK_FREE)
 
 
 def problem_of(model, angles, start=None):
@@ -97,7 +103,7 @@ def test_limits_are_kept_and_the_status_tells_the_truth(right_hand, method):
         np.testing.assert_array_equal(solution.statuses == Status.REACHED, missed <= EFFORT[method].tolerance)
 
 
-@pytest.mark.parametrize("method", [*EXACT, Method.CLOSED_FORM, Method.FABRIK])
+@pytest.mark.parametrize("method", [*EXACT, Method.CLOSED_FORM, Fabrik.FABRIK])
 def test_target_beyond_reach_stretches_the_finger_towards_it(right_hand, method):
     heading = np.array([np.cos(0.6), 0.0, -np.sin(0.6)])
     reach = right_hand.chain[2].sum()
@@ -113,17 +119,17 @@ def test_target_inside_the_fold_is_unreachable(right_hand):
     assert solution.statuses[1] == Status.UNREACHABLE
 
 
-@pytest.mark.parametrize("method", [*EXACT, Method.CLOSED_FORM, Method.FABRIK])
+@pytest.mark.parametrize("method", [*EXACT, Method.CLOSED_FORM, Fabrik.FABRIK])
 def test_straight_finger_is_pulled_in_along_its_own_line(right_hand, method):
     straight = neutral_pose().angles.copy()
     straight[9:13] = [0.0, 0.5, 0.0, 0.0]
     target = 0.97 * right_hand.chain[2].sum() * np.array([np.cos(0.5), 0.0, -np.sin(0.5)])
     solution = solve(method, aimed(right_hand, 2, target, straight))
     assert solution.statuses[2] == Status.REACHED
-    assert solution.handed_over[2] == (method is Method.FABRIK)
+    assert solution.handed_over[2] == (method is Fabrik.FABRIK)
 
 
-@pytest.mark.parametrize("method", [Method.TRANSPOSE, Method.SVD, Method.FABRIK_ALONE])
+@pytest.mark.parametrize("method", [Method.TRANSPOSE, Method.SVD, Fabrik.FABRIK_ALONE])
 def test_those_that_cannot_leave_the_straight_pose_say_so(right_hand, method):
     limits = right_hand.limits.copy()
     limits[9:13] = [[-0.5, 0.5], [-0.5, 1.5], [-0.5, 1.5], [-0.5, 1.5]]
@@ -140,7 +146,7 @@ def test_locked_fabrik_says_that_limits_stopped_it_and_hands_over(right_hand):
     stopped = 0
     for _ in range(40):
         problem = problem_of(right_hand, rng.uniform(*right_hand.limits.T))
-        alone, whole = solve(Method.FABRIK_ALONE, problem), solve(Method.FABRIK, problem)
+        alone, whole = solve(Fabrik.FABRIK_ALONE, problem), solve(Fabrik.FABRIK, problem)
         locked = alone.statuses != Status.REACHED
         assert set(alone.statuses[locked]) <= {Status.LIMITED, Status.STALLED, Status.EXHAUSTED}
         assert whole.handed_over[locked].all() and (whole.statuses == Status.REACHED).all()
@@ -207,7 +213,7 @@ def test_free_fabrik_is_the_published_one(right_hand):
     rng = np.random.default_rng(8)
     problem = problem_of(right_hand, rng.uniform(*right_hand.limits.T))
     for iterations in range(1, 6):
-        solution = solve(Method.FABRIK_FREE, problem, Effort(0.0, iterations))
+        solution = solve(Fabrik.FABRIK_FREE, problem, Effort(0.0, iterations))
         for finger, rows in enumerate(ANGLE_SLICES):
             joints, length = np.empty((4, 3)), problem.lengths[finger]
             chain_points(problem.start[rows].copy(), length, joints, np.empty((3, rows.stop - rows.start)))
@@ -220,7 +226,7 @@ def test_finger_without_target_stays(right_hand):
     problem = problem_of(right_hand, neutral_pose().angles)
     targets = problem.targets.copy()
     targets[3] = np.nan
-    for method in Method:
+    for method in ALL:
         solution = solve(method, replace(problem, targets=targets))
         assert solution.statuses[3] == Status.MISSING and np.isnan(solution.residuals[3])
         np.testing.assert_array_equal(solution.angles[13:17], problem.start[13:17])

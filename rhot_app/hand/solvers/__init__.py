@@ -1,1 +1,1 @@
-"""The inverse kinematics of the literature side by side, apart from the live path: `methods.solve` is the way in."""
+"""Inverse kinematics: what the trackers solve hands with, and the literature's solvers, which a rig may choose."""

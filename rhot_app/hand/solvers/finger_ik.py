@@ -7,7 +7,6 @@ the joints that the target leaves free on the natural pose (DIP = 2/3 PIP, RHOT 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,16 +16,8 @@ from numpy.typing import NDArray
 from rhot_app.estimation.least_squares import Stop, descend, implements
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import FINGER_ANGLES, HandPose
-from rhot_app.hand.solvers.finger_chain import (
-    MISSING,
-    clamp,
-    fabrik_within,
-    linearise,
-    miss,
-    norm,
-    status_of,
-    to_finger,
-)
+from rhot_app.hand.solvers.fabrik import fabrik_within
+from rhot_app.hand.solvers.finger_chain import MISSING, Solution, clamp, linearise, miss, norm, status_of, to_finger
 from rhot_app.hand.solvers.pose_descent import STEP_MAX
 
 Array = NDArray[np.float64]
@@ -46,20 +37,8 @@ the pose is looked for, near the target."""
 STOP = Stop(12, 1e-4, 1e-6, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class FingersSolution:
-    """All five fingers: `angles` (21,) rad, `residuals` (5,) m (NaN without a target), `iterations` (5,), `reached`
-    (5,) bool, `statuses` (5,) of Status."""
-
-    angles: Array
-    residuals: Array
-    iterations: NDArray[np.int64]
-    reached: NDArray[np.bool_]
-    statuses: NDArray[np.uint8]
-
-
 def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: float = TOLERANCE,
-                  max_iterations: int = FABRIK_ITERATIONS, target_sd: float = 0.0) -> FingersSolution:
+                  max_iterations: int = FABRIK_ITERATIONS, target_sd: float = 0.0) -> Solution:
     """Bring the marker of every finger with a target there: `targets` (5, 3) m world; NaN rows keep the pose's angles.
 
     Nearby targets give nearby angles. A target out of reach stretches the finger towards it as far as the limits allow.
@@ -74,7 +53,7 @@ def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: f
                          model.chain, model.chain_bend, model.limits, targets, model.pose_prior.mean,
                          model.pose_prior.information, tolerance, max_iterations, target_sd, residuals, iterations,
                          statuses)
-    return FingersSolution(angles, residuals, iterations, residuals <= tolerance, statuses)
+    return Solution(angles, residuals, iterations, statuses)
 
 
 @njit(cache=True)
