@@ -1,6 +1,8 @@
-"""How much there is to read in the core: files, tokens, lines, and the numbers that somebody chose.
+"""How much there is to read in the core or the shell: files, tokens, lines, and the numbers that somebody chose.
 
-    python benchmarks/core_size.py [--against COMMIT] [--json FILE]
+    python benchmarks/core_size.py [--shell] [--against COMMIT] [--json FILE]
+
+The core is what a frame meets between a camera and a state; the shell is what people and other programs meet.
 
 Tokens are those of Python's `tokenize` without comments, docstrings and layout. A chosen number is a literal of an
 algorithm, at module level, in a record, a default or a body. Not chosen: 0, 1, 2 and 0.5; powers of ten between units
@@ -14,7 +16,7 @@ import io
 import subprocess
 import sys
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tables import arguments, publish, table
@@ -23,6 +25,9 @@ ROOT = Path(__file__).resolve().parents[1]
 CORE = ("rhot_node", *(f"rhot_app/{room}" for room in (
     "estimation", "geometry", "filters", "hand", "tracking", "barehand", "articulated", "objects", "handfit",
     "recording", "sources", "state.py", "project", "project.py", "api.py")))
+SHELL = tuple(f"rhot_app/{room}" for room in (
+    "ui", "calibration", "simulator", "engine", "export", "outputs", "evaluation", "certificate", "mouse", "warm",
+    "warm.py", "__main__.py"))
 FORMATS = ("rhot_node/wire/", "rhot_node/video/avi.py")
 
 LAYOUT = frozenset((tokenize.NEWLINE, tokenize.NL, tokenize.INDENT, tokenize.DEDENT, tokenize.COMMENT,
@@ -32,10 +37,10 @@ SHAPES = frozenset(("zeros", "empty", "ones", "eye", "full", "reshape", "tile", 
 STRUCTURE = frozenset((0, 1, 2, 0.5, *(10.0**k for k in range(-9, 10, 3))))
 
 
-def files(commit: str | None) -> Iterator[tuple[str, str]]:
-    """Path and text of each file of the core, of the working tree or of a commit."""
-    listed = subprocess.run(["git", "ls-tree", "-r", "--name-only", commit, "--", *CORE] if commit else
-                            ["git", "ls-files", "--", *CORE], cwd=ROOT, capture_output=True, text=True, check=True)
+def files(commit: str | None, rooms: Sequence[str] = CORE) -> Iterator[tuple[str, str]]:
+    """Path and text of each file of some rooms, of the working tree or of a commit."""
+    listed = subprocess.run(["git", "ls-tree", "-r", "--name-only", commit, "--", *rooms] if commit else
+                            ["git", "ls-files", "--", *rooms], cwd=ROOT, capture_output=True, text=True, check=True)
     for path in listed.stdout.split():
         if not path.endswith(".py"):
             continue
@@ -117,10 +122,10 @@ def chosen(path: str, text: str) -> list[tuple[int, float]]:
     return visitor.found
 
 
-def measure(commit: str | None) -> dict[str, float]:
+def measure(commit: str | None, rooms: Sequence[str] = CORE) -> dict[str, float]:
     """All figures of the working tree or of a commit."""
     count = {"files": 0, "tokens": 0, "lines of code": 0, "chosen numbers": 0}
-    for path, text in files(commit):
+    for path, text in files(commit, rooms):
         tokens, lines = tokens_and_lines(text)
         count["files"] += 1
         count["tokens"] += tokens
@@ -132,22 +137,24 @@ def measure(commit: str | None) -> dict[str, float]:
 def main() -> int:
     """Print the table."""
     parser = arguments(__doc__)
+    parser.add_argument("--shell", action="store_true", help="the shell instead of the core")
     parser.add_argument("--against", metavar="COMMIT", help="also measure a commit, and print the ratios")
     parser.add_argument("--room", metavar="PATH", help="list the chosen numbers of the files that begin so")
     args = parser.parse_args()
+    part, rooms = ("the shell", SHELL) if args.shell else ("the core", CORE)
     if args.room:
-        for path, text in files(None):
+        for path, text in files(None, rooms):
             for line, value in chosen(path, text) if path.startswith(args.room) else []:
                 print(f"{path}:{line}: {value}")
         return 0
-    here = measure(None)
+    here = measure(None, rooms)
     rows = [[name, value] for name, value in here.items()]
-    head = ["the core", "now"]
+    head = [part, "now"]
     if args.against:
-        then = measure(args.against)
+        then = measure(args.against, rooms)
         head += [args.against, "ratio"]
         rows = [[name, value, then[name], value / then[name]] for name, value in here.items()]
-    publish(args, {"core": rows}, table(head, rows))
+    publish(args, {part.split()[1]: rows}, table(head, rows))
     return 0
 
 
