@@ -89,37 +89,48 @@ def test_a_thing_behind_the_hand_is_not_the_marker(kind: str, first: bool) -> No
     assert max(np.linalg.norm(state.marker_positions[1] - REST[1]) for state in states) < 2e-3
 
 
-def beside_things(kind: str) -> list[HandState]:
+DECOYS = {  # of which marker's colour, and where, in m, from the marker
+    "behind an index finger": (1, (0.2, -0.15, 0.5)), "beside an index finger": (1, (0.2, 0.05, 0.05)),
+    "before a ring finger": (3, (0.1, 0.1, -0.15)), "behind the wrist": (5, (0.2, -0.15, 0.5)),
+    "beside the wrist": (5, (0.15, 0.1, 0.0))}
+
+
+def beside_things(kind: str, decoy: str, seed: int = 7) -> list[HandState]:
     """States of a still hand, one of whose markers is hidden for a second while two things have its colour."""
-    things = np.stack([THING, THING + np.array([-0.4, 0.0, 0.1])])
+    marker, offset = DECOYS[decoy]
+    thing = REST[marker] + np.array(offset)
+    things = np.stack([thing, thing + np.array([-0.4, 0.0, 0.1])])
     frames = []
-    for frame in observe(RIG, WIDE, still_trajectory(REST), 2.5, Viewing()):
+    for frame in observe(RIG, WIDE, still_trajectory(REST), 2.5, Viewing(seed=seed)):
         t_s = 1e-9 * frame.t_row0_master_ns - 5e5
-        both = with_further(frame, [1, 1], things)
+        both = with_further(frame, [marker, marker], things)
         if 1.0 <= t_s < 2.0:  # hidden: the node reports the things, one of them as the best candidate
             pixels = both.pixels.copy()
-            pixels[1] = both.further.pixels[0]
+            pixels[marker] = both.further.pixels[0]
             both = replace(both, pixels=pixels, further=both.further.of(np.arange(6)))
         frames.append(both)
     return run(make_tracker(with_tracker(RIG, kind)), frames)
 
 
 @pytest.mark.parametrize("kind", ["classic", "estimator"])
-def test_a_thing_is_not_called_a_hidden_marker(kind: str) -> None:
-    states = beside_things(kind)
+@pytest.mark.parametrize("decoy", DECOYS)
+def test_a_thing_does_not_take_the_place_of_a_hidden_marker(kind: str, decoy: str) -> None:
+    states, marker = beside_things(kind, decoy), DECOYS[decoy][0]
     hidden = [state for state in states if 1.1 < seconds(state) < 1.95]
-    assert hidden and all(state.marker_knowledge[1] != MEASURED for state in hidden)
-    assert states[-1].marker_knowledge[1] == KNOWN[kind]
+    others = [m for m in range(6) if m != marker]
+    assert hidden and all(state.marker_knowledge[marker] != MEASURED for state in hidden)
+    assert all((state.marker_knowledge[others] == KNOWN[kind]).all() for state in hidden)
+    assert max(np.linalg.norm(state.marker_positions[others] - REST[others], axis=1).max() for state in hidden) < 5e-3
+    assert states[-1].marker_knowledge[marker] in (KNOWN[kind], INFERRED)  # two candidates are near
+    assert np.linalg.norm(states[-1].marker_positions[marker] - REST[marker]) < 2e-3
 
 
-@pytest.mark.parametrize("kind", ["classic", pytest.param("estimator", marks=pytest.mark.xfail(
-    strict=True, reason="a thing that is the best candidate for a second draws the hand away: of 12 seeds of the "
-                        "noise, 3 ended farther off than 2 mm by one rule to end a fit, 5 by another"))])
-def test_a_thing_does_not_take_the_place_of_a_hidden_marker(kind: str) -> None:
-    states = beside_things(kind)
+@pytest.mark.parametrize("seed", range(8, 12))
+def test_no_noise_makes_a_thing_a_hidden_marker(seed: int) -> None:
+    states = beside_things("estimator", "behind an index finger", seed)
     hidden = [state for state in states if 1.1 < seconds(state) < 1.95]
-    assert all((state.marker_knowledge[[0, 2, 3, 4, 5]] == KNOWN[kind]).all() for state in hidden)
-    assert np.linalg.norm(states[-1].marker_positions[1] - REST[1]) < 2e-3
+    assert max(np.linalg.norm(np.delete(state.marker_positions - REST, 1, axis=0), axis=1).max()
+               for state in hidden) < 5e-3
 
 
 VARIANCES = np.full(len(REST), POSITION_SD_M**2)

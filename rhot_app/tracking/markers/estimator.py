@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.estimation.layout import pose_matrix
-from rhot_app.estimation.track import LOST_NS, SESSION_NS, Life, TrackFilter
+from rhot_app.estimation.track import LOST_NS, NEVER, PREDICTED_NS, SESSION_NS, Life, TrackFilter
+from rhot_app.geometry.camera import undistort_points
+from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.landmarks import LASTING_S
 from rhot_app.hand.motion.hand_process import HandProcess
 from rhot_app.hand.motion.hand_state import STATE, TANGENT
@@ -32,8 +34,9 @@ from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObs
 from rhot_app.tracking.markers.hand_size import HandSize
 from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
-from rhot_app.tracking.rig_arrays import compile_rig
+from rhot_app.tracking.rig_arrays import RigArrays, compile_rig
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, HandFrame, Tracker
+from rhot_app.tracking.trust import JUMP_FLOOR_M
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
@@ -112,7 +115,7 @@ class Estimator(Tracker):
             self._resize(*self._size.known)
         self._life, self._by_one = Life(), False
         self._filter.end()
-        self._rejections = Rejections(len(self._rig.cameras), self._markers)
+        self._rejections = Rejections(self._rig, self._markers)
 
     def ingest(self, frame: CameraFrame) -> None:
         """Take one frame in; it is weighed by the next `solve`."""
@@ -248,7 +251,8 @@ class Estimator(Tracker):
         if self._filter.history is not None:
             knot.label = Weighed(frame.observations, copied(self._observations), copied(self._process), self._scale,
                                  self._by_one)
-        wrong = self._rejections.wrong(frame, inliers, distances, self._observations.periods_s[frame.camera])
+        period_s = self._observations.periods_s[frame.camera]
+        wrong = self._rejections.wrong(frame, inliers, distances, period_s, knot.state, self._scale[0])
         if wrong:
             inflated = self._filter.newest.covariance.copy()
             for part, factor in wrong:
@@ -265,29 +269,72 @@ class Estimator(Tracker):
 
 
 class Rejections:
-    """How often in a row each of C cameras has rejected each marker."""
+    """How often in a row each of C cameras has rejected each of M markers, and where it saw it last meanwhile."""
 
-    def __init__(self, cameras: int, markers: MarkerModel) -> None:
-        self._markers, self._counts = markers, np.zeros((cameras, len(markers.finger)), np.int64)
+    def __init__(self, rig: RigArrays, markers: MarkerModel) -> None:
+        shape = len(rig.cameras), len(markers.finger)
+        self._rig, self._markers, self._counts = rig, markers, np.zeros(shape, np.int64)
+        self._pixels, self._times = np.zeros((*shape, 2)), np.full(shape, NEVER, np.int64)
 
-    def wrong(self, frame: MarkerFrame, accepted: Mask, distances: Array, period_s: float) -> list[tuple[slice, float]]:
+    def wrong(self, frame: MarkerFrame, accepted: Mask, distances: Array, period_s: float, state: Array,
+              scale: float) -> list[tuple[slice, float]]:
         """The fingers, and the palm, whose marker one camera has rejected REJECTIONS times in a row: outliers do not
-        last. All rejections of a landmark within the correlation time of its error count as one. `distances` (M,):
-        squared Mahalanobis distances, 2 on average. `period_s`: between the camera's frames. Returns where they are in
-        a pose, and the factors by which their covariance is too small."""
+        last, but for things that no hand has there. All rejections of a landmark within the correlation time of its
+        error count as one. `distances` (M,): squared Mahalanobis distances, 2 on average. `period_s`: between the
+        camera's frames. `state`: of the hand, by the `accepted` ones; `scale`: its size over that of its file. Returns
+        where they are in a pose, and the factors by which their covariance is too small."""
         rejected, observations = self._counts[frame.camera], frame.observations
         reported = ((observations.flags & int(MarkerFlag.LOST)) == 0) & np.isfinite(observations.pixels[:, 0])
+        refused = reported & ~accepted
         rejected[accepted] = 0
-        rejected[reported & ~accepted] += 1
+        rejected[refused] += 1
+        self._pixels[frame.camera, refused], self._times[frame.camera, refused] = frame.pixels[refused], frame.t_ns
         enough = REJECTIONS * np.where(self._markers.landmark, max(LASTING_S / period_s, 1.0), 1.0)
+        often = np.flatnonzero((rejected >= enough) & (distances > GATE))
         found = []
-        for m in np.flatnonzero((rejected >= enough) & (distances > GATE)):
+        for m in often[self._may_be_there(often, frame, accepted, state, scale)] if len(often) else ():
             finger = self._markers.finger[m]
             angles = ANGLE_SLICES[finger]
             first = TANGENT.angles.start
             found.append((slice(first + angles.start, first + angles.stop) if finger >= 0 else TANGENT.palm,
                           0.5 * float(distances[m])))
         return found
+
+    def _may_be_there(self, markers: Indices, frame: MarkerFrame, accepted: Mask, state: Array,
+                      scale: float) -> Mask:
+        """(K,) whether a hand in `state` may have each of `markers` (K,) where this camera sees it: a part of its ray
+        is within reach of all accepted markers, and other cameras' rays do not meet it elsewhere."""
+        dh, places = frame.markers.dh, np.empty((len(accepted), 3))
+        forward_arrays(dh, pose_matrix(state), state[STATE.angles], empty_frames(dh), places)
+        reach = scale * self._rig.reach[:, accepted]
+        return np.array([self._is_in_reach(m, frame, places[accepted], reach[m]) for m in markers])
+
+    def _is_in_reach(self, m: int, frame: MarkerFrame, others: Array, reach: Array) -> bool:
+        """Whether marker m may be there, as far as it can be from `others` (K, 3) m by their `reach` (K,) m."""
+        origin, along = self._ray(frame.camera, frame.pixels[m])
+        apart = others - origin
+        depths = apart @ along
+        room = (reach + JUMP_FLOOR_M) ** 2 - (apart * apart).sum(axis=1) + depths**2
+        if (room < 0.0).any():
+            return False
+        nearest = np.max(depths - np.sqrt(room), initial=0.0)
+        farthest = np.min(depths + np.sqrt(room), initial=np.inf)
+        for camera in range(len(self._counts)):
+            if camera != frame.camera and abs(frame.t_ns - self._times[camera, m]) < PREDICTED_NS:
+                other, direction = self._ray(camera, self._pixels[camera, m])
+                across = along - (along @ direction) * direction
+                sine_sq = across @ across
+                depth = across @ (other - origin) / sine_sq
+                slack = JUMP_FLOOR_M / math.sqrt(sine_sq)
+                nearest, farthest = max(nearest, depth - slack), min(farthest, depth + slack)
+        return bool(nearest <= farthest)
+
+    def _ray(self, camera: int, pixel: Array) -> tuple[Array, Array]:
+        """Origin m and unit direction, world, of a pixel's ray."""
+        pose = self._rig.cameras[camera]
+        x, y = undistort_points(pixel[None], self._rig.intrinsics[camera])[0]
+        direction = np.array([x, y, 1.0]) @ pose[:, :3]
+        return -pose[:, 3] @ pose[:, :3], direction / np.linalg.norm(direction)
 
 
 def associate(frame: MarkerFrame, pixels: Array, covariances: Array, distances: Array) -> MarkerFrame:
