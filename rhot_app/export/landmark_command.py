@@ -10,9 +10,7 @@ from typing import Any
 
 from rhot_app.errors import RecordingError, input_file, positive_number
 from rhot_app.progress import ProgressLine
-from rhot_node.landmarks import install_command
-from rhot_node.landmarks.install import LICENCE, PACKAGE
-from rhot_node.landmarks.install_command import add_wheel
+from rhot_node.landmarks.install import LICENCE, PACKAGE, add_wheel, install
 from rhot_node.terminal import add_examples
 
 INSTALL = "install"
@@ -50,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
         if len(args.tables) > 1 or args.rig is not None or args.out is not None:
             args.refuse("install stands alone, or with --wheel FILE")
         progress = ProgressLine("Installing the hand networks")
-        return install_command.install(args.wheel, False, progress.report)
+        return install(args.wheel, False, progress.report)
     missing = [option for option, value in (("--rig", args.rig), ("--out", args.out)) if value is None]
     if missing or args.wheel is not None:
         args.refuse(f"a log of landmarks needs {' and '.join(missing)}" if missing else "--wheel belongs to install")

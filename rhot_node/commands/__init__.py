@@ -18,7 +18,7 @@ COMMANDS = {
                "something could be better; 2: something is wrong."),
     "install": (_SETUP, "Make the node a system service (systemd): started at boot, restarted when it ends or hangs, "
                         "held in bounds. To be run as root. Its settings then lie in /var/lib/rhot-node/node.json."),
-    "landmarks": ("rhot_node.landmarks.install_command",
+    "landmarks": ("rhot_node.landmarks.install",
                   "Install the networks that find 21 landmarks of a bare hand. They are taken out of a wheel, which "
                   "pip downloads (36 MB) and which is not installed."),
     "pair": (_SETUP, "Show a fresh one-time code to pair a master with; the code before it is void."),
