@@ -21,9 +21,9 @@ import tables
 
 from rhot_node.capture.yuv import YuvWriter
 from rhot_node.config import CameraSettings, NodeSettings, save_settings
+from rhot_node.detectors import warm_up_image
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
-from rhot_node.warm_up import warm_up_image
 
 SIZE = (640, 480)
 FPS = 40

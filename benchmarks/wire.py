@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from tables import arguments, publish, table
 
-from rhot_app.sources.text_datagrams import Point, parse_text
+from rhot_app.sources.validation import Point, parse_text
 from rhot_node.detect.fast import FastDetector
+from rhot_node.detectors import warm_up, warm_up_image
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
-from rhot_node.warm_up import warm_up, warm_up_image
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import MarkerObservation, Observations
 

@@ -45,13 +45,13 @@ from rhot_node.clock import NodeClock
 from rhot_node.compiled import ALL, VARIABLE, WINDOW, is_complete, mark_complete
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.tags import TagDetector
+from rhot_node.detectors import warm_up as warm_up_detector
 from rhot_node.files import resource_path
 from rhot_node.foreground_store import ForegroundStore
 from rhot_node.markers import load_markers
 from rhot_node.slice_search import SliceSearch
 from rhot_node.tag_search import warm_up_picture
 from rhot_node.threads import OneShotThread
-from rhot_node.warm_up import warm_up as warm_up_detector
 from rhot_node.wire.messages import FAMILIES
 
 

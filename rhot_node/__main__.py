@@ -24,7 +24,6 @@ from rhot_node.terminal import add_examples, printable_output
 
 if TYPE_CHECKING:
     from rhot_node.config import NodeSettings
-    from rhot_node.detect.image import Detector
     from rhot_node.keys import NodeTrust
     from rhot_node.network.pairing import OfferFile
 
@@ -116,7 +115,7 @@ def daemon_parser() -> argparse.ArgumentParser:
 
 def _serve(options: argparse.Namespace) -> int:
     from rhot_node.config import load_settings
-    from rhot_node.logs import log_to_stderr
+    from rhot_node.terminal import log_to_stderr
     end = End(os.getppid() if options.exit_with_parent else None)
     settings = load_settings(options.settings)
     log_to_stderr(options.log_level.upper(), f"%(asctime)s {settings.name} %(levelname)s %(message)s")
@@ -129,9 +128,9 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     """Put the parts together and loop until the end."""
     from rhot_node.capture.open import data_set_settings, open_camera
     from rhot_node.daemon import NodeDaemon
+    from rhot_node.detectors import DetectorChoice, make_detector
     from rhot_node.foreground_store import ForegroundStore, foreground_path
-    from rhot_node.health.checks import HealthMonitor
-    from rhot_node.health.machine import Machine
+    from rhot_node.health.checks import HealthMonitor, Machine
     from rhot_node.keys import trust_state
     from rhot_node.network.control import ControlServer
     from rhot_node.network.link import UdpLink
@@ -139,7 +138,6 @@ def _run(options: argparse.Namespace, settings: NodeSettings, end: End) -> None:
     from rhot_node.network.presence import Announcer, Presence
     from rhot_node.network.requests import Responder, SettingsStore
     from rhot_node.network.session import LinkKeys
-    from rhot_node.plugins import DetectorChoice
     from rhot_node.service import ServiceManager
     from rhot_node.video.recorder import VideoRecorder, video_folder
     from rhot_node.wire.messages import U32_MAX
@@ -213,20 +211,6 @@ def _invite(settings: NodeSettings, offers: OfferFile) -> None:
     from rhot_node.commands.setup_command import invitation
     logging.getLogger(__name__).warning("not paired yet\n%s",
                                         invitation(settings, offers.current() or offers.renew()))
-
-
-def make_detector(settings: NodeSettings) -> Detector:
-    """The detector that the settings name, no plug-in, compiled and warmed up."""
-    from rhot_node.warm_up import warm_up
-    detector: Detector
-    if settings.detector == "reference":
-        from rhot_node.detect.reference import ReferenceDetector
-        detector = ReferenceDetector(settings.markers)
-    else:
-        from rhot_node.detect.fast import FastDetector
-        detector = FastDetector(settings.markers)
-    warm_up(detector, settings.markers, (settings.camera.width, settings.camera.height))
-    return detector
 
 
 if __name__ == "__main__":

@@ -156,8 +156,8 @@ def preload(package: str) -> None:
         for module in pkgutil.walk_packages(importlib.import_module(name).__path__, f"{name}."):
             importlib.import_module(module.name)
     if package == "rhot_node":
-        from rhot_node.__main__ import make_detector
         from rhot_node.config import load_settings
+        from rhot_node.detectors import make_detector
         from rhot_node.files import resource_path
         make_detector(load_settings(resource_path("nodes", "left.json")))
     else:

@@ -39,8 +39,8 @@ from rhot_app.simulator.scene.rigid_target import BALL_RADIUS_M, STICK_RGB, Rigi
 from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
 from rhot_app.simulator.scene.scene_description import MarkerShow
 from rhot_app.sources.local_nodes import NodePorts
-from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
+from rhot_node.detectors import make_detector
 from rhot_node.wire.messages import MarkerObservation
 
 Array = NDArray[np.float64]

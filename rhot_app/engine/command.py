@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.keys import load_master_keys
     from rhot_app.project import load_rig
     from rhot_app.sources.links import UdpNodes
-    from rhot_node.logs import log_to_stderr
+    from rhot_node.terminal import log_to_stderr
 
     if args.video and args.log is None:
         raise EngineError("--video needs --log FILE: the videos belong to a recording.")

@@ -33,8 +33,8 @@ from rhot_app.outputs.outputs import Outputs, check_output
 from rhot_app.outputs.spec import SECRET_VARIABLE, OutputStatus, as_run
 from rhot_app.project import OutputSettings, Rig, parse_rig
 from rhot_app.state import HandState
-from rhot_node.logs import log_to_stderr
 from rhot_node.network.context import Context
+from rhot_node.terminal import log_to_stderr
 from rhot_node.threads import OneShotThread, Watch, Worker, complaints
 
 RESTART_S: Final = 1.0

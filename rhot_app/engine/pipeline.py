@@ -35,8 +35,8 @@ from rhot_app.tracking.tracker import (
 )
 from rhot_node.wire.codec import decode as decode_datagram
 from rhot_node.wire.codec import encode as encode_datagram
-from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import MarkerObservation, Observations
+from rhot_node.wire.points import MarkerTable
 
 RECENT = 256
 """Frames kept for whoever looks a few times a second: half a second of four cameras at 120 Hz."""

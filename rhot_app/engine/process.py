@@ -22,7 +22,7 @@ from rhot_app.engine.client import EngineClient
 from rhot_app.engine.directory import EngineDirectory, lock_holder, open_directory
 from rhot_app.errors import EngineError
 from rhot_node.files import decode_message, read_input, write_document
-from rhot_node.logs import before
+from rhot_node.terminal import before
 
 START_TIMEOUT_S = 240.0
 """The first start of all compiles the tracker, on a slow or busy machine for minutes; later ones take seconds."""

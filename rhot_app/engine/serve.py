@@ -40,8 +40,8 @@ from rhot_app.tracking.scene import make_tracker
 from rhot_node.compiled import announce_compilation
 from rhot_node.files import JSON_BYTES_MAX
 from rhot_node.keys import KeyPair
-from rhot_node.logs import cut_log
 from rhot_node.network.context import Context
+from rhot_node.terminal import cut_log
 from rhot_node.threads import OneShotThread
 
 _COLLECT_S = 5.0

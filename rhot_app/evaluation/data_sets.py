@@ -27,8 +27,8 @@ from rhot_app.simulator.film.node_log import CABLE, Network, NodeSender, write_n
 from rhot_app.simulator.film.shot import RIG_NAME, Shot, make_renderer, make_shot, save_shot
 from rhot_app.simulator.film.truth import FrameTruth, Truth, load_truth, save_truth, true_object
 from rhot_app.simulator.scene.scene import Scene, node_settings
-from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
+from rhot_node.detectors import make_detector
 from rhot_node.files import read_input, resource_path
 from rhot_node.wire.messages import MarkerObservation
 

@@ -37,8 +37,7 @@ from rhot_app.recording.landmark_log import FIRST_NS, HandFilm, landmark_order, 
 from rhot_app.recording.raw_log import FILMS, LogReader, filmed_at
 from rhot_app.rig_history import accept_hand
 from rhot_app.sources.film_offset import filmed
-from rhot_app.sources.films import NamedFilm
-from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out
+from rhot_app.sources.frame_sets import CameraVideo, NamedFilm, frame_sets, frames_left_out
 from rhot_app.sources.recorded_pictures import recorded_pictures
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState

@@ -17,7 +17,7 @@ from rhot_app.export.states import HandStates, in_blocks
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, TrackerKind, load_rig, with_tracker
 from rhot_app.recording.raw_log import LogReader, Record, wall_clock_offset_ns
-from rhot_app.sources.films import film_period_ns
+from rhot_app.sources.frame_sets import film_period_ns
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import HandState
 from rhot_app.tracking.scene import make_tracker

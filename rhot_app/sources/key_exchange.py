@@ -18,8 +18,8 @@ from rhot_app.sources.node_link import RESTART_NS, NodeLink
 from rhot_node.errors import printable
 from rhot_node.files import decode_message
 from rhot_node.keys import HexKey, KeyPair, connect_with
-from rhot_node.logs import LogLimit
 from rhot_node.network.context import Context
+from rhot_node.terminal import LogLimit
 
 _RECONNECT_MS = 100
 _REFUSED = zmq.EVENT_HANDSHAKE_FAILED_AUTH | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL

@@ -27,7 +27,7 @@ from rhot_app.keys import load_master_keys
 from rhot_node.config import NodeSettings, load_settings, save_settings
 from rhot_node.errors import NodeError, SettingsError, system_sentence
 from rhot_node.keys import keys_path, pair_beforehand
-from rhot_node.logs import cut_log, log_to_stderr
+from rhot_node.terminal import cut_log, log_to_stderr
 from rhot_node.threads import ANSWER_S
 
 log = logging.getLogger(__name__)

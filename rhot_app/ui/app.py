@@ -18,8 +18,7 @@ from rhot_app.project import load_rig
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
 from rhot_node.files import require_replaceable
-from rhot_node.logs import log_to_stderr
-from rhot_node.terminal import add_examples
+from rhot_node.terminal import add_examples, log_to_stderr
 
 if TYPE_CHECKING:
     from rhot_app.ui.common.controller import Controller

@@ -21,6 +21,7 @@ from rhot_node.health.camera import watch_camera
 from rhot_node.health.checks import (
     Check,
     Level,
+    Machine,
     check_clock,
     check_heat,
     check_memory,
@@ -30,7 +31,6 @@ from rhot_node.health.checks import (
     check_speed,
     worst,
 )
-from rhot_node.health.machine import Machine
 from rhot_node.keys import NodeTrust, keys_path
 from rhot_node.landmark_search import OpenNetworks, open_networks
 from rhot_node.service import NAME, STATE_FOLDER

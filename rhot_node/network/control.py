@@ -19,12 +19,12 @@ from rhot_node.config import NodeSettings
 from rhot_node.errors import NAME_LIMIT, LinkError, printable
 from rhot_node.files import MIB
 from rhot_node.keys import NodeTrust, serve_with
-from rhot_node.logs import LogLimit
 from rhot_node.network.context import Context
 from rhot_node.network.pairing import REQUEST_MAX as STRANGERS_REQUEST_MAX
 from rhot_node.network.pairing import Reception
 from rhot_node.network.pictures import PictureBox, encode_preview
 from rhot_node.network.requests import Responder
+from rhot_node.terminal import LogLimit
 from rhot_node.threads import Worker
 
 log = logging.getLogger(__name__)

@@ -9,9 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from rhot_node.errors import WireError
-from rhot_node.wire.codec import KEY_LENGTH, Seal, decode_verified, is_tagged
+from rhot_node.wire.codec import KEY_LENGTH, Seal, SequenceVerdict, SequenceWindow, decode_verified, is_tagged
 from rhot_node.wire.messages import U32_MAX, Message
-from rhot_node.wire.sequence import SequenceVerdict, SequenceWindow
 
 log = logging.getLogger(__name__)
 

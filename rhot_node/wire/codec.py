@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import hashlib
 from collections.abc import Callable
 from hmac import compare_digest
@@ -9,7 +10,7 @@ from struct import error as struct_error
 from typing import Any
 
 from rhot_node.errors import WireError
-from rhot_node.wire import commands, marker_table, points, search
+from rhot_node.wire import commands, points, search
 from rhot_node.wire.fields import FRAME, HEADER, TAG_LENGTH, begin, decode_frame, encode_frame
 from rhot_node.wire.messages import (
     ClockReply,
@@ -58,6 +59,61 @@ class Seal:
         return compare_digest(self.tag(view[:-TAG_LENGTH]), view[-TAG_LENGTH:])
 
 
+# -- sequence numbers of one stream: what is new, doubled, late, or never came -----------------------------------------
+
+class SequenceVerdict(enum.Enum):
+    """What one sequence number says about its datagram."""
+
+    FRESH = 0  # newer than all before
+    LATE = 1  # overtaken, but seen for the first time
+    DUPLICATE = 2
+    STALE = 3  # older than the window
+    JUMP = 4  # further ahead than any loss explains
+
+
+class SequenceWindow:
+    """Remembers the last `size` numbers. `lost` counts those that have not come (a late one is taken off again)."""
+
+    def __init__(self, size: int = 512, longest_jump: int = 100_000) -> None:
+        self._size = size
+        self._mask = (1 << size) - 1
+        self._longest_jump = longest_jump
+        self._newest: int | None = None
+        self._seen = 0  # bit k: number newest - k has come
+        self.lost = 0
+
+    def judge(self, sequence: int) -> SequenceVerdict:
+        """What `sequence` says, without taking it in: a datagram refused for another reason must leave no trace."""
+        newest = self._newest
+        if newest is None:
+            return SequenceVerdict.FRESH
+        ahead = sequence - newest
+        if ahead > 0:
+            return SequenceVerdict.FRESH if ahead <= self._longest_jump else SequenceVerdict.JUMP
+        if -ahead >= self._size:
+            return SequenceVerdict.STALE
+        return SequenceVerdict.DUPLICATE if self._seen >> -ahead & 1 else SequenceVerdict.LATE
+
+    def take(self, sequence: int) -> None:
+        """Take in a number that was judged FRESH or LATE."""
+        newest = self._newest
+        if newest is None:
+            self._newest, self._seen = sequence, self._mask  # what was before the first one is not missing
+        elif sequence > newest:
+            ahead = sequence - newest
+            self._seen = (self._seen << ahead | 1) & self._mask if ahead < self._size else 1
+            self._newest = sequence
+            self.lost += ahead - 1
+        else:
+            self._seen |= 1 << newest - sequence
+            self.lost -= 1
+
+    def restart(self) -> None:
+        """The sender counts from new; the losses so far stay counted."""
+        self._newest = None
+        self._seen = 0
+
+
 # -- messages ----------------------------------------------------------------------------------------------------------
 
 MAGIC = b"RHOT"
@@ -67,7 +123,7 @@ FLAG_TAGGED = 1  # bit 0 of the header's flags: an authentication tag of TAG_LEN
 _FLAGS_AT = 6  # offset of the header's flags
 _TAGGED = FLAG_TAGGED.to_bytes(2, "little")
 _MESSAGES: dict[type, tuple[int, Callable[[Any], bytes], Callable[..., Message]]] = {
-    Observations: (1, marker_table.encode_observations, marker_table.decode_observations),
+    Observations: (1, points.encode_observations, points.decode_observations),
     ClockRequest: (2, commands.encode_clock_request, commands.decode_clock_request),
     ClockReply: (3, commands.encode_clock_reply, commands.decode_clock_reply),
     Start: (4, commands.encode_start, commands.decode_start),
@@ -154,8 +210,8 @@ def is_tagged(data: Datagram) -> bool:
     magic, version, _, flags, _, _, _ = HEADER.unpack_from(data)
     if magic != MAGIC:
         raise WireError("magic", repr(magic))
-    if version not in (VERSION, marker_table.VERSION):
-        raise WireError("version", f"{version}, this program speaks {VERSION} and {marker_table.VERSION}")
+    if version not in (VERSION, points.VERSION):
+        raise WireError("version", f"{version}, this program speaks {VERSION} and {points.VERSION}")
     if flags & ~FLAG_TAGGED:
         raise WireError("flags", f"unknown header flags {flags:#06x}")
     if flags and len(data) < HEADER.size + TAG_LENGTH:
@@ -169,7 +225,7 @@ def _decode_body(data: Datagram, payload: memoryview) -> Message:
         raise WireError("type", str(number))
     kind, decode_payload = _BY_TYPE[number]
     if kind is Observations:
-        return marker_table.decode_observations(payload, decode_frame(payload, node_id, session, sequence), version)
+        return points.decode_observations(payload, decode_frame(payload, node_id, session, sequence), version)
     if version != VERSION:
         raise WireError("version", f"{version} of a message of type {number}, this program speaks {VERSION}")
     if not issubclass(kind, FrameMessage):
@@ -180,7 +236,7 @@ def _decode_body(data: Datagram, payload: memoryview) -> Message:
 
 def _encode(message: Message) -> bytes:
     number, encode_payload, _ = _MESSAGES[type(message)]
-    version = marker_table.VERSION if number == _MESSAGES[Observations][0] else VERSION
+    version = points.VERSION if number == _MESSAGES[Observations][0] else VERSION
     head = HEADER.pack(MAGIC, version, number, 0, message.node_id, message.session, message.sequence)
     if isinstance(message, FrameMessage):
         head += encode_frame(message)

@@ -22,8 +22,8 @@ from rhot_node.capture.pi_camera import CameraStack, PiCamera, load_stack
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.fast import FastDetector
+from rhot_node.detectors import warm_up_image
 from rhot_node.errors import CameraError
-from rhot_node.warm_up import warm_up_image
 
 CLOCK = NodeClock(offset_ns=10**14)
 SETTINGS = CameraSettings(fps=40, exposure_us=4000, gain=2.0, red_gain=1.5, blue_gain=1.8)

@@ -8,8 +8,7 @@ import msgspec
 import pytest
 
 from rhot_app.engine.node_meter import SENTENCE_MAX, health_advice, sees_black
-from rhot_node.health.checks import BLACK_PICTURE, check_heat, check_power
-from rhot_node.health.machine import Throttled
+from rhot_node.health.checks import BLACK_PICTURE, Throttled, check_heat, check_power
 
 
 def test_a_nodes_own_checks_become_advice() -> None:

@@ -26,7 +26,7 @@ from rhot_app.recording.landmark_log import write_landmark_log
 from rhot_app.recording.raw_log import LogReader, wall_clock_offset_ns
 from rhot_app.rig_history import versions
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
-from rhot_app.sources.films import recorded_films
+from rhot_app.sources.frame_sets import recorded_films
 from rhot_app.state import Condition
 from rhot_node.capture.yuv import YuvWriter
 from rhot_node.detect.image import from_bgr

@@ -78,7 +78,7 @@ from pathlib import Path
 import numpy as np
 from rhot_node.detect.image import from_bgr
 from rhot_node.files import resource_path
-from rhot_node.keypoints.detector import KeypointDetector
+from rhot_node.keypoints import KeypointDetector
 from rhot_node.markers import load_markers
 from tiny_network import place
 detector = KeypointDetector(place(Path({str(tmp_path)!r})), load_markers(resource_path("markers", "landmarks21.json")))

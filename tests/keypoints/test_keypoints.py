@@ -11,11 +11,11 @@ from tiny_network import POINTS, SIDE, linear_network, place, spread_points
 
 from rhot_node.config import NodeSettings
 from rhot_node.detect.image import YuvImage, from_bgr
+from rhot_node.detectors import DetectorChoice
 from rhot_node.errors import KeypointError
 from rhot_node.files import resource_path
-from rhot_node.keypoints.detector import KeypointDetector
+from rhot_node.keypoints import KeypointDetector
 from rhot_node.markers import load_markers
-from rhot_node.plugins import DetectorChoice
 
 MARKERS = load_markers(resource_path("markers", "landmarks21.json"))
 WIDTH, HEIGHT = 320, 240

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from rhot_node.health.machine import Machine
+from rhot_node.health.checks import Machine
 
 WELL: dict[str, str] = {
     "proc/device-tree/model": "Raspberry Pi 4 Model B Rev 1.4\0",

@@ -22,7 +22,7 @@ from shipped_markers import RHOT6
 
 from rhot_node.capture.stream import StreamHeader, pack_header
 from rhot_node.config import CameraSettings, ClockSettings
-from rhot_node.warm_up import warm_up_image
+from rhot_node.detectors import warm_up_image
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import (
     ClockReply,

@@ -15,6 +15,7 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, changed_settings
 from rhot_node.daemon import NodeDaemon
 from rhot_node.detect.image import YuvImage, from_bgr, to_bgr
+from rhot_node.detectors import DetectorChoice
 from rhot_node.errors import KeypointError, SettingsError
 from rhot_node.landmark_search import LandmarkSearch
 from rhot_node.landmarks import install
@@ -22,7 +23,6 @@ from rhot_node.landmarks.networks import HAND_SIGMA, DetectedHand, Region
 from rhot_node.network.pictures import PictureBox
 from rhot_node.network.requests import SettingsStore
 from rhot_node.network.session import Stream
-from rhot_node.plugins import DetectorChoice
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import HandLandmarks, Observations
 

@@ -12,15 +12,17 @@ from rhot_node.health.checks import (
     RECENT_S,
     Check,
     HealthMonitor,
+    Machine,
+    Throttled,
     check_clock,
     check_heat,
     check_memory,
     check_network,
     check_power,
     check_speed,
+    run_command,
     worst,
 )
-from rhot_node.health.machine import Machine, Throttled, run_command
 
 FIRMWARE = "sys/devices/platform/soc/soc:firmware/get_throttled"
 FIRMWARE_PI5 = "sys/devices/platform/soc@107c000000/soc@107c000000:firmware/get_throttled"

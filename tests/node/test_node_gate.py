@@ -13,7 +13,7 @@ from trusted_node import TrustedNode
 
 from rhot_node.capture.camera import Frame
 from rhot_node.keys import new_key_pair, serve_with
-from rhot_node.logs import LINES_AT_ONCE, LineLimit, LogLimit, before, cut_log
+from rhot_node.terminal import LINES_AT_ONCE, LineLimit, LogLimit, before, cut_log
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import Stop
 

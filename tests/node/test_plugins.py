@@ -21,11 +21,11 @@ from rhot_node.capture.open import PluginCamera, open_camera
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings, NodeSettings, load_settings
 from rhot_node.detect.image import YuvImage
+from rhot_node.detectors import DetectorChoice, PluginDetector, warm_up_image
 from rhot_node.errors import CameraError
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet
-from rhot_node.plugins import DetectorChoice, PluginDetector, plugin_names
-from rhot_node.warm_up import warm_up_image
+from rhot_node.plugins import plugin_names
 from rhot_node.wire.messages import MarkerFlag, NodeState
 
 PAGE = (Path(__file__).parents[2] / "docs" / "plugins.md").read_text()

@@ -14,8 +14,8 @@ from rhot_app.simulator.film.shot import Shot, make_renderer, make_shot
 from rhot_app.simulator.film.truth import true_object
 from rhot_app.simulator.scene.scene import Scene, make_scene, node_settings, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow
-from rhot_node.__main__ import make_detector
 from rhot_node.detect.image import from_i420
+from rhot_node.detectors import make_detector
 from rhot_node.wire.messages import MarkerFlag
 
 EXACT = ObservationNoise(white=0.0, common=0.0, own=0.0)

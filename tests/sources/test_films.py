@@ -16,7 +16,7 @@ from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
 from rhot_app.recording.raw_log import FILMS, LogReader, encode_log
 from rhot_app.recording.video import video_path
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.sources.films import recorded_films
+from rhot_app.sources.frame_sets import recorded_films
 from rhot_app.sources.recorded_pictures import FilmReader
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.tracker import CameraObservations

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhot_app.sources.text_datagrams import Point, parse_text
+from rhot_app.sources.validation import Point, parse_text
 from rhot_node.errors import WireError
 
 

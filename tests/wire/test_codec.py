@@ -33,7 +33,6 @@ from wire_samples import (
 
 from rhot_node.errors import WireError
 from rhot_node.wire.codec import Seal, asks_who_is_there, decode, decode_sealed, encode
-from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import (
     ClockRequest,
     Fiducials,
@@ -47,6 +46,7 @@ from rhot_node.wire.messages import (
     StartEntry,
     Stop,
 )
+from rhot_node.wire.points import MarkerTable
 from rhot_node.wire.search import pack_map, pack_slices, unpack_map, unpack_slices
 
 OBSERVATIONS = "version_1_observations_some_lost"

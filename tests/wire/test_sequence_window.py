@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rhot_node.wire.sequence import SequenceVerdict, SequenceWindow
+from rhot_node.wire.codec import SequenceVerdict, SequenceWindow
 
 
 def feed(window: SequenceWindow, sequence: int) -> SequenceVerdict:

@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.sources.replay import LogReplay
     from rhot_app.tracking.scene import make_tracker
     from rhot_app.tracking.smoothing import NOT_SMOOTHED
-    from rhot_node.logs import log_to_stderr
+    from rhot_node.terminal import log_to_stderr
 
     log_to_stderr(logging.INFO if args.verbose else logging.WARNING)
     reader = LogReader(args.path)

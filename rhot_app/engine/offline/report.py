@@ -29,8 +29,8 @@ from rhot_app.errors import EngineError
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_log
 from rhot_node.files import open_input
-from rhot_node.logs import before
 from rhot_node.network.pairing import ALPHABET
+from rhot_node.terminal import before
 
 LAST_S: Final = 60.0
 LOG_BYTES_MAX: Final = 1 << 20

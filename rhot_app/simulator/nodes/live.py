@@ -32,8 +32,8 @@ from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_sh
 from rhot_app.simulator.scene.scene_description import Show
 from rhot_app.sources.local_nodes import NodeSupervisor, add_serve_arguments, serve
 from rhot_node.errors import NodeError
-from rhot_node.logs import cut_log
 from rhot_node.network.context import Context
+from rhot_node.terminal import cut_log
 from rhot_node.threads import Worker
 
 # -- control socket ----------------------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from rhot_app.sources.local_nodes import POLL_S, NodeSupervisor, add_serve_argum
 from rhot_node.config import NodeSettings, load_settings
 from rhot_node.errors import SettingsError
 from rhot_node.files import write_atomically
-from rhot_node.logs import cut_log
+from rhot_node.terminal import cut_log
 
 _BEGIN_NS = 300_000_000
 """From the moment that all films are open until they begin."""

@@ -7,8 +7,8 @@ from typing import Any
 from rhot_app.project import Rig
 from rhot_app.tracking.kinds.kind import FrameTimes, Kind
 from rhot_app.tracking.tracker import CameraObservations, Candidates
-from rhot_node.wire.marker_table import MarkerTable
 from rhot_node.wire.messages import Observations
+from rhot_node.wire.points import MarkerTable
 
 
 class MarkerKind(Kind):

@@ -33,7 +33,7 @@ from rhot_app.project import load_rig, parse_rig, save_rig, with_tracker
 from rhot_app.sources.cameras.camera_set import camera_set_of
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
 from rhot_node.compiled import WINDOW
-from rhot_node.logs import before
+from rhot_node.terminal import before
 
 if TYPE_CHECKING:
     from rhot_app.simulator.nodes.remote import TwinRemote

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 from rhot_app.errors import RecordingError
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import Rig
-from rhot_app.sources.films import RecordedFilm
+from rhot_app.sources.frame_sets import RecordedFilm
 from rhot_app.sources.recorded_pictures import FilmReader
 from rhot_app.state import HandState
 from rhot_app.ui.models.palette import Scheme

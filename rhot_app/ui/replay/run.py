@@ -28,7 +28,7 @@ from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.recording.bookmarks import Bookmark, bookmarks_of
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
-from rhot_app.sources.films import RecordedFilm, recorded_films
+from rhot_app.sources.frame_sets import RecordedFilm, recorded_films
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.scene import make_tracker

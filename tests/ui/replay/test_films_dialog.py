@@ -20,7 +20,7 @@ from rhot_app.export.film_log import ChosenFilm, log_films
 from rhot_app.project import save_rig
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
-from rhot_app.sources.films import recorded_films
+from rhot_app.sources.frame_sets import recorded_films
 from rhot_app.ui.replay.films_dialog import FilmsDialog
 from rhot_node.landmarks import networks
 
