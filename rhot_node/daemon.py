@@ -7,7 +7,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from rhot_node.capture.camera import FIRST_FRAME_S, READ_S, Camera, EndOfRecording, Frame, Reporting, Rewindable
 from rhot_node.clock import NodeClock
@@ -15,17 +15,17 @@ from rhot_node.config import CameraSettings, NodeSettings
 from rhot_node.detect.image import Detector
 from rhot_node.errors import CameraError
 from rhot_node.foreground_store import ForegroundStore
-from rhot_node.frame_search import frame_head
+from rhot_node.frame_search import FrameMessages, Sender
 from rhot_node.health.camera import RateMeter, brightness, camera_troubles
 from rhot_node.health.checks import BLACK_PICTURE, Check, is_black
 from rhot_node.landmark_search import LandmarkSearch
 from rhot_node.network.pictures import PictureBox
 from rhot_node.network.requests import SettingsStore
-from rhot_node.network.session import Sessions, Stream
+from rhot_node.network.session import Sessions
 from rhot_node.slice_search import SliceSearch
 from rhot_node.tag_search import TagSearch
 from rhot_node.threads import Watch, complaints
-from rhot_node.wire.messages import U32_MAX, FrameMessage, MarkerObservation, NodeState, Observations
+from rhot_node.wire.messages import NodeState, Observations
 
 log = logging.getLogger(__name__)
 
@@ -39,14 +39,6 @@ OpenCamera = Callable[[CameraSettings], Camera]
 MakeDetector = Callable[[NodeSettings], Detector]
 
 
-class ObservationSender(Protocol):
-    """Where observations go; the UDP link or a fake. Three threads call it."""
-
-    def send(self, observations: FrameMessage, stream: Stream) -> bool:
-        """Send them where the stream goes; False when they could not be sent."""
-        ...
-
-
 @dataclass
 class Counters:
     """What the daemon has counted since it started."""
@@ -55,8 +47,6 @@ class Counters:
     skipped_frames: int = 0  # gaps in the camera's numbers
     over_budget: int = 0  # frames whose processing took longer than the budget
     late_dropped: int = 0  # of these, those that were not sent because of it
-    sent: int = 0
-    not_sent: int = 0  # refused by the network
     faults: int = 0
 
 
@@ -86,6 +76,8 @@ class NodeDaemon:
         self._landmarks = LandmarkSearch(store.current, clock)
         self.foreground = ForegroundStore(None) if foreground is None else foreground
         self.slices = SliceSearch(store.current.node_id, clock, self.foreground)
+        self._searches = self._tags, self._landmarks, self.slices
+        self._messages = FrameMessages(store.current.node_id, clock)
         self._frames, self._opening = Watch(_SENDS), Watch("opens the camera", _OPENING_S)
         self._camera: Camera | None = None
         self._detector: Detector | None = None
@@ -98,8 +90,6 @@ class NodeDaemon:
         self._black, self._luma = False, 0.0
         self._rate = RateMeter()
         self._light_due_s = 0.0
-        self._session = 0  # whose sequence is being counted
-        self._sequence = 0
 
     @property
     def state(self) -> NodeState:
@@ -139,7 +129,11 @@ class NodeDaemon:
 
     def count(self) -> dict[str, Any]:
         """Counters, for the control channel."""
-        return dataclasses.asdict(self.counters) | self._tags.count() | self._landmarks.count() | self.slices.count()
+        counted = {**dataclasses.asdict(self.counters), "sent": self._messages.sent,
+                   "not_sent": self._messages.not_sent}
+        for search in self._searches:
+            counted |= search.count()
+        return counted
 
     def spare_landmarks(self) -> None:
         """Search no landmarks for a while, whose camera serves nobody. Any thread may ask."""
@@ -148,9 +142,8 @@ class NodeDaemon:
     def prepare(self) -> None:
         """Make the detector and open the camera: the node is then ready. Raises CameraError."""
         self._detector = self._make_detector(self._settings)
-        self._tags.prepare()
-        self._landmarks.prepare()
-        self.slices.prepare()
+        for search in self._searches:
+            search.prepare()
         self._open()
         self._prepared = True
         self._show_state()
@@ -159,9 +152,8 @@ class NodeDaemon:
         """Close the camera and end the searches beside that for markers."""
         self._frames.dismiss()
         self._opening.dismiss()
-        self._tags.close()
-        self._landmarks.close()
-        self.slices.close()
+        for search in self._searches:
+            search.close()
         self.foreground.close()
         self._close_camera()
 
@@ -170,12 +162,12 @@ class NodeDaemon:
             self._camera.close()
             self._camera = None
 
-    def step(self, sender: ObservationSender, pictures: PictureBox) -> bool:
+    def step(self, sender: Sender, pictures: PictureBox) -> bool:
         """Handle one frame, or wait for one a moment. False when the recording is over and the node with it."""
         with self._frames.timed():
             return self._step(sender, pictures)
 
-    def _step(self, sender: ObservationSender, pictures: PictureBox) -> bool:
+    def _step(self, sender: Sender, pictures: PictureBox) -> bool:
         self.sessions.expire(time.monotonic())
         if self._store.current is not self._settings:
             self._take_settings(self._store.current, pictures)
@@ -204,7 +196,8 @@ class NodeDaemon:
             if late and self._settings.late_frames == "drop":
                 self.counters.late_dropped += 1
             elif not self._by_networks_alone():
-                self._send(frame, markers, stream, sender)
+                self._messages.send(Observations(*self._messages.head(frame, stream, Observations),
+                                                 self._settings.markers.checksum, markers), stream, sender)
             searched = self.slices.offer(frame, stream, sender)
             self._tags.offer(frame, stream, sender)
             self._landmarks.offer(frame, stream, sender)
@@ -212,18 +205,6 @@ class NodeDaemon:
         if self._video is not None:
             self._video(frame)
         return True
-
-    def _send(self, frame: Frame, markers: tuple[MarkerObservation, ...], stream: Stream,
-              sender: ObservationSender) -> None:
-        if stream.session != self._session:
-            self._session, self._sequence = stream.session, 0
-        head = frame_head(frame, self._settings.node_id, stream.session, self._sequence, self._clock.now_ns())
-        observations = Observations(*head, self._settings.markers.checksum, markers)
-        self._sequence = (self._sequence + 1) & U32_MAX
-        if sender.send(observations, stream):
-            self.counters.sent += 1
-        else:
-            self.counters.not_sent += 1
 
     def _by_networks_alone(self) -> bool:
         """Whether all markers are landmarks that the hand networks find: messages of markers would say nothing."""
@@ -303,8 +284,8 @@ class NodeDaemon:
         """Apply changed settings as far as a running node can."""
         old, self._settings = self._settings, settings
         pictures.preview_hz = settings.preview_hz
-        self._tags.configure(settings)
-        self._landmarks.configure(settings)
+        for search in self._searches:
+            search.configure(settings)
         if (settings.detector, settings.markers) != (old.detector, old.markers):
             self._detector = self._make_detector(settings)
         if settings.camera != old.camera and self._camera_takes_settings and self._camera is not None:

@@ -14,7 +14,7 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, network_model
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import KeypointError
-from rhot_node.frame_search import FrameSearch, SearchSender, Waiting
+from rhot_node.frame_search import FrameSearch, Waiting
 from rhot_node.health.checks import Check
 from rhot_node.network.session import Stream
 from rhot_node.wire.messages import LANDMARKS, HandLandmarks, LandmarkedHand
@@ -44,10 +44,11 @@ def open_networks(model: str) -> HandNetworks:
 class LandmarkSearch(FrameSearch[YuvImage]):
     """Searches frames and sends the hands that it finds, a message without hands included."""
 
+    names = "landmark", "hands_found", "landmarks"
+
     def __init__(self, settings: NodeSettings, clock: NodeClock, open_with: OpenNetworks | None = None) -> None:
         """`open_with`: opens the networks of a model; None: the installed ones. Nothing is loaded before `prepare`."""
         super().__init__(settings.node_id, clock)
-        self.found = 0
         self.trouble = ""
         """Why the networks cannot be used; empty when they can, or are not asked for."""
         self._model = network_model(settings.detector)
@@ -78,15 +79,13 @@ class LandmarkSearch(FrameSearch[YuvImage]):
         """Whether landmarks are searched for."""
         return self._model is not None and time.monotonic() >= self._spared_s
 
-    def offer(self, frame: Frame, stream: Stream, sender: SearchSender) -> None:
-        """Have a frame searched if landmarks are asked for and nothing else is being searched; costs a copy of it."""
-        if self.wanted and self.free():
-            self.put(Waiting(frame, frame.image.copy(), stream, sender))
+    def due(self, frame: Frame, stream: Stream) -> bool:
+        """Whenever landmarks are searched for."""
+        return self.wanted
 
-    def count(self) -> dict[str, int]:
-        """Counters, for the control channel."""
-        return {"landmark_frames": self.searched, "landmark_frames_skipped": self.skipped, "hands_found": self.found,
-                "landmarks_sent": self.sent, "landmarks_not_sent": self.not_sent}
+    def work(self, frame: Frame) -> YuvImage:
+        """The whole picture."""
+        return frame.image.copy()
 
     def troubles(self) -> list[Check]:
         """What is wrong, for the node's report."""

@@ -18,7 +18,7 @@ from rhot_node.detect.edges import Edges, find_edges, noise_of
 from rhot_node.detect.foreground import foreground_map
 from rhot_node.detect.image import YuvImage
 from rhot_node.foreground_store import ForegroundStore, rgb_of
-from rhot_node.frame_search import FrameSearch, SearchSender, Waiting
+from rhot_node.frame_search import FrameSearch, Waiting
 from rhot_node.network.session import Stream
 from rhot_node.wire.messages import U32_MAX, ForegroundPart, SliceEdges, Slices
 from rhot_node.wire.search import EDGES_FIT, FOREGROUND_FIT, pack_edges, pack_map, unpack_slices
@@ -47,11 +47,13 @@ Work = tuple[YuvImage, _Order]
 class SliceSearch(FrameSearch[Work]):
     """`take` belongs to the link's thread."""
 
+    names = "slice", "slice_requests", "edges"
+
     def __init__(self, node_id: int, clock: NodeClock, foreground: ForegroundStore) -> None:
         super().__init__(node_id, clock)
-        self.requests = 0
         self._foreground = foreground
-        self._order: _Order | None = None
+        self._order: _Order | None = None  # the newest one; the one that a frame is due by is the daemon's own
+        self._due_by: _Order | None = None
         self._parts: dict[int, Slices] = {}
         self._collected = (0, 0)  # session and request whose parts are being collected
         self._noise, self._noise_due_s = 1.0, 0.0
@@ -86,27 +88,21 @@ class SliceSearch(FrameSearch[Work]):
         slices = unpack_slices(records)
         if len(slices) != message.slice_count:
             return "count"
-        self.requests += 1
+        self.found += 1
         self._order = _Order(session, message.request, (message.width, message.height), message.map_step, slices,
                              time.monotonic() + VALID_S)
         return ""
 
-    def offer(self, frame: Frame, stream: Stream, sender: SearchSender) -> bool:
-        """Have a frame searched if slices are asked for and nothing else is being searched; costs a copy of it. False
-        when it was asked for and is not done."""
-        order = self._order
-        if (order is None or order.session != stream.session or time.monotonic() > order.until_s
-                or order.size != frame.image.size):
-            return True
-        if not self.free():
-            return False
-        self.put(Waiting(frame, (frame.image.copy(), order), stream, sender))
-        return True
+    def due(self, frame: Frame, stream: Stream) -> bool:
+        """Whether a request for frames like this one is in force."""
+        self._due_by = order = self._order
+        return (order is not None and order.session == stream.session and time.monotonic() <= order.until_s
+                and order.size == frame.image.size)
 
-    def count(self) -> dict[str, int]:
-        """Counters, for the control channel."""
-        return {"slice_requests": self.requests, "slice_frames": self.searched, "slice_frames_skipped": self.skipped,
-                "edges_sent": self.sent, "edges_not_sent": self.not_sent}
+    def work(self, frame: Frame) -> Work:
+        """The whole picture, and the request."""
+        assert self._due_by is not None
+        return frame.image.copy(), self._due_by
 
     def search(self, waiting: Waiting[Work]) -> None:
         """Search one frame."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rhot_node.capture.camera import NS_PER_S, Frame
 from rhot_node.clock import NodeClock
 from rhot_node.config import NodeSettings, TagSettings
-from rhot_node.frame_search import FrameSearch, SearchSender, Waiting
+from rhot_node.frame_search import FrameSearch, Waiting
 from rhot_node.network.session import Stream
 from rhot_node.wire.messages import FAMILIES, Fiducials
 
@@ -25,10 +25,11 @@ Luma = NDArray[np.uint8]
 class TagSearch(FrameSearch[Luma]):
     """Searches frames and sends what it finds, a message without fiducials included."""
 
+    names = "tag", "tags_found", "fiducials"
+
     def __init__(self, settings: NodeSettings, clock: NodeClock) -> None:
         """Nothing is loaded before `prepare`."""
         super().__init__(settings.node_id, clock)
-        self.found = 0
         self._settings: TagSettings = settings.tags
         self._detector: TagDetector | None = None
         self._made_for: tuple[str, ...] = ()
@@ -44,15 +45,20 @@ class TagSearch(FrameSearch[Luma]):
         self._settings = settings.tags
         self._begin()
 
-    def offer(self, frame: Frame, stream: Stream, sender: SearchSender) -> None:
-        """Have a frame searched if it is due and nothing else is being searched; costs a copy of its luma."""
-        if self._settings.enabled and self._due(frame.t_node_ns) and self.free():
-            self.put(Waiting(frame, frame.image.y.copy(), stream, sender))
+    def due(self, frame: Frame, stream: Stream) -> bool:
+        """Whether tags are sought, and it is time by `rate_hz`."""
+        if not self._settings.enabled or self._settings.rate_hz is None:
+            return self._settings.enabled
+        period_ns = round(NS_PER_S / self._settings.rate_hz)
+        late_ns = frame.t_node_ns - self._due_ns
+        if -period_ns <= late_ns < 0:
+            return False
+        self._due_ns = (self._due_ns if 0 <= late_ns < period_ns else frame.t_node_ns) + period_ns
+        return True
 
-    def count(self) -> dict[str, int]:
-        """Counters, for the control channel."""
-        return {"tag_frames": self.searched, "tag_frames_skipped": self.skipped, "tags_found": self.found,
-                "fiducials_sent": self.sent, "fiducials_not_sent": self.not_sent}
+    def work(self, frame: Frame) -> Luma:
+        """Its luma."""
+        return frame.image.y.copy()
 
     def search(self, waiting: Waiting[Luma]) -> None:
         """Search one frame."""
@@ -65,16 +71,6 @@ class TagSearch(FrameSearch[Luma]):
     def _begin(self) -> None:
         if self._settings.enabled:
             self.start("searches for tags")
-
-    def _due(self, t_node_ns: int) -> bool:
-        if self._settings.rate_hz is None:
-            return True
-        period_ns = round(NS_PER_S / self._settings.rate_hz)
-        late_ns = t_node_ns - self._due_ns
-        if -period_ns <= late_ns < 0:
-            return False
-        self._due_ns = (self._due_ns if 0 <= late_ns < period_ns else t_node_ns) + period_ns
-        return True
 
     def _detector_of(self, dictionaries: tuple[str, ...]) -> TagDetector | None:
         """The detector of these dictionaries, None of none."""
