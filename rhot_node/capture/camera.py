@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import Any, Final, Generic, Protocol, TypeVar, runtime_checkable
 
 from rhot_node.clock import NodeClock
 from rhot_node.detect.image import YuvImage
 from rhot_node.errors import CameraError
 from rhot_node.files import MIB, read_input
+
+T = TypeVar("T")
 
 FIRST_FRAME_S: Final = 5.0
 """s that a camera may take from being opened to its first frame. Chosen."""
@@ -82,6 +85,38 @@ def i420_bytes(width: int, height: int) -> int:
 
 class EndOfRecording(Exception):  # noqa: N818 - an end, not an error
     """A finite source (file, folder) has no more frames."""
+
+
+class Newest(Generic[T]):
+    """Holds the newest item that a driver's thread puts in until the reader takes it: a slow reader misses the others.
+    """
+
+    def __init__(self) -> None:
+        self.closed = False
+        self._changed = threading.Condition()
+        self._item: T | None = None
+
+    def put(self, item: T) -> T | None:
+        """Keep `item`; returns what nobody will take any more: the one before, or once closed `item` itself."""
+        with self._changed:
+            if self.closed:
+                return item
+            before, self._item = self._item, item
+            self._changed.notify_all()
+        return before
+
+    def take(self, timeout_s: float) -> T | None:
+        """The newest item not taken yet; None when none comes in time, or none will come."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._item is not None or self.closed, timeout_s)
+            item, self._item = self._item, None
+            return item
+
+    def close(self) -> None:
+        """No more items come."""
+        with self._changed:
+            self.closed = True
+            self._changed.notify_all()
 
 
 # -- pacing of recordings ----------------------------------------------------------------------------------------------

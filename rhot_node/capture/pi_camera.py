@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from rhot_node.capture.camera import FIRST_FRAME_S, SILENCE_S, Frame
+from rhot_node.capture.camera import FIRST_FRAME_S, SILENCE_S, Frame, Newest
 from rhot_node.capture.sensors import Box, choose_preset, make_controls, mid_exposure_ns, read_out
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
@@ -63,7 +62,8 @@ class PiCamera:
         self._clock = clock
         self._where = f"Pi camera {number}"
         self._stack = load()
-        self._requests = NewestRequest(clock)
+        self._newest = Newest[Arrival]()
+        self._arrivals = 0
         self._heard_s = 0.0
         self._held: contextlib.ExitStack | None = None  # what the reader's frame lies in
         self._last: tuple[int, int, int] | None = None  # of the last frame: number, sensor time, index of its arrival
@@ -90,7 +90,7 @@ class PiCamera:
         """The newest frame; its image lies in the camera's buffer until the next read. Raises CameraError when the
         camera fell silent."""
         self._give_back()
-        arrival = self._requests.take(timeout_s)
+        arrival = self._newest.take(timeout_s)
         if arrival is None:
             if time.monotonic() - self._heard_s > SILENCE_S:
                 raise CameraError(f"{self._where}: no frame for {SILENCE_S:.0f} s. Is its cable seated at both ends? "
@@ -126,7 +126,10 @@ class PiCamera:
     def close(self) -> None:
         """Give all buffers back and release the camera. May be called twice."""
         self._give_back()
-        self._requests.close()
+        self._newest.close()
+        waiting = self._newest.take(0.0)
+        if waiting is not None:
+            waiting.request.release()
         camera, self._camera = self._camera, None
         if camera is not None:
             camera.close()
@@ -179,9 +182,9 @@ class PiCamera:
         for phrase in self._controls.refused:
             log.warning("%s: the camera does not take the setting %s", self._where, phrase)
         camera.set_controls(self._controls.values)
-        camera.post_callback = self._requests.put
+        camera.post_callback = self._arrive
         camera.start()
-        first = self._requests.take(FIRST_FRAME_S)
+        first = self._newest.take(FIRST_FRAME_S)
         if first is None:
             raise CameraError(f"{self._where}: opened, but no frame came within {FIRST_FRAME_S:.0f} s. Seat its cable "
                               "anew, then run `rhot-node doctor`.")
@@ -192,6 +195,15 @@ class PiCamera:
         self._readout = read_out(self._preset, self._frame_min_us, limits, crop, self._size,
                                  self._settings.row_time_ns)
         self._heard_s = time.monotonic()
+
+    def _arrive(self, request: Any) -> None:
+        """picamera2's callback, in its thread: keep the request, and give the one before it back."""
+        t_node_ns = self._clock.now_ns()
+        request.acquire()
+        unused = self._newest.put(Arrival(request, self._arrivals, t_node_ns))
+        self._arrivals += 1
+        if unused is not None:
+            unused.request.release()
 
     def _give_back(self) -> None:
         held, self._held = self._held, None
@@ -239,46 +251,6 @@ class Arrival:
     request: Any
     index: int
     t_node_ns: int
-
-
-class NewestRequest:
-    """Holds one request. `put` is picamera2's callback, in its thread; the rest is the reader's."""
-
-    def __init__(self, clock: NodeClock) -> None:
-        self._clock = clock
-        self._changed = threading.Condition()
-        self._newest: Arrival | None = None
-        self._count = 0
-        self._closed = False
-
-    def put(self, request: Any) -> None:
-        """Keep `request` and give the one before it back."""
-        t_node_ns = self._clock.now_ns()
-        request.acquire()
-        with self._changed:
-            old = self._newest
-            self._newest = Arrival(request, self._count, t_node_ns)
-            self._count += 1
-            if self._closed:
-                old, self._newest = self._newest, None
-            self._changed.notify()
-        if old is not None:
-            old.request.release()
-
-    def take(self, timeout_s: float) -> Arrival | None:
-        """The newest request not taken yet; None when none comes in time."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._newest is not None, timeout_s)
-            newest, self._newest = self._newest, None
-            return newest
-
-    def close(self) -> None:
-        """Give back what waits, and everything that still comes."""
-        with self._changed:
-            self._closed = True
-        waiting = self.take(0.0)
-        if waiting is not None:
-            waiting.request.release()
 
 
 def read_metadata(request: Any) -> dict[str, Any]:

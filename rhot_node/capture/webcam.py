@@ -7,7 +7,6 @@ import enum
 import logging
 import re
 import socket
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from urllib.parse import SplitResult, urlsplit
 import cv2
 import numpy as np
 
-from rhot_node.capture.camera import FIRST_FRAME_S, SILENCE_S, Frame, available_delay_ns
+from rhot_node.capture.camera import FIRST_FRAME_S, SILENCE_S, Frame, Newest, available_delay_ns
 from rhot_node.capture.v4l2 import EXPOSURE_UNIT_US, Automatics, ExposureMode, read_automatics
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
@@ -48,6 +47,17 @@ def open_v4l2(device: str) -> Capture:
     return cv2.VideoCapture(int(match[1]) if match else device, cv2.CAP_V4L2)
 
 
+@dataclass(frozen=True, slots=True)
+class Grabbed:
+    """One image as the device gave it: (H, W, 3) BGR, how many came before it, when its read returned, and when its
+    driver says that it began, None where it does not."""
+
+    image: Plane
+    number: int
+    t_return_node_ns: int
+    t_begin_node_ns: int | None
+
+
 class GrabbedCamera:
     """A camera whose frames are grabbed by OpenCV. Where its driver stamps them (V4L2, at the start of exposure),
     mid-exposure of row 0 is half the exposure later. Else it is taken to be the time at which the read returned, less
@@ -60,8 +70,10 @@ class GrabbedCamera:
         self._name, self._remedy = name, remedy
         self._exposure_ns = settings.exposure_ns
         self._row_time_ns = settings.row_time_ns
-        self._grabber = LatestGrabber(lambda: _read(capture, stamped), capture.release, clock)
-        first = self._grabber.take(FIRST_FRAME_S)
+        self._capture, self._stamped, self._clock = capture, stamped, clock
+        self._newest = Newest[Grabbed]()
+        self._task = OneShotThread("reads the camera", self._grab)
+        first = self._newest.take(FIRST_FRAME_S)
         if first is None:
             self.close()
             raise CameraError(f"{name}: opened, but no frame came within {FIRST_FRAME_S:.0f} s. {remedy}")
@@ -76,9 +88,9 @@ class GrabbedCamera:
 
     def read(self, timeout_s: float) -> Frame | None:
         """The newest frame. Raises CameraError when the camera is gone, silent, or changed its image size."""
-        grabbed = self._grabber.take(timeout_s)
+        grabbed = self._newest.take(timeout_s)
         if grabbed is None:
-            if self._grabber.failed:
+            if self._newest.closed:
                 raise CameraError(f"{self._name}: the camera stopped delivering frames. {self._remedy}")
             if time.monotonic() - self._heard_s > SILENCE_S:
                 raise CameraError(f"{self._name}: no frame for {SILENCE_S:.0f} s. {self._remedy}")
@@ -99,8 +111,22 @@ class GrabbedCamera:
         )
 
     def close(self) -> None:
-        """Release the device."""
-        self._grabber.close()
+        """Release the device; where it does not return from its read, leave it to end by itself."""
+        self._newest.close()
+        self._task.join(2.0)
+
+    def _grab(self) -> None:
+        """Read until the device fails or is closed, in a thread of its own."""
+        number = 0
+        try:
+            while not self._newest.closed and (found := _read(self._capture, self._stamped)) is not None:
+                image, begin_ns = found
+                self._newest.put(Grabbed(image, number, self._clock.now_ns(),
+                                         None if begin_ns is None else self._clock.from_host_ns(begin_ns)))
+                number += 1
+        finally:
+            self._newest.close()
+            self._capture.release()
 
 
 class Webcam(GrabbedCamera):
@@ -236,68 +262,3 @@ def _read(capture: Capture, stamped: bool) -> tuple[Plane, int | None] | None:
     begin_ns = round(1e6 * capture.get(cv2.CAP_PROP_POS_MSEC)) if stamped else 0
     believed = 0 <= time.monotonic_ns() - begin_ns <= OLDEST_STAMP_NS  # else it is of another clock, or missing
     return np.asarray(image, dtype=np.uint8), begin_ns if believed else None
-
-
-# -- reading thread ----------------------------------------------------------------------------------------------------
-# So that a slow reader always gets the newest frame.
-
-@dataclass(frozen=True, slots=True)
-class Grabbed:
-    """One image as the device gave it: (H, W, 3) BGR, how many came before it, when its read returned, and when its
-    driver says that it began, None where it does not."""
-
-    image: Plane
-    number: int
-    t_return_node_ns: int
-    t_begin_node_ns: int | None
-
-
-class LatestGrabber:
-    """Calls `grab` for ever in its own thread and keeps the newest image. `grab` gives it with the time at which it
-    began, ns by the machine's monotonic clock or None, and returns None when the device failed; `release` is called at
-    the end, in the same thread."""
-
-    def __init__(self, grab: Callable[[], tuple[Plane, int | None] | None], release: Callable[[], object],
-                 clock: NodeClock) -> None:
-        self._grab = grab
-        self._release = release
-        self._clock = clock
-        self._changed = threading.Condition()
-        self._newest: Grabbed | None = None
-        self._failed = False
-        self._ending = False
-        self._task = OneShotThread("reads the camera", self._run)
-
-    @property
-    def failed(self) -> bool:
-        """True when the device gave no more images."""
-        return self._failed
-
-    def take(self, timeout_s: float) -> Grabbed | None:
-        """The newest image not taken yet; None when none comes in time or the device failed."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._newest is not None or self._failed, timeout_s)
-            newest, self._newest = self._newest, None
-            return newest
-
-    def close(self) -> None:
-        """End the thread; when the device does not return from its read, leave it to end by itself."""
-        self._ending = True
-        self._task.join(2.0)
-
-    def _run(self) -> None:
-        number = 0
-        try:
-            while not self._ending and (found := self._grab()) is not None:
-                image, begin_ns = found
-                grabbed = Grabbed(image, number, self._clock.now_ns(),
-                                  None if begin_ns is None else self._clock.from_host_ns(begin_ns))
-                with self._changed:
-                    self._newest = grabbed
-                    self._changed.notify_all()
-                number += 1
-        finally:
-            with self._changed:
-                self._failed = not self._ending
-                self._changed.notify_all()
-            self._release()
