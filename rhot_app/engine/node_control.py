@@ -21,8 +21,8 @@ from rhot_app.errors import EngineError
 from rhot_app.project import Rig, RigNode
 from rhot_node.errors import printable
 from rhot_node.files import decode_message
-from rhot_node.keys import KeyPair, connect_with
-from rhot_node.network.context import Context
+from rhot_node.keys import KeyPair
+from rhot_node.network.context import Client, Context, RefusedError, connect, read_answer
 
 TIMEOUT_S = 2.7
 """A still may take two seconds on a node whose camera has just stopped; a client waits for three."""
@@ -53,7 +53,7 @@ class _Peer:
     """One node's control channel."""
 
     node: RigNode
-    requests: zmq.Socket[bytes]
+    requests: Client
     previews: zmq.Socket[bytes] | None = None
     asked: dict[int, _Asked] = field(default_factory=dict)
     message: str = ""
@@ -100,7 +100,8 @@ class NodeControl:
         for node_id, node in wanted.items():
             if node_id not in self._peers:
                 try:
-                    self._peers[node_id] = _Peer(node, self._connect(zmq.DEALER, node, _endpoints(node)[0]))
+                    self._peers[node_id] = _Peer(node, Client(self._context, _endpoints(node)[0], self._own,
+                                                              node.public_key))
                 except zmq.ZMQError as exc:  # the node is tracked all the same; only its settings are out of reach
                     log.warning("node %s: %s is no address to connect to (%s)", node.name, _endpoints(node)[0], exc)
         self.set_preview(self._preview)
@@ -160,7 +161,8 @@ class NodeControl:
         self._preview = on
         for peer in self._peers.values():
             if on and peer.previews is None:
-                peer.previews = self._connect(zmq.SUB, peer.node, _endpoints(peer.node)[1])
+                peer.previews = connect(self._context, zmq.SUB, _endpoints(peer.node)[1], self._own,
+                                        peer.node.public_key)
                 peer.previews.setsockopt(zmq.SUBSCRIBE, b"")
             elif not on and peer.previews is not None:
                 peer.previews.close()
@@ -249,23 +251,6 @@ class NodeControl:
         while self._peers:
             _close(self._peers.popitem()[1])
 
-    def _connect(self, kind: int, node: RigNode, endpoint: str) -> zmq.Socket[bytes]:
-        """A socket towards one node, encrypted if it is paired."""
-        socket = self._context.socket(kind)
-        socket.setsockopt(zmq.RECONNECT_IVL, 100)
-        socket.setsockopt(zmq.RECONNECT_IVL_MAX, 1000)
-        socket.setsockopt(zmq.RCVHWM, 8)
-        if kind == zmq.DEALER:
-            socket.setsockopt(zmq.IMMEDIATE, 1)
-        if node.public_key and self._own is not None:
-            connect_with(socket, self._own, node.public_key)
-        try:
-            socket.connect(endpoint)
-        except zmq.ZMQError:
-            socket.close()
-            raise
-        return socket
-
     def _put(self, peer: _Peer, client: bytes | None, command: str, request: dict[str, Any]) -> None:
         asked = _Asked(next(self._numbers), client, command, msgspec.json.encode(request),
                        time.monotonic() + TIMEOUT_S)
@@ -276,23 +261,19 @@ class NodeControl:
         """Send what could not be sent yet: nothing is queued for a node that is not there, to reach it much later."""
         for asked in peer.asked.values():
             if not asked.sent:
-                try:
-                    peer.requests.send_multipart([asked.number.to_bytes(8, "little"), b"", asked.payload], zmq.DONTWAIT)
-                except zmq.Again:
+                if not peer.requests.send(asked.payload, asked.number):
                     return
                 asked.sent = True
 
 
 def _receive(peer: _Peer) -> list[tuple[_Asked, Answer, bytes | None]]:
     found: list[tuple[_Asked, Answer, bytes | None]] = []
-    while True:
-        try:
-            parts = peer.requests.recv_multipart(zmq.DONTWAIT)
-        except zmq.Again:
-            return found
-        asked = peer.asked.pop(int.from_bytes(parts[0], "little"), None)
-        if asked is not None and len(parts) >= 3:
-            found.append((asked, *_translate(peer.node.name, asked.command, parts[2:])))
+    while (received := peer.requests.receive()) is not None:
+        number, parts = received
+        asked = peer.asked.pop(number, None)
+        if asked is not None:
+            found.append((asked, *_translate(peer.node.name, asked.command, parts)))
+    return found
 
 
 def _take_video_answer(peer: _Peer, answer: Answer) -> None:
@@ -320,12 +301,11 @@ def _take_video_answer(peer: _Peer, answer: Answer) -> None:
 def _translate(name: str, command: str, parts: list[bytes]) -> tuple[Answer, bytes | None]:
     """A node's reply as the engine's answer to its client."""
     try:
-        reply = decode_message(parts[0], dict[str, Any])
+        reply = read_answer(parts[0])
+    except RefusedError as exc:
+        return refusal(EngineError(f"node {name}: {exc}")), None
     except msgspec.MsgspecError as exc:
         return refusal(EngineError(f"node {name} gave an answer that cannot be read ({printable(str(exc))}).")), None
-    if not reply.pop("ok", False):
-        reason = printable(str(reply.get("error", "it refused without a reason")))
-        return refusal(EngineError(f"node {name}: {reason}")), None
     if len(parts) > 1:
         name_of_part = str(reply.get("format", "png")) if command == "still" else "data"
         return {"ok": True, "answer": reply, "attachment": name_of_part}, parts[1]
@@ -356,6 +336,6 @@ def _reached(node: RigNode) -> tuple[str, ...]:
 
 
 def _close(peer: _Peer) -> None:
-    peer.requests.close(_LAST_WORDS_MS if peer.asked else 0)
+    peer.requests.socket.close(_LAST_WORDS_MS if peer.asked else 0)
     if peer.previews is not None:
         peer.previews.close()

@@ -26,9 +26,9 @@ from rhot_app.progress import Progress, ProgressLine, silent, within
 from rhot_app.project import Rig, RigNode, load_rig
 from rhot_app.recording.raw_log import LogReader
 from rhot_node.errors import NodeError, printable
-from rhot_node.files import MIB, decode_message, free_bytes, replacing
-from rhot_node.keys import KeyPair, connect_with
-from rhot_node.network.context import Context
+from rhot_node.files import MIB, free_bytes, replacing
+from rhot_node.keys import KeyPair
+from rhot_node.network.context import Client, Context, RefusedError, ask_all, read_answer
 from rhot_node.terminal import add_examples
 from rhot_node.threads import ANSWER_S
 from rhot_node.video.avi import read_stamps
@@ -39,7 +39,6 @@ PATIENCE_S: Final = 30.0
 
 _ANSWER_MAX = 8 * MIB  # bytes; the longest honest answer is a list of some ten thousand videos
 _LOOK_S = 0.5
-_PAUSE_S = 0.1  # before a connection is made anew
 
 COLUMNS = ("frame_number", "t_node_ns", "exposure_ns", "row_time_ns")
 
@@ -55,10 +54,6 @@ class Collected:
 
 class _Videos(msgspec.Struct):
     videos: Annotated[list[VideoInfo], Meta(max_length=100_000)]
-
-
-class _SilentError(RhotError):
-    """A node gave no answer in time."""
 
 
 def video_name(log: Path) -> str:
@@ -100,13 +95,13 @@ def collect_videos(log: Path, rig: Rig, own: KeyPair, folder: Path | None = None
     found, problems = [], []
     for number, node in enumerate(nodes):
         part = within(progress, number / len(nodes), (number + 1) / len(nodes))
-        with contextlib.closing(_Channel(node, own, patience_s)) as channel:
-            try:
+        try:
+            with contextlib.closing(_Channel(node, own, patience_s)) as channel:
                 found.append(_collect(channel, name, video_path(log, node.name, folder), keep, part))
-            except (RhotError, NodeError) as exc:
-                problems.append(str(exc))
-            except OSError as exc:
-                problems.append(f"{exc.filename or log}: cannot be written ({exc.strerror}).")
+        except (RhotError, NodeError) as exc:
+            problems.append(str(exc))
+        except OSError as exc:
+            problems.append(f"{exc.filename or log}: cannot be written ({exc.strerror}).")
     if problems:
         raise RecordingError("\n".join(problems))
     return found
@@ -186,11 +181,14 @@ class _Channel:
     """Requests to one node, which are asked again when the connection was cut."""
 
     def __init__(self, node: RigNode, own: KeyPair, patience_s: float) -> None:
-        self.node = node
-        self._own = own
-        self._patience_s = patience_s
-        self._context = Context()
-        self._socket: zmq.Socket[bytes] | None = None
+        """Raises RecordingError for an address that none can have."""
+        self.node, self._patience_s, self._context = node, patience_s, Context()
+        try:
+            self._client = Client(self._context, f"tcp://{node.address}:{node.control_port}", own, node.public_key,
+                                  _ANSWER_MAX)
+        except zmq.ZMQError as exc:
+            self._context.destroy(linger=0)
+            raise RecordingError(f"node {node.name}: {node.address} is no address to connect to ({exc}).") from exc
 
     def close(self) -> None:
         """End the connection."""
@@ -223,48 +221,20 @@ class _Channel:
 
     def ask(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes | None]:
         """The answer and what is attached to it. Raises RecordingError when the node refuses or stays silent."""
-        end_s = time.monotonic() + self._patience_s
-        while True:
-            try:
-                parts = self._ask_once(msgspec.json.encode(request), max(end_s - time.monotonic(), _PAUSE_S))
-                break
-            except _SilentError:
-                if time.monotonic() >= end_s:
-                    raise RecordingError(
-                        f"node {self.node.name} does not answer at {self.node.address}:{self.node.control_port}. When "
-                        "it runs again, collect the videos again: it goes on where it was cut off.") from None
+        end_s, data, parts = time.monotonic() + self._patience_s, msgspec.json.encode(request), None
+        while parts is None:
+            left_s = end_s - time.monotonic()
+            if left_s <= 0.0:
+                raise RecordingError(
+                    f"node {self.node.name} does not answer at {self.node.address}:{self.node.control_port}. When it "
+                    "runs again, collect the videos again: it goes on where it was cut off.")
+            (parts,) = ask_all([(self._client, data)], min(ANSWER_S, left_s))
         try:
-            answer = decode_message(parts[0], dict[str, Any])
+            return read_answer(parts[0]), parts[1] if len(parts) > 1 else None
+        except RefusedError as exc:
+            raise RecordingError(f"node {self.node.name}: {exc}") from exc
         except msgspec.MsgspecError as exc:
             raise self._strange() from exc
-        if not answer.get("ok"):
-            raise RecordingError(f"node {self.node.name}: {printable(str(answer.get('error', 'it refused')))}")
-        return answer, parts[1] if len(parts) > 1 else None
-
-    def _ask_once(self, data: bytes, left_s: float) -> list[bytes]:
-        socket = self._socket or self._connect()
-        self._socket = socket
-        with contextlib.suppress(zmq.ZMQError):
-            socket.send(data, zmq.DONTWAIT)
-            if socket.poll(round(1e3 * min(ANSWER_S, left_s))):
-                return socket.recv_multipart()
-        socket.close()
-        self._socket = None
-        time.sleep(min(_PAUSE_S, left_s))
-        raise _SilentError
-
-    def _connect(self) -> zmq.Socket[bytes]:
-        socket = self._context.socket(zmq.REQ)
-        socket.maxmsgsize = _ANSWER_MAX
-        if self.node.public_key:
-            connect_with(socket, self._own, self.node.public_key)
-        try:
-            socket.connect(f"tcp://{self.node.address}:{self.node.control_port}")
-        except zmq.ZMQError as exc:
-            socket.close()
-            raise RecordingError(f"node {self.node.name}: {self.node.address} is no address to connect to "
-                                 f"({exc}).") from exc
-        return socket
 
     def _strange(self) -> RecordingError:
         return RecordingError(f"node {self.node.name} gave an answer that cannot be read; is it of another version?")

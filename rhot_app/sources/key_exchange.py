@@ -16,12 +16,10 @@ from rhot_app.errors import SourceError
 from rhot_app.project import RigNode
 from rhot_app.sources.node_link import RESTART_NS, NodeLink
 from rhot_node.errors import printable
-from rhot_node.files import decode_message
-from rhot_node.keys import HexKey, KeyPair, connect_with
-from rhot_node.network.context import Context
+from rhot_node.keys import HexKey, KeyPair
+from rhot_node.network.context import Client, Context, RefusedError, read_answer
 from rhot_node.terminal import LogLimit
 
-_RECONNECT_MS = 100
 _REFUSED = zmq.EVENT_HANDSHAKE_FAILED_AUTH | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
 
 log = logging.getLogger(__name__)
@@ -30,16 +28,14 @@ log = logging.getLogger(__name__)
 class _Granted(msgspec.Struct):
     """The node's answer."""
 
-    ok: bool
-    name: str = ""
-    key: HexKey | None = None
-    error: str = ""
+    name: str
+    key: HexKey
 
 
 @dataclass(slots=True)
 class _Peer:
     link: NodeLink
-    socket: zmq.Socket[bytes]
+    client: Client
     monitor: zmq.Socket[bytes]
     endpoints: set[str]
     asked_ns: int = 0
@@ -67,10 +63,7 @@ class KeyExchange:
             if now_ns - peer.asked_ns >= RESTART_NS and peer.link.wants_key(now_ns):
                 peer.asked_ns = now_ns
                 question = msgspec.json.encode({"request": "link", "name": peer.link.key_name})
-                try:
-                    peer.socket.send_multipart([b"", question], zmq.DONTWAIT)
-                except zmq.Again:  # no connection: nothing is queued for a node that is not there
-                    continue
+                peer.client.send(question)
 
     def reach(self, link: NodeLink, places: Sequence[RigNode]) -> None:
         """Be connected to where the node is and to these places where it may be. What does not have its key can make no
@@ -80,15 +73,15 @@ class KeyExchange:
             return
         wanted = {_endpoint(node) for node in (link.node, *places)}
         for endpoint in peer.endpoints - wanted:
-            peer.socket.disconnect(endpoint)
+            peer.client.socket.disconnect(endpoint)
         for endpoint in wanted - peer.endpoints:
-            peer.socket.connect(endpoint)
+            peer.client.socket.connect(endpoint)
         peer.endpoints = wanted
 
     def close(self) -> None:
         """Close all connections. May be called twice."""
         for peer in self._peers:
-            peer.socket.disable_monitor()
+            peer.client.socket.disable_monitor()
         self._peers = []
         if self._context is not None:
             self._context.destroy(linger=0)
@@ -101,23 +94,20 @@ class KeyExchange:
                 peer.link.turned_away |= event["endpoint"].decode() == _endpoint(peer.link.node)
         except zmq.Again:
             pass
-        try:
-            while True:
-                self._take(peer.link, peer.socket.recv_multipart(zmq.DONTWAIT)[-1])
-        except zmq.Again:
-            pass
+        while (answer := peer.client.receive()) is not None:
+            self._take(peer.link, answer[1][0])
 
     def _take(self, link: NodeLink, data: bytes) -> None:
         try:
-            granted = decode_message(data, _Granted)
+            granted = msgspec.convert(read_answer(data), _Granted)
+        except RefusedError as exc:
+            link.turned_away = True
+            self._tell(link, f"gave no key: {exc}")
         except msgspec.MsgspecError as exc:
             self._tell(link, f"gave no key but something that cannot be read ({printable(str(exc))})")
-            return
-        link.turned_away = not granted.ok
-        if granted.ok and granted.key is not None:
-            link.use_key(granted.name, bytes.fromhex(granted.key))
         else:
-            self._tell(link, f"gave no key: {printable(granted.error)}")
+            link.turned_away = False
+            link.use_key(granted.name, bytes.fromhex(granted.key))
 
     def _tell(self, link: NodeLink, what: str) -> None:
         if self._limit.due(link.node.name, time.monotonic()):
@@ -126,18 +116,13 @@ class KeyExchange:
     def _connect(self, link: NodeLink, own: KeyPair | None) -> None:
         assert self._context is not None and own is not None
         node = link.node
-        socket = self._context.socket(zmq.DEALER)
-        socket.setsockopt(zmq.IMMEDIATE, 1)
-        socket.setsockopt(zmq.RECONNECT_IVL, _RECONNECT_MS)
-        connect_with(socket, own, node.public_key)
-        monitor = socket.get_monitor_socket(_REFUSED)
         try:
-            socket.connect(_endpoint(node))
+            client = Client(self._context, _endpoint(node), own, node.public_key)
         except zmq.ZMQError as exc:
             self.close()
             raise SourceError(f"node {node.name}: {node.address}:{node.control_port} is no address to connect to "
                               f"({exc.strerror}).") from exc
-        self._peers.append(_Peer(link, socket, monitor, {_endpoint(node)}))
+        self._peers.append(_Peer(link, client, client.socket.get_monitor_socket(_REFUSED), {_endpoint(node)}))
 
 
 def _endpoint(node: RigNode) -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import secrets
 import socket
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,9 +22,9 @@ from rhot_app.keys import KnownNode, MasterKeys, load_master_keys, remember_node
 from rhot_app.project import Rig, RigNode, load_rig
 from rhot_app.rig_history import accept
 from rhot_node.errors import printable
-from rhot_node.files import PRINTABLE, decode_message
+from rhot_node.files import PRINTABLE
 from rhot_node.keys import Name
-from rhot_node.network.context import Context
+from rhot_node.network.context import Client, Context, RefusedError, ask_all, read_answer
 from rhot_node.network.pairing import NO_CODE, NONCE_LENGTH, Transcript, proof, proves, read_code
 from rhot_node.terminal import add_examples
 from rhot_node.wire.messages import PAIRING_PORT, PORT_MAX, U32_MAX
@@ -71,10 +70,6 @@ class Introduction(msgspec.Struct, frozen=True):
     pairing_port: Port
     public_key: Annotated[str, Meta(pattern=r"\A([0-9a-f]{64})?\Z")] = ""
     nonce: Annotated[str, Meta(pattern=r"\A([0-9a-f]{32})?\Z")] = ""  # of the code it offers; empty: it offers none
-
-
-class _Refusal(msgspec.Struct):
-    error: Annotated[str, Meta(max_length=1000)]
 
 
 class _Paired(msgspec.Struct):
@@ -130,28 +125,18 @@ def pair(address: NodeAddress, code_text: str, keys: MasterKeys, timeout_s: floa
 def _ask(questions: Sequence[tuple[NodeAddress, dict[str, Any]]], timeout_s: float) -> list[bytes | str | None]:
     """The bytes of every answer; None for silence, a sentence for an address that cannot be asked."""
     context = Context()
-    poller = zmq.Poller()
-    sockets: dict[zmq.Socket[bytes], int] = {}
+    clients: dict[int, tuple[Client, bytes]] = {}
     answers: list[bytes | str | None] = [None] * len(questions)
     try:
         for place, (address, question) in enumerate(questions):
-            socket = context.socket(zmq.REQ)
-            socket.maxmsgsize = _ANSWER_MAX
             try:
-                socket.connect(f"tcp://{address}")
-                socket.send(msgspec.json.encode(question), zmq.DONTWAIT)
-            except zmq.Again:
-                continue  # what listens there has hung up already; waiting to send would be for ever
+                client = Client(context, f"tcp://{address}", longest=_ANSWER_MAX)
             except (zmq.ZMQError, UnicodeError) as exc:
                 answers[place] = f"{str(address)!r} is not an address that can be asked ({exc})."
                 continue
-            sockets[socket] = place
-            poller.register(socket, zmq.POLLIN)
-        end_s = time.monotonic() + timeout_s
-        while sockets and (left_s := end_s - time.monotonic()) > 0.0:
-            for socket, _ in poller.poll(round(1e3 * left_s) + 1):
-                answers[sockets.pop(socket)] = socket.recv_multipart()[0]
-                poller.unregister(socket)
+            clients[place] = client, msgspec.json.encode(question)
+        for place, parts in zip(clients, ask_all([*clients.values()], timeout_s), strict=True):
+            answers[place] = None if parts is None else parts[0]
     finally:
         context.destroy(linger=0)
     return answers
@@ -165,9 +150,9 @@ def _read(address: NodeAddress, answer: bytes | str | None, kind: type[T], timeo
     if isinstance(answer, str):
         raise PairingError(answer)
     try:
-        if not decode_message(answer, dict[str, Any]).get("ok"):
-            raise PairingError(f"{address}: {printable(decode_message(answer, _Refusal).error)}")
-        return decode_message(answer, kind)
+        return msgspec.convert(read_answer(answer), kind)
+    except RefusedError as exc:
+        raise PairingError(f"{address}: {exc}") from exc
     except msgspec.MsgspecError as exc:
         raise PairingError(f"{address}: something answered that is not a node of this system "
                            f"({printable(str(exc))}).") from exc
