@@ -19,10 +19,10 @@ from rhot_app.engine.node_meter import foreground_advice, health_advice, sees_bl
 from rhot_app.engine.status import Advice, EngineStatus, Preview
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, RigNode
-from rhot_node.errors import printable
+from rhot_node.errors import NodeError, printable
 from rhot_node.files import decode_message
 from rhot_node.keys import KeyPair
-from rhot_node.network.context import Client, Context, RefusedError, connect, read_answer
+from rhot_node.network.context import Client, Context, read_answer
 
 TIMEOUT_S = 2.7
 """A still may take two seconds on a node whose camera has just stopped; a client waits for three."""
@@ -161,8 +161,8 @@ class NodeControl:
         self._preview = on
         for peer in self._peers.values():
             if on and peer.previews is None:
-                peer.previews = connect(self._context, zmq.SUB, _endpoints(peer.node)[1], self._own,
-                                        peer.node.public_key)
+                peer.previews = Client(self._context, _endpoints(peer.node)[1], self._own, peer.node.public_key,
+                                       kind=zmq.SUB).socket
                 peer.previews.setsockopt(zmq.SUBSCRIBE, b"")
             elif not on and peer.previews is not None:
                 peer.previews.close()
@@ -302,7 +302,7 @@ def _translate(name: str, command: str, parts: list[bytes]) -> tuple[Answer, byt
     """A node's reply as the engine's answer to its client."""
     try:
         reply = read_answer(parts[0])
-    except RefusedError as exc:
+    except NodeError as exc:
         return refusal(EngineError(f"node {name}: {exc}")), None
     except msgspec.MsgspecError as exc:
         return refusal(EngineError(f"node {name} gave an answer that cannot be read ({printable(str(exc))}).")), None

@@ -28,7 +28,7 @@ from rhot_app.recording.raw_log import LogReader
 from rhot_node.errors import NodeError, printable
 from rhot_node.files import MIB, free_bytes, replacing
 from rhot_node.keys import KeyPair
-from rhot_node.network.context import Client, Context, RefusedError, ask_all, read_answer
+from rhot_node.network.context import Client, Context, ask_all, read_answer
 from rhot_node.terminal import add_examples
 from rhot_node.threads import ANSWER_S
 from rhot_node.video.avi import read_stamps
@@ -231,7 +231,7 @@ class _Channel:
             (parts,) = ask_all([(self._client, data)], min(ANSWER_S, left_s))
         try:
             return read_answer(parts[0]), parts[1] if len(parts) > 1 else None
-        except RefusedError as exc:
+        except NodeError as exc:
             raise RecordingError(f"node {self.node.name}: {exc}") from exc
         except msgspec.MsgspecError as exc:
             raise self._strange() from exc

@@ -15,9 +15,9 @@ from zmq.utils.monitor import recv_monitor_message
 from rhot_app.errors import SourceError
 from rhot_app.project import RigNode
 from rhot_app.sources.node_link import RESTART_NS, NodeLink
-from rhot_node.errors import printable
+from rhot_node.errors import NodeError, printable
 from rhot_node.keys import HexKey, KeyPair
-from rhot_node.network.context import Client, Context, RefusedError, read_answer
+from rhot_node.network.context import Client, Context, read_answer
 from rhot_node.terminal import LogLimit
 
 _REFUSED = zmq.EVENT_HANDSHAKE_FAILED_AUTH | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
@@ -100,7 +100,7 @@ class KeyExchange:
     def _take(self, link: NodeLink, data: bytes) -> None:
         try:
             granted = msgspec.convert(read_answer(data), _Granted)
-        except RefusedError as exc:
+        except NodeError as exc:
             link.turned_away = True
             self._tell(link, f"gave no key: {exc}")
         except msgspec.MsgspecError as exc:

@@ -21,10 +21,10 @@ from rhot_app.errors import PairingError, positive_count
 from rhot_app.keys import KnownNode, MasterKeys, load_master_keys, remember_node
 from rhot_app.project import Rig, RigNode, load_rig
 from rhot_app.rig_history import accept
-from rhot_node.errors import printable
+from rhot_node.errors import NodeError, printable
 from rhot_node.files import PRINTABLE
 from rhot_node.keys import Name
-from rhot_node.network.context import Client, Context, RefusedError, ask_all, read_answer
+from rhot_node.network.context import Client, Context, ask_all, read_answer
 from rhot_node.network.pairing import NO_CODE, NONCE_LENGTH, Transcript, proof, proves, read_code
 from rhot_node.terminal import add_examples
 from rhot_node.wire.messages import PAIRING_PORT, PORT_MAX, U32_MAX
@@ -79,14 +79,8 @@ class _Paired(msgspec.Struct):
 def ask_who(addresses: Sequence[NodeAddress], timeout_s: float = TIMEOUT_S) -> list[Introduction | str]:
     """Ask every address at once who is there; a sentence stands for one that did not say. Returns after the last answer
     or `timeout_s`."""
-    answers = _ask([(address, {"request": "hello"}) for address in addresses], timeout_s)
-    found: list[Introduction | str] = []
-    for address, answer in zip(addresses, answers, strict=True):
-        try:
-            found.append(_read(address, answer, Introduction, timeout_s))
-        except PairingError as exc:
-            found.append(str(exc))
-    return found
+    answers = _ask(addresses, {"request": "hello"}, Introduction, timeout_s)
+    return [str(one) if isinstance(one, PairingError) else one for one in answers]
 
 
 def pair(address: NodeAddress, code_text: str, keys: MasterKeys, timeout_s: float = TIMEOUT_S,
@@ -113,7 +107,9 @@ def pair(address: NodeAddress, code_text: str, keys: MasterKeys, timeout_s: floa
                             nonce, who.node_id, who.name, keys.me.name)
     request = {"request": "pair", "master_key": keys.own.public_key, "master_name": keys.me.name,
                "master_nonce": nonce.hex(), "proof": proof(code, "master", transcript).hex()}
-    answer = _read(address, _ask([(address, request)], timeout_s)[0], _Paired, timeout_s)
+    (answer,) = _ask([address], request, _Paired, timeout_s)
+    if isinstance(answer, PairingError):
+        raise answer
     if not proves(bytes.fromhex(answer.proof), code, "node", transcript):
         raise PairingError(f"what answers at {address} does not know the code of {who.name}: somebody stands between, "
                            "or answers in its place. Nothing was paired here. Run `rhot-node unpair` on the node and "
@@ -122,40 +118,36 @@ def pair(address: NodeAddress, code_text: str, keys: MasterKeys, timeout_s: floa
     return who
 
 
-def _ask(questions: Sequence[tuple[NodeAddress, dict[str, Any]]], timeout_s: float) -> list[bytes | str | None]:
-    """The bytes of every answer; None for silence, a sentence for an address that cannot be asked."""
+def _ask(addresses: Sequence[NodeAddress], request: dict[str, Any], kind: type[T],
+         timeout_s: float) -> list[T | PairingError]:
+    """What each address answers as a `kind`, or why it does not."""
+    found: dict[NodeAddress, T | PairingError] = {}
+    clients: dict[NodeAddress, tuple[Client, bytes]] = {}
     context = Context()
-    clients: dict[int, tuple[Client, bytes]] = {}
-    answers: list[bytes | str | None] = [None] * len(questions)
     try:
-        for place, (address, question) in enumerate(questions):
+        for address in addresses:
             try:
                 client = Client(context, f"tcp://{address}", longest=_ANSWER_MAX)
+                clients[address] = client, msgspec.json.encode(request)
             except (zmq.ZMQError, UnicodeError) as exc:
-                answers[place] = f"{str(address)!r} is not an address that can be asked ({exc})."
-                continue
-            clients[place] = client, msgspec.json.encode(question)
-        for place, parts in zip(clients, ask_all([*clients.values()], timeout_s), strict=True):
-            answers[place] = None if parts is None else parts[0]
+                found[address] = PairingError(f"{str(address)!r} is not an address that can be asked ({exc}).")
+        answers = ask_all([*clients.values()], timeout_s)
     finally:
         context.destroy(linger=0)
-    return answers
+    for address, parts in zip(clients, answers, strict=True):
+        found[address] = _read(address, parts[0], kind) if parts is not None else PairingError(
+            f"{address}: nothing answered within {timeout_s:g} s. Is rhot-node running there, and the address right?")
+    return [found[address] for address in addresses]
 
 
-def _read(address: NodeAddress, answer: bytes | str | None, kind: type[T], timeout_s: float) -> T:
-    """The answer as a `kind`; raises PairingError for anything else."""
-    if answer is None:
-        raise PairingError(f"{address}: nothing answered within {timeout_s:g} s. Is rhot-node running there, and the "
-                           "address right?")
-    if isinstance(answer, str):
-        raise PairingError(answer)
+def _read(address: NodeAddress, answer: bytes, kind: type[T]) -> T | PairingError:
     try:
         return msgspec.convert(read_answer(answer), kind)
-    except RefusedError as exc:
-        raise PairingError(f"{address}: {exc}") from exc
+    except NodeError as exc:
+        return PairingError(f"{address}: {exc}")
     except msgspec.MsgspecError as exc:
-        raise PairingError(f"{address}: something answered that is not a node of this system "
-                           f"({printable(str(exc))}).") from exc
+        return PairingError(f"{address}: something answered that is not a node of this system "
+                            f"({printable(str(exc))}).")
 
 
 # -- the command ``rhot pair`` -----------------------------------------------------------------------------------------

@@ -48,35 +48,27 @@ class Context(zmq.Context["zmq.Socket[bytes]"]):
         super().__del__()
 
 
-def connect(context: Context, kind: int, endpoint: str, own: KeyPair | None = None, node_key: str = "",
-            longest: int = -1) -> zmq.Socket[bytes]:
-    """A socket towards a node; with keys it talks encrypted to the holder of `node_key` and nobody else.
-
-    `longest`: bytes of a message part that ends the connection when it is longer, -1: none does. Nothing is queued for
-    a node that is not there, to reach it much later. Raises zmq.ZMQError, UnicodeError; nothing stays open then.
-    """
-    socket = context.socket(kind)
-    socket.setsockopt(zmq.RECONNECT_IVL, _RECONNECT_MS)
-    socket.setsockopt(zmq.IMMEDIATE, 1)
-    socket.setsockopt(zmq.RCVHWM, _ANSWERS_QUEUED)
-    socket.maxmsgsize = longest
-    if own is not None and node_key:
-        connect_with(socket, own, node_key)
-    try:
-        socket.connect(endpoint)
-    except (zmq.ZMQError, UnicodeError):
-        socket.close()
-        raise
-    return socket
-
-
 class Client:
-    """Requests to a node, and its answers. Never waits. One thread."""
+    """Requests to a node, and its answers. Never waits; nothing is queued for a node that is not there, to reach it
+    much later. One thread."""
 
-    def __init__(self, context: Context, endpoint: str, own: KeyPair | None = None, node_key: str = "",
-                 longest: int = -1) -> None:
-        """See `connect`."""
-        self.socket = connect(context, zmq.DEALER, endpoint, own, node_key, longest)
+    def __init__(self, context: Context, endpoint: str, own: KeyPair | None = None, node_key: str = "", *,
+                 kind: int = zmq.DEALER, longest: int = -1) -> None:
+        """With keys it talks encrypted to the holder of `node_key` and nobody else. `kind`: of the socket. `longest`:
+        bytes of a message part that ends the connection when it is longer, -1: none does. Raises zmq.ZMQError,
+        UnicodeError; nothing stays open then."""
+        self.socket = socket = context.socket(kind)
+        socket.setsockopt(zmq.RECONNECT_IVL, _RECONNECT_MS)
+        socket.setsockopt(zmq.IMMEDIATE, 1)
+        socket.setsockopt(zmq.RCVHWM, _ANSWERS_QUEUED)
+        socket.maxmsgsize = longest
+        if own is not None and node_key:
+            connect_with(socket, own, node_key)
+        try:
+            socket.connect(endpoint)
+        except (zmq.ZMQError, UnicodeError):
+            socket.close()
+            raise
 
     def send(self, request: bytes, number: int = 0) -> bool:
         """Send a request, whose answer will have its `number`; False without a connection."""
@@ -120,15 +112,12 @@ def ask_all(questions: Sequence[tuple[Client, bytes]], timeout_s: float) -> list
     return answers
 
 
-class RefusedError(NodeError):
-    """A node does not do what it was asked. The message: why, in the node's words, safe to show."""
-
-
 def read_answer(data: bytes) -> dict[str, Any]:
-    """What a node answers. Raises RefusedError when it refuses, msgspec.MsgspecError for what no node answers."""
+    """What a node answers. Raises NodeError with its words when it refuses, msgspec.MsgspecError for what no node
+    answers."""
     answer = decode_message(data, dict[str, Any])
     if answer.pop("ok", False) is True:
         return answer
     if not isinstance(answer.get("error"), str):
         raise msgspec.ValidationError("neither ok nor error")
-    raise RefusedError(printable(answer["error"]))
+    raise NodeError(printable(answer["error"]))
