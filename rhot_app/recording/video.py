@@ -5,7 +5,6 @@ Functions that wait; call them in a worker or a command.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import fcntl
 import hashlib
@@ -21,15 +20,13 @@ import zmq
 from msgspec import Meta
 
 from rhot_app.errors import RecordingError, RhotError
-from rhot_app.keys import load_master_keys
-from rhot_app.progress import Progress, ProgressLine, silent, within
-from rhot_app.project import Rig, RigNode, load_rig
+from rhot_app.progress import Progress, silent, within
+from rhot_app.project import Rig, RigNode
 from rhot_app.recording.raw_log import LogReader
 from rhot_node.errors import NodeError, printable
 from rhot_node.files import MIB, free_bytes, replacing
 from rhot_node.keys import KeyPair
 from rhot_node.network.context import Client, Context, ask_all, read_answer
-from rhot_node.terminal import add_examples
 from rhot_node.threads import ANSWER_S
 from rhot_node.video.avi import read_stamps
 from rhot_node.video.recorder import READ_MAX, VideoInfo, VideoName
@@ -238,33 +235,3 @@ class _Channel:
 
     def _strange(self) -> RecordingError:
         return RecordingError(f"node {self.node.name} gave an answer that cannot be read; is it of another version?")
-
-
-# -- the command ``rhot video`` ----------------------------------------------------------------------------------------
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``rhot video``."""
-    parser.add_argument("what", choices=("collect",), help="collect: fetch the videos of a log from the nodes")
-    parser.add_argument("log", type=Path, metavar="LOG", help="the log that `rhot engine --log LOG --video` wrote")
-    parser.add_argument("--rig", type=Path, metavar="FILE",
-                        help="the rig file that says where the nodes are now (default: the log's own rig)")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where the videos go (default: beside the log)")
-    parser.add_argument("--keep", action="store_true", help="leave the videos on the nodes as well")
-    add_examples(parser, "rhot video collect wave.rhotlog",
-                 "rhot video collect wave.rhotlog --rig desk.json --out videos --keep")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Collect; raises RecordingError, RigError, TrustError."""
-    if args.rig is not None:
-        rig = load_rig(args.rig)
-    else:
-        with contextlib.closing(LogReader(args.log)) as reader:
-            rig = reader.rig
-    if args.out is not None and not args.out.is_dir():
-        raise RecordingError(f"{args.out}: there is no such folder. Make it first.")
-    line = ProgressLine("videos")
-    for video in collect_videos(args.log, rig, load_master_keys().own, args.out, keep=args.keep, progress=line.report):
-        dropped = f", {video.info.dropped} dropped" if video.info.dropped else ""
-        print(f"{video.path}: {video.info.frames} frames{dropped}. {printable(video.info.message)}".rstrip())
-    return 0

@@ -1,4 +1,4 @@
-"""The master's command socket: clock requests to every node, start and stop, and the nodes' answers."""
+"""The rig's nodes, live: a port and a thread for the data of each, and one more for clocks, start and stop."""
 
 from __future__ import annotations
 
@@ -49,22 +49,40 @@ def new_session() -> int:
     return secrets.randbits(62) | 1
 
 
-class NodeLinks:
-    """Talks to all nodes of a rig. `step` waits for answers and sends what is due; `start_thread` runs it."""
+class UdpNodes(RigLinks):
+    """`ObservationSource` of the rig's nodes. Receives as soon as it is made; admits frames once started. `step` waits
+    for answers to commands and sends what is due, in a thread of its own."""
 
-    def __init__(self, rig: Rig, links: list[NodeLink], data_ports: list[int], own: KeyPair | None) -> None:
-        """`links` and `data_ports` in the order of the rig's nodes; `own`: the master's keys, None when no node is
-        paired. Text nodes are not spoken to. Raises SourceError."""
-        self._keys = KeyExchange(links, own)
+    live = True
+    log_path = ""
+
+    def __init__(self, rig: Rig, own: KeyPair | None = None) -> None:
+        """Open all ports; `own`: the master's keys, which paired nodes ask for. Raises SourceError when a port is taken
+        or keys are missing; nothing stays open then."""
+        super().__init__(rig)
+        with contextlib.ExitStack() as stack:
+            sockets = []
+            for node in rig.nodes:
+                sockets.append(open_data_socket(node.data_port, node.name))
+                stack.callback(sockets[-1].close)
+            self.receivers = tuple(NodeReceiver(sock, link.door, link.node.name)
+                                   for sock, link in zip(sockets, self.links, strict=True))
+            self._keys = KeyExchange(self.links, own)
+            stack.pop_all()
         self._tap: RecordSink | None = None
-        self._recent: deque[tuple[RecordKind, int, int, bytes]] = deque(maxlen=RECENT * len(links))
-        self.broadcast_failure = ""
-        self._links = {link.node.node_id: link for link in links if not link.node.text_datagrams}
-        self._entries = {link.node.node_id: StartEntry(link.node.node_id, port, 0)
-                         for link, port in zip(links, data_ports, strict=True) if not link.node.text_datagrams}
+        self._recent: deque[tuple[RecordKind, int, int, bytes]] = deque(maxlen=RECENT * len(self.links))
+        # text nodes are not spoken to
+        spoken_to = [(link, receiver) for link, receiver in zip(self.links, self.receivers, strict=True)
+                     if not link.node.text_datagrams]
+        self._links = {link.node.node_id: link for link, _ in spoken_to}
+        self._entries = {link.node.node_id: StartEntry(link.node.node_id, receiver.port, 0)
+                         for link, receiver in spoken_to}
         self._broadcast = (rig.broadcast.address, rig.broadcast.port)
         self._addresses: dict[int, str | None] = {}
-        self._named: list[NodeLink] = []  # those whose address is a name
+        for node_id, link in self._links.items():
+            with contextlib.suppress(ValueError):
+                self._addresses[node_id] = str(ipaddress.ip_address(link.node.address))
+        self._named = [link for node_id, link in self._links.items() if node_id not in self._addresses]
         self._lost = LostNodes(list(self._links.values()), rig.broadcast.port, time.monotonic_ns())
         self._due_ns = dict.fromkeys(self._links, 0)
         self._sequence = 0
@@ -76,34 +94,53 @@ class NodeLinks:
         self._kernel_time = KernelTime()
         self._worker = Worker("commands the nodes", lambda: self.step(0.02))
         self._resolver = Worker("looks up the nodes' addresses", self._resolve, hang_s=None)
+        self._followed = FollowedObjects(rig)
+        for receiver in self.receivers:
+            receiver.start()
+        self._followed.start()
+        self._worker.start()
+        if self._named:
+            self._resolver.start()
+
+    def deliver_to(self, deliver: Deliver) -> None:
+        """Hand frames to `deliver` from now on, each camera's in its own thread."""
+        for receiver in self.receivers:
+            receiver.deliver = deliver
+        self._followed.deliver = deliver
+
+    def notices(self) -> list[str]:
+        """What is wrong with the trackers that follow objects. Links and receivers speak for themselves."""
+        return self._followed.notices()
 
     def start(self, session: int) -> None:
-        """Tell every node to stream `session`."""
+        """Admit `session` and tell every node to stream it."""
         with self._lock:
             now_ns = time.monotonic_ns()
-            for link in self._links.values():
+            for link in self.links:
                 link.want(session, now_ns)
+            self.starts += 1
             self._tell(RecordKind.START, functools.partial(self._start, session), now_ns)
 
     def stop(self) -> None:
-        """Tell every node to stop what it streams for us, twice, because nobody asks again."""
+        """Tell every node to stop what it streams for us, twice, because nobody asks again; admit nothing more."""
         with self._lock:
             now_ns = time.monotonic_ns()
             for session in {link.wanted for link in self._links.values() if link.wanted}:
                 self._tell(RecordKind.STOP, functools.partial(self._stop, session), now_ns, times=2)
-            for link in self._links.values():
+            for link in self.links:
                 link.want(0, now_ns)
 
-    def search(self, link: NodeLink, request: SliceRequest) -> None:
+    def search(self, request: SliceRequest) -> None:
         """Ask a node to search its next frames. May be called by any thread."""
+        link = self.links[request.camera]
         with self._lock:
             for datagram in link.slices(request):
                 self._send(link, datagram)
                 self._note(RecordKind.SLICES, link.node.node_id, time.monotonic_ns(), datagram)
 
     def record_to(self, tap: RecordSink | None) -> None:
-        """Hand every command datagram to `tap` from now on: first the running session and the last exchanges,
-        without which a recording that begins now could not tell the nodes' times."""
+        """Hand everything to `tap` from now on, None: to nobody. First the running session and the last exchanges,
+        without which a recording that begins now could not tell the nodes' times: datagrams mean nothing before."""
         with self._lock:
             if tap is not None:
                 for node_id, link in self._links.items():
@@ -113,6 +150,11 @@ class NodeLinks:
                 for record in list(self._recent):
                     tap.put(*record)
             self._tap = tap
+        for link, receiver in zip(self.links, self.receivers, strict=True):
+            before, receiver.sink = receiver.sink, None if tap is None else DatagramSink(tap, link)
+            if before is not None:
+                before.close()
+        self._followed.tap = tap
 
     def step(self, timeout_s: float) -> None:
         """Wait up to `timeout_s` for one answer, take in all that wait, then send what is due."""
@@ -139,23 +181,16 @@ class NodeLinks:
                 if now_ns >= self._due_ns[node_id] + wait_ns and link.reachable:
                     self._ask(link, now_ns)
 
-    def start_thread(self) -> None:
-        """Find the addresses of named nodes and run `step` until `close`."""
-        self._worker.start()
-        for link in self._links.values():
-            with contextlib.suppress(ValueError):
-                self._addresses[link.node.node_id] = str(ipaddress.ip_address(link.node.address))
-        self._named = [link for link in self._links.values() if link.node.node_id not in self._addresses]
-        if self._named:
-            self._resolver.start()
-
     def close(self) -> None:
-        """End the threads and close the socket. May be called twice."""
+        """End the threads and close all ports. May be called twice."""
+        self._followed.close()
         self._resolver.close(0.0)  # the system may take its time over a name
         self._worker.close()
         self._lost.close()
         self._keys.close()
         self._socket.close()
+        for receiver in self.receivers:
+            receiver.close()
 
     def _receive(self, flags: int) -> None:
         data, ancillary, _, sender = self._socket.recvmsg(RECEIVE_MAX, ANCILLARY_SIZE, flags)
@@ -240,10 +275,8 @@ class NodeLinks:
     def _send_broadcast(self, datagram: bytes) -> None:
         try:
             self._socket.sendto(datagram, self._broadcast)
-            self.broadcast_failure = ""
         except OSError as exc:  # every node is told at its own address too
-            self.broadcast_failure = f"broadcast to {self._broadcast[0]}: {exc.strerror}"
-            log.info("%s", self.broadcast_failure)
+            log.info("broadcast to %s: %s", self._broadcast[0], exc.strerror)
 
     def _note(self, kind: RecordKind, node_id: int, t_master_ns: int, data: bytes) -> None:
         if kind in (RecordKind.CLOCK_REQUEST, RecordKind.CLOCK_REPLY):
@@ -262,77 +295,3 @@ class NodeLinks:
                                         "Correct it in the rig, or switch the node on.")
         found = all(self._addresses.get(link.node.node_id) for link in self._named)
         self._resolver.ending.wait(_RESOLVE_S if not found else 10 * _RESOLVE_S)
-
-
-# -- live nodes --------------------------------------------------------------------------------------------------------
-# A port and a thread for each, one more for clocks, start and stop.
-
-class UdpNodes(RigLinks):
-    """`ObservationSource` of the rig's nodes. Receives as soon as it is made; admits frames once started."""
-
-    live = True
-    log_path = ""
-
-    def __init__(self, rig: Rig, own: KeyPair | None = None) -> None:
-        """Open all ports; `own`: the master's keys, which paired nodes ask for. Raises SourceError when a port is taken
-        or keys are missing; nothing stays open then."""
-        super().__init__(rig)
-        with contextlib.ExitStack() as stack:
-            sockets = []
-            for node in rig.nodes:
-                sockets.append(open_data_socket(node.data_port, node.name))
-                stack.callback(sockets[-1].close)
-            self.receivers = tuple(NodeReceiver(sock, link.door, link.node.name)
-                                   for sock, link in zip(sockets, self.links, strict=True))
-            self._commands = NodeLinks(rig, list(self.links), [receiver.port for receiver in self.receivers],
-                                       own)
-            stack.pop_all()
-        self._followed = FollowedObjects(rig)
-        for receiver in self.receivers:
-            receiver.start()
-        self._followed.start()
-        self._commands.start_thread()
-
-    def deliver_to(self, deliver: Deliver) -> None:
-        """Hand frames to `deliver` from now on, each camera's in its own thread."""
-        for receiver in self.receivers:
-            receiver.deliver = deliver
-        self._followed.deliver = deliver
-
-    def notices(self) -> list[str]:
-        """What is wrong with the trackers that follow objects. Links and receivers speak for themselves."""
-        return self._followed.notices()
-
-    def start(self, session: int) -> None:
-        """Admit `session` and tell every node to stream it."""
-        for link in self.links:
-            link.want(session, time.monotonic_ns())
-        self.starts += 1
-        self._commands.start(session)
-
-    def stop(self) -> None:
-        """Tell every node to stop, and admit nothing more."""
-        self._commands.stop()
-        for link in self.links:
-            link.want(0, time.monotonic_ns())
-
-    def search(self, request: SliceRequest) -> None:
-        """Ask a node to search its next frames."""
-        self._commands.search(self.links[request.camera], request)
-
-    def record_to(self, tap: RecordSink | None) -> None:
-        """Tap all sockets; None ends it."""
-        self._commands.record_to(tap)  # first what is known of sessions and clocks: datagrams mean nothing before
-        for link, receiver in zip(self.links, self.receivers, strict=True):
-            before, receiver.sink = receiver.sink, None if tap is None else DatagramSink(tap, link)
-            if before is not None:
-                before.close()
-        self._followed.tap = tap
-
-    def close(self) -> None:
-        """Close all ports."""
-        self._followed.close()
-        self._commands.close()
-        for receiver in self.receivers:
-            receiver.close()
-

@@ -40,7 +40,7 @@ def test_a_paired_node_is_followed_and_streams_again(setup: Setup) -> None:
     assert (node.udp_port, node.control_port) == (setup.node.link.port, setup.node.server.control_port)
     assert (node.name, node.public_key, node.intrinsics) == (
         setup.rig.nodes[0].name, setup.rig.nodes[0].public_key, setup.rig.nodes[0].intrinsics)
-    eventually(lambda: not setup.source._commands._lost._searches)
+    eventually(lambda: not setup.source._lost._searches)
 
 
 def test_a_node_that_was_elsewhere_from_the_start_is_found(setup: Setup) -> None:

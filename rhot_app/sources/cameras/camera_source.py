@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
-import json
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
 from rhot_app.errors import RecordingError, SourceError
-from rhot_app.sources.cameras.camera_set import NONE_FOUND, CameraSource
+from rhot_app.sources.cameras.camera_set import CameraSource
 from rhot_app.sources.recorded_pictures import recorded_pictures
 from rhot_node.capture.v4l2 import USUAL, Device, Mode, list_devices, look_at_device
 from rhot_node.capture.webcam import NetworkCamera, shown_url
@@ -19,7 +16,6 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import FPS, CameraSettings
 from rhot_node.errors import CameraError
 from rhot_node.files import why
-from rhot_node.terminal import add_examples
 
 MOST: Final = 16
 """Cameras of a rig."""
@@ -105,28 +101,3 @@ def _recorded(path: Path) -> CameraSource:
 def _even(pixels: int) -> int:
     """Nodes cut an odd row or column off."""
     return pixels - pixels % 2
-
-
-# -- the command ``rhot cameras`` --------------------------------------------------------------------------------------
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``rhot cameras``."""
-    parser.add_argument("--json", action="store_true", help="print one JSON object: the cameras with all their modes")
-    add_examples(parser, "rhot cameras", "rhot cameras --json")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Print them; exit code 1 when there is none."""
-    devices = list_devices()
-    if args.json:
-        print(json.dumps({"cameras": [asdict(device) for device in devices]}))
-    else:
-        print("\n".join(map(device_line, devices)) or NONE_FOUND)
-    return 0 if devices else 1
-
-
-def device_line(device: Device) -> str:
-    """A camera in one line: its number, name, and modes or fault."""
-    number = device.path.removeprefix("/dev/video")
-    said = device.problem or f"{device.mode}" + (f", {len(device.modes)} picture sizes" if device.modes else "")
-    return f"{number}  {device.name}  {said}"
