@@ -15,8 +15,16 @@ from msgspec import Meta
 from platformdirs import user_config_path
 
 from rhot_node.errors import TrustError
-from rhot_node.files import decode_document
-from rhot_node.keys import HexKey, KeyPair, Master, Name, create_private, new_key_pair, read_private, write_private
+from rhot_node.keys import (
+    HexKey,
+    KeyPair,
+    Master,
+    Name,
+    create_private_document,
+    new_key_pair,
+    read_private_document,
+    write_private_document,
+)
 
 FORMAT: Final = "rhot-master-keys"
 VERSION: Final = 1
@@ -59,7 +67,7 @@ def keys_path() -> Path:
 def load_master_keys(path: Path | None = None) -> MasterKeys:
     """The keys; drawn and written when there are none. Raises TrustError when the file is open to others or broken."""
     place = path or keys_path()
-    keys = _read(place)
+    keys = read_private_document(place, MasterKeys, FORMAT, VERSION)
     if keys is not None:
         return keys
     try:
@@ -67,8 +75,8 @@ def load_master_keys(path: Path | None = None) -> MasterKeys:
     except OSError as exc:
         raise TrustError(f"{place.parent}: cannot be made ({exc.strerror}); {PLACE_VARIABLE} may name another file for "
                          "the keys.") from exc
-    create_private(place, _encode(MasterKeys(new_key_pair())))  # of two programs that start at once the first one draws
-    keys = _read(place)
+    create_private_document(place, MasterKeys(new_key_pair()))  # of two programs that start at once one draws
+    keys = read_private_document(place, MasterKeys, FORMAT, VERSION)
     if keys is None:
         raise TrustError(f"{place}: vanished while it was being made.")
     return keys
@@ -79,14 +87,4 @@ def remember_node(node: KnownNode, path: Path | None = None) -> None:
     place = path or keys_path()
     keys = load_master_keys(place)
     others = tuple(one for one in keys.nodes if one.public_key != node.public_key)
-    write_private(place, _encode(msgspec.structs.replace(keys, nodes=(*others, node))))
-
-
-def _read(path: Path) -> MasterKeys | None:
-    data = read_private(path)
-    return None if data is None else decode_document(data, MasterKeys, format_name=FORMAT, version=VERSION,
-                                                     where=str(path), error=TrustError)
-
-
-def _encode(keys: MasterKeys) -> bytes:
-    return msgspec.json.format(msgspec.json.encode(keys), indent=2) + b"\n"
+    write_private_document(place, msgspec.structs.replace(keys, nodes=(*others, node)))

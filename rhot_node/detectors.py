@@ -234,6 +234,6 @@ def warm_up_image(markers: MarkerSet, size: tuple[int, int]) -> YuvImage:
     for index, marker in enumerate(markers.markers):
         x, y = 2 * DISC_RADIUS * (1 + 2 * (index % across)), 2 * DISC_RADIUS * (1 + 2 * (index // across))
         disc = (2 * columns + 0.5 - x) ** 2 + (2 * rows + 0.5 - y) ** 2 <= DISC_RADIUS**2
-        chroma[0][disc] = np.clip(128 + round(marker.chroma.cb), 0, 255)
-        chroma[1][disc] = np.clip(128 + round(marker.chroma.cr), 0, 255)
+        for plane, mean in zip(chroma, (marker.chroma.cb, marker.chroma.cr), strict=True):
+            plane[disc] = np.clip(128 + round(mean), 0, 255)
     return YuvImage(luma, chroma[0], chroma[1])

@@ -317,7 +317,12 @@ def sync_folder(path: Path) -> None:
 
 def write_document(path: Path, document: Any) -> None:
     """Write a msgspec document as indented JSON, atomically: a reader sees the old file or the new one, whole."""
-    write_atomically(path, msgspec.json.format(msgspec.json.encode(document), indent=2) + b"\n")
+    write_atomically(path, encode_document(document))
+
+
+def encode_document(document: Any) -> bytes:
+    """A msgspec document as indented JSON."""
+    return msgspec.json.format(msgspec.json.encode(document), indent=2) + b"\n"
 
 
 def write_atomically(path: Path, data: bytes, *, private: bool = False) -> None:

@@ -102,8 +102,7 @@ class ForegroundStore:
     def learn_background(self, pictures: PictureBox, seconds: float, *, save: bool = True) -> None:
         """Begin to learn the scene as it is during the next seconds; with `save` False it is in force until the node
         ends or `revert`. Raises NodeError while that goes on already."""
-        if self.learning:
-            raise NodeError("the background is being learnt already; wait for its end.")
+        self._require_idle()
         self._failure, self._until_s, self._ending = "", time.monotonic() + seconds, threading.Event()
         learn = functools.partial(self._learn, pictures, save, self._until_s, self._ending)
         self._task = OneShotThread("learns the background", learn)
@@ -111,8 +110,7 @@ class ForegroundStore:
     def learn_skin(self, pictures: PictureBox, *, save: bool = True) -> bool:
         """Learn the skin's colours from the next picture. False when it shows no skin; generic colours are then used.
         `save` as in `learn_background`. Raises NodeError without a picture, or when the file cannot be written."""
-        if self.learning:
-            raise NodeError("the background is being learnt; wait for its end.")
+        self._require_idle()
         image = self._picture(pictures)
         model = self.of_size(image.shape[1], image.shape[0])
         self._use(learn_skin(image, model), save=save)
@@ -120,8 +118,7 @@ class ForegroundStore:
 
     def save(self) -> None:
         """Keep what is in force; what was kept before can be brought back by `revert`. Raises NodeError."""
-        if self.learning:
-            raise NodeError("the background is being learnt; wait for its end.")
+        self._require_idle()
         if self.path is not None:
             try:
                 if self.path.exists():
@@ -135,8 +132,8 @@ class ForegroundStore:
     def revert(self, *, earlier: bool = False) -> None:
         """Use what is in the file again; a background that is being learnt is given up. `earlier`: use what was there
         before the last `save`, and once more, what that had saved. Raises NodeError."""
-        if self.learning and earlier:
-            raise NodeError("the background is being learnt; wait for its end.")
+        if earlier:
+            self._require_idle()
         with self._changing:
             self._ending.set()
             self._task = None
@@ -152,6 +149,10 @@ class ForegroundStore:
         known = self.path is not None and self.path.exists()
         self.current, self._failure = load_foreground(self.path) if known and self.path is not None else _FLAT, ""
 
+    def _require_idle(self) -> None:
+        if self.learning:
+            raise NodeError("the background is being learnt already; wait for its end.")
+
     def _before(self) -> Path:
         assert self.path is not None
         return self.path.with_suffix(".before.npz")
@@ -159,8 +160,7 @@ class ForegroundStore:
     def forget(self) -> None:
         """Know nothing any more. Raises NodeError while a background is being learnt, or when the file cannot be
         removed."""
-        if self.learning:
-            raise NodeError("the background is being learnt; wait for its end.")
+        self._require_idle()
         try:
             if self.path is not None:
                 self.path.unlink(missing_ok=True)

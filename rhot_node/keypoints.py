@@ -40,6 +40,7 @@ Share = Annotated[float, Meta(gt=0, le=1)]
 FileName = Annotated[str, Meta(pattern=r"\A[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z")]
 
 CARD_BYTES_MAX = 65_536
+_BYTE = 1 / 255  # what a pixel is multiplied by for 0 to 1
 
 
 class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -51,7 +52,7 @@ class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     layout: Literal["nchw", "nhwc"] = "nchw"
     channels: Literal["rgb", "bgr"] = "rgb"
     mean: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    scale: tuple[float, float, float] = (1 / 255, 1 / 255, 1 / 255)
+    scale: tuple[float, float, float] = (_BYTE, _BYTE, _BYTE)
 
 
 class Points(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -7,7 +7,7 @@ import os
 import secrets
 import stat
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 import msgspec
 import zmq
@@ -15,8 +15,10 @@ from msgspec import Meta
 from zmq.utils import z85
 
 from rhot_node.errors import TrustError
-from rhot_node.files import PRINTABLE, decode_document, write_atomically
+from rhot_node.files import PRINTABLE, decode_document, encode_document, write_atomically
 from rhot_node.wire.messages import TrustState
+
+T = TypeVar("T")
 
 HexKey = Annotated[str, Meta(pattern=r"\A[0-9a-f]{64}\Z")]
 Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=PRINTABLE)]
@@ -99,11 +101,23 @@ def write_private(path: Path, data: bytes) -> None:
         raise TrustError(f"{path}: cannot be written ({exc.strerror}).") from exc
 
 
-def create_private(path: Path, data: bytes) -> bool:
-    """Write `data` as `write_private` does unless `path` is there already; returns whether it was written. Of several
-    programs that do so at once, one does. Raises TrustError."""
+def read_private_document(path: Path, kind: type[T], format_name: str, version: int) -> T | None:
+    """The document of a file of secrets; None when there is none. Raises TrustError."""
+    data = read_private(path)
+    return None if data is None else decode_document(data, kind, format_name=format_name, version=version,
+                                                     where=str(path), error=TrustError)
+
+
+def write_private_document(path: Path, document: Any) -> None:
+    """Write a document as `write_private` does."""
+    write_private(path, encode_document(document))
+
+
+def create_private_document(path: Path, document: Any) -> bool:
+    """Write `document` unless `path` is there already; returns whether it was written. Of several programs that do so
+    at once, one does. Raises TrustError."""
     fresh = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
-    write_private(fresh, data)
+    write_private_document(fresh, document)
     try:
         os.link(fresh, path)  # unlike a rename, never over what is there
     except FileExistsError:
@@ -163,7 +177,7 @@ class NodeTrust:
     def __init__(self, path: Path) -> None:
         """Read the file, or draw a key pair and write it. Raises TrustError when it is open to others or broken."""
         self.path = path
-        self._keys = _read(path) or self._draw()
+        self._keys = self._read() or self._draw()
         self._seen = self._look()
 
     @property
@@ -186,7 +200,7 @@ class NodeTrust:
         if len(others) >= MASTERS_MAX:
             raise TrustError(f"{MASTERS_MAX} masters are paired already; `rhot-node unpair` forgets them all.")
         keys = msgspec.structs.replace(self._keys, masters=(*others, master))
-        _write(self.path, keys)
+        write_private_document(self.path, keys)
         self._keys, self._seen = keys, self._look()
         log.info("paired with %r, key %s", master.name, master.public_key)
 
@@ -195,16 +209,19 @@ class NodeTrust:
         if self._look() == self._seen:
             return False
         try:
-            self._keys = _read(self.path) or self._draw()
+            self._keys = self._read() or self._draw()
         except TrustError as exc:
             log.error("%s Nobody is let in until this is mended.", exc)
             self._keys = NodeKeys(new_key_pair())
         self._seen = self._look()
         return True
 
+    def _read(self) -> NodeKeys | None:
+        return read_private_document(self.path, NodeKeys, FORMAT, VERSION)
+
     def _draw(self) -> NodeKeys:
         keys = NodeKeys(new_key_pair())
-        _write(self.path, keys)
+        write_private_document(self.path, keys)
         return keys
 
     def _look(self) -> tuple[int, int] | None:
@@ -232,12 +249,3 @@ def pair_beforehand(path: Path, master: Master) -> str:
         trust.add(master)
     return trust.own.public_key
 
-
-def _read(path: Path) -> NodeKeys | None:
-    data = read_private(path)
-    return None if data is None else decode_document(data, NodeKeys, format_name=FORMAT, version=VERSION,
-                                                     where=str(path), error=TrustError)
-
-
-def _write(path: Path, keys: NodeKeys) -> None:
-    write_private(path, msgspec.json.format(msgspec.json.encode(keys), indent=2) + b"\n")

@@ -25,10 +25,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 RETRY_S: Final = 5.0
-"""Between tries to open the networks: somebody may install them meanwhile."""
-
-SPARED_S: Final = 5.0
-"""A node that is not reminded for so long searches again."""
+"""Between tries to open the networks: somebody may install them meanwhile. A node that is not reminded to spare its
+search for so long searches again."""
 
 _OPENING_S = 15.0  # on a slow computer, LiteRT takes seconds to load
 
@@ -71,8 +69,8 @@ class LandmarkSearch(FrameSearch[YuvImage]):
             self.start("finds landmarks of hands", _OPENING_S)
 
     def spare(self) -> None:
-        """Search nothing for SPARED_S: nobody uses what would be found. Any thread may ask."""
-        self._spared_s = time.monotonic() + SPARED_S
+        """Search nothing for RETRY_S: nobody uses what would be found. Any thread may ask."""
+        self._spared_s = time.monotonic() + RETRY_S
 
     @property
     def wanted(self) -> bool:

@@ -21,7 +21,7 @@ from rhot_node.foreground_store import ForegroundStore, rgb_of
 from rhot_node.frame_search import FrameSearch, Waiting
 from rhot_node.network.session import Stream
 from rhot_node.wire.messages import U32_MAX, ForegroundPart, SliceEdges, Slices
-from rhot_node.wire.search import EDGES_FIT, FOREGROUND_FIT, pack_edges, pack_map, unpack_slices
+from rhot_node.wire.search import EDGES_FIT, FOREGROUND_FIT, MAP_STEPS, pack_edges, pack_map, unpack_slices
 
 VALID_S = 1.0
 """How long a request is in force: a hand has moved on by then."""
@@ -65,10 +65,11 @@ class SliceSearch(FrameSearch[Work]):
 
     def warm_up(self) -> None:
         """Have everything compiled that a search needs."""
-        image = np.zeros((32, 32, 3), np.uint8)
-        model = self._foreground.of_size(32, 32)
-        find_edges(image, np.array([[16.0, 16.0, 1.0, 0.0, 4.0]]), model, noise_of(image))
-        foreground_map(image, model, 4)
+        step = MAP_STEPS.start
+        side = step * step
+        image, model = np.zeros((side, side, 3), np.uint8), self._foreground.of_size(side, side)
+        find_edges(image, np.array([[0.5 * side, 0.5 * side, 1.0, 0.0, step]]), model, noise_of(image))
+        foreground_map(image, model, step)
 
     def take(self, message: Slices, session: int) -> str:
         """Take a part of a request in, while `session` runs (0: none). Returns why it was dropped, or nothing."""

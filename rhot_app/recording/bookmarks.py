@@ -14,9 +14,10 @@ from typing import Final
 
 from rhot_app.errors import RecordingError
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_record
+from rhot_node.files import KIB
 from rhot_node.wire.fields import TIME_MAX_NS
 
-TEXT_MAX: Final = 1024  # bytes of UTF-8
+TEXT_MAX: Final = KIB  # bytes of UTF-8
 
 
 @dataclass(frozen=True, slots=True)

@@ -182,7 +182,7 @@ class _Channel:
         self.node, self._patience_s, self._context = node, patience_s, Context()
         try:
             self._client = Client(self._context, f"tcp://{node.address}:{node.control_port}", own, node.public_key,
-                                  _ANSWER_MAX)
+                                  longest=_ANSWER_MAX)
         except zmq.ZMQError as exc:
             self._context.destroy(linger=0)
             raise RecordingError(f"node {node.name}: {node.address} is no address to connect to ({exc}).") from exc

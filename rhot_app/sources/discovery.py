@@ -18,7 +18,7 @@ from rhot_app.progress import Progress, silent
 from rhot_node.errors import WireError
 from rhot_node.network.presence import SERVICE, Presence, is_loopback, own_interfaces, presence_of
 from rhot_node.wire.codec import decode, encode
-from rhot_node.wire.fields import RECEIVE_MAX
+from rhot_node.wire.fields import BURST, RECEIVE_MAX
 from rhot_node.wire.messages import BROADCAST_PORT, U32_MAX, U64_MAX, Find, Here, NodeState
 
 if TYPE_CHECKING:
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 # Anybody can answer anything. What comes back is good for showing and for trying an address, nothing else.
 
 _EVERYBODY = "255.255.255.255"
-BURST = 256  # answers taken at once
-
 log = logging.getLogger(__name__)
 
 
@@ -162,7 +160,7 @@ class ZeroconfBrowser:
 SECONDS = 2.5
 """Zeroconf may take more than a second; a broadcast is answered within milliseconds."""
 
-_AGAIN_S = 0.5  # between questions: broadcasts get lost, above all without a cable
+AGAIN_S = 0.5  # between questions: broadcasts get lost, above all without a cable
 _STEP_S = 0.1
 NO_NETWORK = ("This computer has no network, so only nodes on this computer itself can be found. Connect it to the "
               "network of the nodes.")
@@ -212,7 +210,7 @@ def find_nodes(seconds: float = SECONDS, *, port: int = BROADCAST_PORT, progress
                          "broadcast are found.")
         while (now_s := time.monotonic()) < begun_s + seconds:
             progress("looking for nodes", (now_s - begun_s) / seconds)
-            if now_s - asked_s >= _AGAIN_S:
+            if now_s - asked_s >= AGAIN_S:
                 asked_s = now_s
                 questions.ask()
             sightings += questions.wait(min(_STEP_S, begun_s + seconds - now_s))

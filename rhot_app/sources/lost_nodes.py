@@ -16,15 +16,16 @@ from collections.abc import Sequence
 import msgspec
 
 from rhot_app.project import RigNode
-from rhot_app.sources.discovery import BURST, Browse, FindSocket, Found, Sighting, ZeroconfBrowser
+from rhot_app.sources.discovery import AGAIN_S, Browse, FindSocket, Found, Sighting, ZeroconfBrowser
 from rhot_app.sources.node_link import NodeLink
 from rhot_node.network.presence import is_loopback
 from rhot_node.threads import OneShotThread
+from rhot_node.wire.fields import BURST
 
 LOST_NS = 2_000_000_000
 """A node that has answered nothing for so long is looked for."""
 
-ASK_NS = 500_000_000
+ASK_NS = round(1e9 * AGAIN_S)
 PATIENT_NS = 3_000_000_000
 """How often it is asked for, in the first seconds and later; then it is looked for by zeroconf too."""
 

@@ -22,7 +22,7 @@ from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.clock import ANCILLARY_SIZE, KernelTime, LinuxOption, ask_for_times
 from rhot_node.files import MIB
 from rhot_node.threads import Worker
-from rhot_node.wire.fields import RECEIVE_MAX
+from rhot_node.wire.fields import BURST, RECEIVE_MAX
 
 # -- thread priority ---------------------------------------------------------------------------------------------------
 
@@ -59,9 +59,6 @@ def hurry_this_thread() -> None:
 
 RECEIVE_BUFFER = 4 * MIB
 """Bytes asked of the kernel: half a second of a 10,000 datagrams/s flood (each costs the kernel ~800 bytes)."""
-
-BURST = 256
-"""Datagrams taken at once before the newest are handed on."""
 
 FRESH_NS = 400_000
 """A datagram that came less than this ago is handed on at once: asking the socket for another one would cost it a

@@ -24,7 +24,7 @@ from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
 from rhot_node.detect.image import Plane, YuvImage, from_i420
 from rhot_node.errors import CameraError
-from rhot_node.files import open_input, read_document, require_file, write_document
+from rhot_node.files import open_input, read_document, write_document
 
 FORMAT: Final = "rhot-yuv"
 VERSION: Final = 1
@@ -174,15 +174,9 @@ def read_header(folder: Path) -> YuvHeader:
 def read_images(folder: Path) -> Iterator[YuvImage]:
     """The images of the recording in `folder`, as views of the file. Raises CameraError."""
     header = read_header(folder)
-    shape = len(header.times_ns), header.frame_bytes
-    try:
-        require_file(folder / FRAMES_NAME)
-        frames = np.memmap(folder / FRAMES_NAME, dtype=np.uint8, mode="r", shape=shape)
-    except (OSError, ValueError) as exc:
-        raise CameraError(f"{folder / FRAMES_NAME}: cannot be read as {shape[0]} frames ({exc}). "
-                          "Record it again.") from exc
-    for frame in frames:
-        yield from_i420(np.asarray(frame), header.width, header.height)
+    frames = np.frombuffer(_map_frames(folder / FRAMES_NAME, header), np.uint8)
+    for frame in frames.reshape(-1, header.frame_bytes):
+        yield from_i420(frame, header.width, header.height)
 
 
 def _map_frames(path: Path, header: YuvHeader) -> mmap.mmap:

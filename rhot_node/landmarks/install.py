@@ -45,28 +45,27 @@ _POLL_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class WheelFile:
-    """A file of the wheel: `place` in it, `size` in bytes."""
+    """A file of the wheel and its `place` in it."""
 
     place: str
-    size: int
     sha256: str
 
 
 FILES: Final = {
     "palm_detection_full.tflite": WheelFile(
-        "mediapipe/modules/palm_detection/palm_detection_full.tflite", 2_339_846,
+        "mediapipe/modules/palm_detection/palm_detection_full.tflite",
         "1b14e9422c6ad006cde6581a46c8b90dd573c07ab7f3934b5589e7cea3f89a54"),
     "palm_detection_lite.tflite": WheelFile(
-        "mediapipe/modules/palm_detection/palm_detection_lite.tflite", 1_985_440,
+        "mediapipe/modules/palm_detection/palm_detection_lite.tflite",
         "e9a4aaddf90dda56a87235303cf00e4c2d3fb28725f68fd88772997dac905c18"),
     "hand_landmark_full.tflite": WheelFile(
-        "mediapipe/modules/hand_landmark/hand_landmark_full.tflite", 5_478_917,
+        "mediapipe/modules/hand_landmark/hand_landmark_full.tflite",
         "11c272b891e1a99ab034208e23937a8008388cf11ed2a9d776ed3d01d0ba00e3"),
     "hand_landmark_lite.tflite": WheelFile(
-        "mediapipe/modules/hand_landmark/hand_landmark_lite.tflite", 2_071_597,
+        "mediapipe/modules/hand_landmark/hand_landmark_lite.tflite",
         "048edd3645c9bf7397d19a9f6e3a42957d6e414c9bea6598030a2e9b624156e6"),
     "LICENSE": WheelFile(
-        "mediapipe-0.10.14.dist-info/LICENSE", 12_331,
+        "mediapipe-0.10.14.dist-info/LICENSE",
         "8707eef0533987efc5b155d64761eeb6e20793f50b9bd1a68dad1cf4719d0ed8"),
 }
 """By the name under which it is installed."""
@@ -88,7 +87,7 @@ def read_network(folder: Path, name: str) -> bytes:
     """The bytes of an installed network, unchanged since. Raises KeypointError."""
     path = folder / name
     try:
-        data = read_input(path, FILES[name].size)
+        data = read_input(path, WHEEL_BYTES)
     except OSError as exc:
         raise KeypointError(f"{path}: the network cannot be read ({why(exc)}). Run `rhot-node landmarks install`.") \
             from exc
@@ -135,7 +134,7 @@ def read_wheel(path: Path) -> dict[str, bytes]:
 def _member(archive: zipfile.ZipFile, path: Path, wanted: WheelFile) -> bytes:
     try:
         with archive.open(wanted.place) as member:
-            data = member.read(wanted.size + 1)  # enough to see that it is longer
+            data = member.read(WHEEL_BYTES)  # none of them is as long
     except KeyError as exc:
         raise KeypointError(f"{path}: has no {wanted.place}, so it is not the wheel of {PACKAGE}. {_advice()}") from exc
     found = hashlib.sha256(data).hexdigest()

@@ -181,7 +181,7 @@ class HandNetworks:
     def _palms(self, picture: Picture, view: Region) -> list[_Palm]:
         """The palms of a part of a picture, the likeliest first: by weighted non-maximum suppression."""
         boxes, logits = self._palm(_sampled(picture, view, PALM_PX))[:2]
-        probability = 1.0 / (1.0 + np.exp(-np.clip(logits.reshape(-1).astype(np.float64), -100.0, 100.0)))
+        probability = np.exp(-np.logaddexp(0.0, -logits.reshape(-1).astype(np.float64)))
         likely = np.flatnonzero(probability >= LEAST_PROBABILITY)
         likely = likely[np.argsort(-probability[likely], kind="stable")]
         # rows of centre, size and seven points, px of the input about the anchor

@@ -22,8 +22,17 @@ import msgspec
 from msgspec import Meta
 
 from rhot_node.errors import NodeError, TrustError
-from rhot_node.files import decode_document, decode_message
-from rhot_node.keys import HexKey, Master, Name, NodeTrust, read_private, remove_private, trust_state, write_private
+from rhot_node.files import KIB, decode_message
+from rhot_node.keys import (
+    HexKey,
+    Master,
+    Name,
+    NodeTrust,
+    read_private_document,
+    remove_private,
+    trust_state,
+    write_private_document,
+)
 
 ALPHABET = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
 """Crockford's base 32: no letter looks like a digit."""
@@ -138,16 +147,14 @@ class OfferFile:
         """Offer a fresh code; the one before, if any, is void. Raises TrustError when it cannot be written."""
         boot_id, now_ns = self._clock()
         offer = Offer(new_code(), secrets.token_hex(NONCE_LENGTH), boot_id, now_ns + VALID_S * 1_000_000_000, TRIES)
-        self._write(offer)
+        write_private_document(self.path, offer)
         return offer
 
     def current(self) -> Offer | None:
         """The code that is valid now; one that is not is removed. Raises TrustError."""
-        data = read_private(self.path)
-        if data is None:
+        offer = read_private_document(self.path, Offer, FORMAT, VERSION)
+        if offer is None:
             return None
-        offer = decode_document(data, Offer, format_name=FORMAT, version=VERSION, where=str(self.path),
-                                error=TrustError)
         boot_id, now_ns = self._clock()
         if offer.boot_id == boot_id and now_ns < offer.expires_ns:
             return offer
@@ -158,7 +165,7 @@ class OfferFile:
         """One try less, written down before anybody is told; returns how many are left. Raises TrustError."""
         left = offer.tries_left - 1
         if left:
-            self._write(msgspec.structs.replace(offer, tries_left=left))
+            write_private_document(self.path, msgspec.structs.replace(offer, tries_left=left))
         else:
             self.close()
         return left
@@ -167,17 +174,13 @@ class OfferFile:
         """Offer no code any more; False when none was offered. Raises TrustError."""
         return remove_private(self.path)
 
-    def _write(self, offer: Offer) -> None:
-        write_private(self.path, msgspec.json.format(msgspec.json.encode(offer), indent=2) + b"\n")
-
-
 # -- requests without authentication -----------------------------------------------------------------------------------
 # Nothing here shows a picture, a setting or a place, and nothing but a proof of the code changes anything.
 
 log = logging.getLogger(__name__)
 
 EXPIRE_S = 1.0
-REQUEST_MAX = 1024  # bytes; a pair request has about 400
+REQUEST_MAX = KIB  # bytes; a pair request has about 400
 NO_CODE = ("this node offers no code now. Run `rhot-node pair` on it; a code is valid for five minutes, five tries "
            "and one master.")
 

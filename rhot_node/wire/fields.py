@@ -16,6 +16,7 @@ HEADER = Struct("<4sBBHIQI")
 TAG_LENGTH = 16  # bytes
 UDP_MAX = 65535  # bytes of the longest datagram that there can be
 RECEIVE_MAX = 8192  # bytes read of a datagram; the longest of ours, a start message, has 4108
+BURST = 256  # datagrams taken from a socket before anything else is looked at
 DATAGRAM_MAX = 1472  # bytes of UDP payload in an Ethernet frame (1500 - 20 IPv4 - 8 UDP): nothing is fragmented
 ROOM = DATAGRAM_MAX - HEADER.size - TAG_LENGTH  # bytes of a payload
 FLAG_TRUNCATED = 1  # bit 0 of the flags of observations and fiducials: there were more than fit

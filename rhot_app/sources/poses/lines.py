@@ -22,11 +22,12 @@ from rhot_app.objects.pose import Validity
 from rhot_app.objects.stream import FARTHEST_M
 from rhot_app.sources.poses.source import ForeignPose, StreamNoise
 from rhot_node.errors import NAME_LIMIT, printable
+from rhot_node.files import KIB
 from rhot_node.wire.fields import TIME_MAX_NS
 
 Array = NDArray[np.float64]
 
-LINE_MAX = 1024
+LINE_MAX = KIB
 """Bytes of a line; what is longer is no pose."""
 
 WINDOW_S = 10.0
