@@ -49,7 +49,7 @@ SUBCOMMANDS = {
     "layers": Subcommand("rhot_app.export.layers_command", "draw which link of a hand or object hides which"),
     "object": Subcommand("rhot_app.objects.object_command", "check an object file, or find the object in still images"),
     "poses": Subcommand("rhot_app.sources.poses.poses_command", "listen to another tracker's poses and record them"),
-    "cameras": Subcommand("rhot_app.sources.cameras.cameras_command", "list the cameras of this computer"),
+    "cameras": Subcommand("rhot_app.sources.cameras.camera_set", "list the cameras of this computer"),
     "nodes": Subcommand("rhot_app.sources.nodes_command", "look for nodes on the network"),
     "pair": Subcommand("rhot_app.sources.pairing", "pair with a node by the code that it shows"),
     "history": Subcommand("rhot_app.calibration.commands.history", "list or bring back earlier versions of a rig file"),

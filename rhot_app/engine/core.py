@@ -30,7 +30,7 @@ from rhot_app.recording.raw_log import CONTINUES, begun_now, next_part
 from rhot_app.recording.recorder import Recorder
 from rhot_app.rig_history import accept
 from rhot_app.sources.links import new_session
-from rhot_app.sources.source import ObservationSource, same_network
+from rhot_app.sources.receiver import ObservationSource, same_network
 from rhot_app.state import SeenContour
 from rhot_app.tracking.tracker import Tracker
 from rhot_node.threads import complaints

@@ -27,8 +27,7 @@ from rhot_app.engine.rig_watch import BonesWatch, HandWatch, RigWatch
 from rhot_app.engine.status import Advice, EngineStatus, LatencySummary, NodeStatus, most_urgent_first
 from rhot_app.project import Rig
 from rhot_app.recording.recorder import Recorder
-from rhot_app.sources.receiver import RECEIVE_BUFFER
-from rhot_app.sources.source import ObservationSource
+from rhot_app.sources.receiver import RECEIVE_BUFFER, ObservationSource
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.tracker import Tracker
 

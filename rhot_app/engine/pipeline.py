@@ -22,7 +22,7 @@ from rhot_app.hand.places import ROLES, place_of
 from rhot_app.objects.object_file import ObjectModel
 from rhot_app.objects.observations import FiducialFrame
 from rhot_app.project import OTHER_HAND, Rig, RigNode
-from rhot_app.sources.source import ObservationSource
+from rhot_app.sources.receiver import ObservationSource
 from rhot_app.state import LATENCY_STAGES, HandState
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.markers.marker_model import points_on

@@ -83,16 +83,14 @@ class LogValidator(RigLinks):
             for entry in message.entries:
                 if (started := self._by_id.get(entry.node_id)) is not None:
                     started.door.expect_session(message.session)
+        elif (link := self._by_id.get(message.node_id)) is None:
+            return
         elif isinstance(message, Slices):
-            searching = self._by_id.get(message.node_id)
-            if searching is not None:
-                searching.door.searches.read(message)
-        elif isinstance(message, ClockRequest | ClockReply):
-            asked = self._by_id.get(message.node_id)
-            if asked is not None and isinstance(message, ClockRequest):
-                asked.sent(message)
-            elif asked is not None and isinstance(message, ClockReply):
-                asked.take_reply(message, record.t_master_ns)
+            link.door.searches.read(message)
+        elif isinstance(message, ClockRequest):
+            link.sent(message)
+        elif isinstance(message, ClockReply):
+            link.take_reply(message, record.t_master_ns)
 
 
 class LogReplay(LogValidator):

@@ -5,10 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from struct import Struct
-from typing import Any
+from typing import Any, TypeVar, overload
+
+from numpy.typing import NDArray
 
 from rhot_node.errors import WireError
 from rhot_node.wire.messages import FrameHead, FrameMessage
+
+T = TypeVar("T")
 
 HEADER = Struct("<4sBBHIQI")
 """Magic, version, type, flags, node, session, sequence."""
@@ -120,3 +124,33 @@ def expect_point(what: str, place: Sequence[float], covariance: Sequence[float],
     if not (0.0 < xx <= COVARIANCE_MAX and 0.0 < yy <= COVARIANCE_MAX
             and xy * xy <= xx * yy * (1.0 + 1e-6)):  # room for rounding to single precision
         raise WireError("marker", f"{what} has an impossible covariance: {(xx, xy, yy)}")
+
+
+class Table(Sequence[T]):
+    """Records over the bytes of a datagram; it equals any sequence of equal records."""
+
+    __slots__ = ("_records",)
+
+    def __init__(self, records: NDArray[Any]) -> None:
+        """`records`: a row each."""
+        self._records = records
+
+    def _record(self, item: int) -> T:
+        raise NotImplementedError
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    @overload
+    def __getitem__(self, item: int) -> T: ...
+    @overload
+    def __getitem__(self, item: slice) -> list[T]: ...
+    def __getitem__(self, item: int | slice) -> T | list[T]:
+        if isinstance(item, slice):
+            return [self._record(row) for row in range(*item.indices(len(self)))]
+        return self._record(item)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and list(self) == list(other)
+
+    __hash__ = None  # type: ignore[assignment]  # as a list's

@@ -6,9 +6,7 @@ The markers of a datagram are a table over its bytes: checked, and read into arr
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from struct import Struct
-from typing import overload
 
 import numpy as np
 from numba import njit
@@ -21,6 +19,7 @@ from rhot_node.wire.fields import (
     FRAME,
     FRAME_ROOM,
     IMAGE_MARGIN,
+    Table,
     begin,
     expect_length,
     expect_point,
@@ -67,50 +66,35 @@ Words = NDArray[np.uint16]  # (M, 16), of which the first two are index and flag
 Values = NDArray[np.float32]  # (M, 8), of which the first is index and flags
 
 
-class MarkerTable(Sequence[MarkerObservation]):
-    """The markers of a datagram, in the order of `Observations.markers`; it equals any sequence of equal observations.
-
-    `marker_count`: number of markers of the set.
+class MarkerTable(Table[MarkerObservation]):
+    """The markers of a datagram, in the order of `Observations.markers`. `marker_count`: number of markers of the set.
     """
 
-    __slots__ = ("_values", "_words", "marker_count")
+    __slots__ = ("_values", "marker_count")
 
     def __init__(self, words: Words, values: Values, marker_count: int) -> None:
         """`words` (N, 16) and `values` (N, 8): two views of the same checked records."""
-        self._words, self._values, self.marker_count = words, values, marker_count
+        super().__init__(words)
+        self._values, self.marker_count = values, marker_count
 
-    def __len__(self) -> int:
-        return len(self._words)
-
-    @overload
-    def __getitem__(self, item: int) -> MarkerObservation: ...
-    @overload
-    def __getitem__(self, item: slice) -> list[MarkerObservation]: ...
-    def __getitem__(self, item: int | slice) -> MarkerObservation | list[MarkerObservation]:
-        if isinstance(item, slice):
-            return [self[row] for row in range(*item.indices(len(self)))]
-        index, bits = self._words[item, :2].tolist()
+    def _record(self, item: int) -> MarkerObservation:
+        index, bits = self._records[item, :2].tolist()
         x, y, diameter, xx, xy, yy, quality = self._values[item, 1:].tolist()
         if bits & _LOST:
             x = y = math.nan  # one NaN object, so that equal markers compare equal
         return MarkerObservation(index, x, y, diameter, xx, xy, yy, quality, FLAGS[bits])
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Sequence) and list(self) == list(other)
-
-    __hash__ = None  # type: ignore[assignment]  # as a list's
-
     def columns(self) -> tuple[Array, Array, Array, Array, NDArray[np.uint16]]:
         """Pixels (N, 2), NaN when lost, covariances (N, 2, 2) px^2, diameters (N,) px, qualities and flags (N,)."""
         count = len(self)
         numbers, flags = np.empty(8 * count), np.empty(count, np.uint16)
-        _read(self._words, self._values, numbers, flags)
+        _read(self._records, self._values, numbers, flags)
         return (numbers[:2 * count].reshape(count, 2), numbers[2 * count:6 * count].reshape(count, 2, 2),
                 numbers[6 * count:7 * count], numbers[7 * count:], flags)
 
     def indices(self) -> NDArray[np.intp]:
         """(N,) the index of each row's marker."""
-        return self._words[:, 0].astype(np.intp)
+        return self._records[:, 0].astype(np.intp)
 
 
 def encode_observations(message: Observations) -> bytes:

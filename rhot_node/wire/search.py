@@ -6,9 +6,7 @@ docs/wire.md, "Slices", "Edges" and "Foreground".
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
 from struct import Struct
-from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +15,7 @@ from rhot_node.errors import WireError
 from rhot_node.wire.fields import (
     FRAME_ROOM,
     ROOM,
+    Table,
     begin,
     expect_length,
     expect_node,
@@ -110,32 +109,18 @@ def decode_slices(payload: memoryview, node_id: int, session: int, sequence: int
 
 # -- edges -------------------------------------------------------------------------------------------------------------
 
-class EdgeTable(Sequence[SliceEdge]):
-    """The edges of a datagram over its bytes; it equals any sequence of equal edges."""
+class EdgeTable(Table[SliceEdge]):
+    """The edges of a datagram."""
 
-    __slots__ = ("_records",)
+    __slots__ = ()
 
     def __init__(self, records: bytes | memoryview) -> None:
         """`records`: as `pack_edges` makes them."""
-        self._records = np.frombuffer(records, _EDGE)
+        super().__init__(np.frombuffer(records, _EDGE))
 
-    def __len__(self) -> int:
-        return len(self._records)
-
-    @overload
-    def __getitem__(self, item: int) -> SliceEdge: ...
-    @overload
-    def __getitem__(self, item: slice) -> list[SliceEdge]: ...
-    def __getitem__(self, item: int | slice) -> SliceEdge | list[SliceEdge]:
-        if isinstance(item, slice):
-            return [self[row] for row in range(*item.indices(len(self)))]
+    def _record(self, item: int) -> SliceEdge:
         index, offset, strength, sd, inside, outside = self._records[item].tolist()
         return SliceEdge(index, offset * OFFSET_PX, sd * SD_PX, strength * STRENGTH, inside / _SURE, outside / _SURE)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Sequence) and list(self) == list(other)
-
-    __hash__ = None  # type: ignore[assignment]  # as a list's
 
     @property
     def data(self) -> bytes:

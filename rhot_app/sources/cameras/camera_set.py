@@ -5,11 +5,13 @@ Only a rig of this folder starts cameras when it is opened. A rig file from else
 
 from __future__ import annotations
 
+import argparse
 import hashlib
+import json
 import re
 import stat
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
@@ -22,10 +24,12 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import Intrinsics, Rig, RigNode, TrackerSettings, load_rig
 from rhot_app.rig_history import accept
 from rhot_app.sources.local_nodes import NodePorts
+from rhot_node.capture.v4l2 import Device, list_devices
 from rhot_node.config import FPS, CameraSettings, NodeSettings
 from rhot_node.files import PRINTABLE, read_document, resource_path, write_document
 from rhot_node.landmarks.install import installed_folder
 from rhot_node.markers import load_markers
+from rhot_node.terminal import add_examples
 
 FORMAT: Final = "rhot-cameras"
 VERSION: Final = 1
@@ -254,3 +258,28 @@ def names_of(sources: Sequence[CameraSource]) -> list[str]:
         name = re.sub(r"[^\w .-]+", "_", stem)[:40].strip(" .") or f"camera {number}"
         names.append(name if name not in names else f"{name} {number}")
     return names
+
+
+# -- the command ``rhot cameras`` --------------------------------------------------------------------------------------
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``rhot cameras``."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object: the cameras with all their modes")
+    add_examples(parser, "rhot cameras", "rhot cameras --json")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print them; exit code 1 when there is none."""
+    devices = list_devices()
+    if args.json:
+        print(json.dumps({"cameras": [asdict(device) for device in devices]}))
+    else:
+        print("\n".join(map(device_line, devices)) or NONE_FOUND)
+    return 0 if devices else 1
+
+
+def device_line(device: Device) -> str:
+    """A camera in one line: its number, name, and modes or fault."""
+    number = device.path.removeprefix("/dev/video")
+    said = device.problem or f"{device.mode}" + (f", {len(device.modes)} picture sizes" if device.modes else "")
+    return f"{number}  {device.name}  {said}"

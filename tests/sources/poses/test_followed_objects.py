@@ -26,8 +26,8 @@ from rhot_app.recording.raw_log import Record, RecordKind
 from rhot_app.sources.poses.followed import FollowedObjects, in_rig
 from rhot_app.sources.poses.open_source import open_source
 from rhot_app.sources.poses.source import ForeignPose
+from rhot_app.sources.receiver import same_network
 from rhot_app.sources.replay import LogValidator
-from rhot_app.sources.source import same_network
 from rhot_app.tracking.kinds.poses import decode_pose, encode_pose
 from rhot_app.tracking.rig_objects import RigObjects
 from rhot_node.files import resource_path
