@@ -320,13 +320,13 @@ class NodeSide:
         stream = self._sessions.current
         if stream is not None and (stream.address[0] != self._sender[0] or not 1 <= stream.address[1] <= 65535):
             raise WronglyTakenError(f"the node streams to {stream}")
-        if self._search.requests >= self._searched + SEARCHED:
+        if self._search.found >= self._searched + SEARCHED:
             self._search_image()
         return self._keys.taken > before
 
     def _search_image(self) -> None:
         """As the search's thread does it with the request that was taken last."""
-        self._searched, order = self._search.requests, self._search._order
+        self._searched, order = self._search.found, self._search._order
         assert order is not None
         edges = find_edges(self._image, order.slices, no_foreground(), 1.0)
         if len(order.slices) > SLICES_MAX or edges.number.any():

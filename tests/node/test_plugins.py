@@ -15,7 +15,7 @@ from node_process import Node, write_settings
 from patience import eventually
 from shipped_markers import LANDMARKS21, RHOT6
 
-from rhot_node import plugins
+from rhot_node import detectors
 from rhot_node.capture.camera import Frame
 from rhot_node.capture.open import PluginCamera, open_camera
 from rhot_node.clock import NodeClock
@@ -208,7 +208,7 @@ def hanging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_detector_that_hangs_is_given_up_and_another_one_takes_its_place(
         hanging: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plugins, "DETECT_S", 0.05)
+    monkeypatch.setattr(detectors, "DETECT_S", 0.05)
     choice = DetectorChoice(lambda settings: Fallback())
     detector = choice.make(settings("plug:hangs"))
     image = warm_up_image(settings("fast").markers, (64, 48))
