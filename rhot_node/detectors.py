@@ -17,10 +17,9 @@ from rhot_node.config import NodeSettings, network_model
 from rhot_node.detect.image import Detector, YuvImage
 from rhot_node.errors import KeypointError, PluginError
 from rhot_node.health.checks import Check
-from rhot_node.keypoints import PREFIX as KEYPOINTS
 from rhot_node.keypoints import PaintedMarkers, keypoint_detector
 from rhot_node.markers import MarkerSet
-from rhot_node.plugins import PREFIX, about_plugin, load_plugin
+from rhot_node.plugins import about_plugin, load_plugin
 from rhot_node.threads import FOREIGN, TimedCalls
 from rhot_node.wire.messages import CANDIDATES_MAX, MarkerFlag, MarkerObservation
 
@@ -91,8 +90,7 @@ class PluginDetector:
     def _give_up(self, exc: TimeoutError) -> None:
         self._instead = self._otherwise()
         self._say(f"{about_plugin(GROUP, self._name)} hangs ({exc}), and is not asked any more. "
-                  + ("All markers are lost." if isinstance(self._instead, NoDetector) else
-                     "The fast detector works in its place."))
+                  f"{_consequence(self._instead)}")
 
     def _check(self, found: tuple[MarkerObservation, ...]) -> None:
         if not all(isinstance(one, MarkerObservation) for one in found):
@@ -132,6 +130,11 @@ class NoDetector:
         """See `Detector`."""
 
 
+def _consequence(instead: Detector) -> str:
+    """What it means that a detector works in another one's place."""
+    return "All markers are lost." if isinstance(instead, NoDetector) else "The fast detector works in its place."
+
+
 class DetectorChoice:
     """Makes the detector that the settings ask for; where that is a plug-in that cannot begin, the fast one. Landmarks
     have no colour: where their detector cannot begin, or none is named, they are lost."""
@@ -152,35 +155,31 @@ class DetectorChoice:
         def instead() -> Detector:
             return NoDetector(settings.markers) if landmarks else self._otherwise(settings)
 
-        if network_model(settings.detector) is not None and landmarks:
-            painted = PaintedMarkers(settings.markers)
-            if painted.own.markers:
-                warm_up(painted, painted.own, (settings.camera.width, settings.camera.height))
-            return painted
-        if settings.detector.startswith(KEYPOINTS):
-            try:
-                return keypoint_detector(settings.detector.removeprefix(KEYPOINTS), settings.markers)
-            except KeypointError as exc:
-                return self._refuse(settings, str(exc))
-        if landmarks and not settings.detector.startswith(PREFIX):
-            return self._refuse(settings, f"the detector {settings.detector!r} finds no landmarks, which the marker "
-                                          "set has. Choose landmarks, keypoints:NAME or a plug-in.")
-        if settings.detector.startswith(PREFIX):
-            try:
-                self._detector = PluginDetector(settings.detector.removeprefix(PREFIX), settings.markers, instead)
-            except PluginError as exc:
-                if landmarks:
-                    return self._refuse(settings, str(exc))
-                log.error("%s The fast detector works in its place.", exc)
-                self._refusal = f"{exc} The fast detector works in its place."
-            else:
+        kind, _, name = settings.detector.partition(":")
+        try:
+            if kind == "keypoints":
+                return keypoint_detector(name, settings.markers)
+            if kind == "plug":
+                self._detector = PluginDetector(name, settings.markers, instead)
                 return self._detector
-        return self._otherwise(settings)
+        except KeypointError as exc:
+            return self._refuse(NoDetector(settings.markers), str(exc))
+        except PluginError as exc:
+            return self._refuse(instead(), str(exc))
+        if landmarks and network_model(settings.detector) is None:
+            return self._refuse(instead(), f"the detector {settings.detector!r} finds no landmarks, which the marker "
+                                           "set has. Choose landmarks, keypoints:NAME or a plug-in.")
+        if not landmarks:
+            return self._otherwise(settings)
+        painted = PaintedMarkers(settings.markers)
+        if painted.own.markers:
+            warm_up(painted, painted.own, (settings.camera.width, settings.camera.height))
+        return painted
 
-    def _refuse(self, settings: NodeSettings, why: str) -> Detector:
-        self._refusal = f"{why} All markers are lost."
+    def _refuse(self, instead: Detector, why: str) -> Detector:
+        self._refusal = f"{why} {_consequence(instead)}"
         log.error("%s", self._refusal)
-        return NoDetector(settings.markers)
+        return instead
 
     def troubles(self) -> list[Check]:
         """What is wrong with the plug-in, for the node's report."""

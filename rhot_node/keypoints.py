@@ -232,9 +232,6 @@ def _reason(exc: cv2.error) -> str:
 
 # -- the detector ------------------------------------------------------------------------------------------------------
 
-PREFIX: Final = "keypoints:"
-"""Begins the name of a model card in a node's settings."""
-
 LEAST_PROBABILITY: Final = 0.5
 """Less likely points are none."""
 

@@ -10,6 +10,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -184,23 +185,21 @@ class SettingsStore:
         return needs_restart(self._at_start, settings)
 
 
+@dataclass(slots=True)
 class Responder:
-    """Answers requests. `state` and `counters` report on the daemon from any thread."""
+    """Answers requests. `state` and `counters` report on the daemon from any thread. `keys` None: the node is open, and
+    no datagram is tagged. `spare`: stops the search for landmarks a while."""
 
-    def __init__(self, store: SettingsStore, sessions: Sessions, pictures: PictureBox, clock: NodeClock,
-                 state: Report, counters: Report, keys: LinkKeys | None, videos: VideoRecorder,
-                 foreground: ForegroundStore, spare: Callable[[], None] = lambda: None) -> None:
-        """`keys` None: the node is open, and no datagram is tagged. `spare`: stops the search for landmarks a while."""
-        self._spare = spare
-        self._store = store
-        self._sessions = sessions
-        self._pictures = pictures
-        self._clock = clock
-        self._state = state
-        self._counters = counters
-        self._keys = keys
-        self._videos = videos
-        self._foreground = foreground
+    store: SettingsStore
+    sessions: Sessions
+    pictures: PictureBox
+    clock: NodeClock
+    state: Report
+    counters: Report
+    keys: LinkKeys | None
+    videos: VideoRecorder
+    foreground: ForegroundStore
+    spare: Callable[[], None] = lambda: None
 
     def answer(self, parts: list[bytes], master: str) -> list[bytes]:
         """The reply's message parts to a request's of the master with this public key (empty: the node is open). Never
@@ -213,7 +212,7 @@ class Responder:
         except (msgspec.DecodeError, NodeError) as exc:
             reply, attachment = {"ok": False, "error": str(exc)}, b""
         except OSError as exc:
-            sentence = f"{self._store.path}: cannot be written ({exc.strerror}); nothing was changed."
+            sentence = f"{self.store.path}: cannot be written ({exc.strerror}); nothing was changed."
             reply, attachment = {"ok": False, "error": sentence}, b""
         except Exception as exc:  # a request must never end the node; the log has the whole story
             log.exception("a request failed")
@@ -225,11 +224,11 @@ class Responder:
         """What is answered besides that it was done, and what is attached to it."""
         match request:
             case StateRequest():
-                return self._state(), b""
+                return self.state(), b""
             case CountersRequest():
-                return {"counters": self._counters()}, b""
+                return {"counters": self.counters()}, b""
             case SettingsRequest():
-                return {"settings": self._store.current}, b""
+                return {"settings": self.store.current}, b""
             case SetSettingsRequest():
                 return self._set_settings(request), b""
             case StillRequest():
@@ -239,32 +238,32 @@ class Responder:
             case LinkRequest():
                 return self._link(request, master), b""
             case StopRequest():
-                return {"stopped": self._sessions.stop(request.session)}, b""
+                return {"stopped": self.sessions.stop(request.session)}, b""
             case SpareLandmarksRequest():
-                self._spare()
+                self.spare()
             case VideoStartRequest():
-                return {"video": self._videos.start(request.name)}, b""
+                return {"video": self.videos.start(request.name)}, b""
             case VideoStopRequest():
-                return {"stopped": self._videos.stop(request.name)}, b""
+                return {"stopped": self.videos.stop(request.name)}, b""
             case VideoListRequest():
-                return {"videos": self._videos.videos()}, b""
+                return {"videos": self.videos.videos()}, b""
             case VideoReadRequest():
-                data = self._videos.read(request.name, request.offset, request.length)
+                data = self.videos.read(request.name, request.offset, request.length)
                 return {"offset": request.offset, "length": len(data)}, data
             case VideoDeleteRequest():
-                self._videos.delete(request.name)
+                self.videos.delete(request.name)
             case LearnBackgroundRequest():
-                self._foreground.learn_background(self._pictures, request.seconds, save=request.save)
+                self.foreground.learn_background(self.pictures, request.seconds, save=request.save)
             case LearnSkinRequest():
-                return {"found": self._foreground.learn_skin(self._pictures, save=request.save)}, b""
+                return {"found": self.foreground.learn_skin(self.pictures, save=request.save)}, b""
             case SaveForegroundRequest():
-                self._foreground.save()
+                self.foreground.save()
             case RevertForegroundRequest():
-                self._foreground.revert(earlier=request.earlier)
+                self.foreground.revert(earlier=request.earlier)
             case ForgetForegroundRequest():
-                self._foreground.forget()
+                self.foreground.forget()
             case ForegroundMaskRequest():
-                mask, picture = self._foreground.mask(self._pictures)
+                mask, picture = self.foreground.mask(self.pictures)
                 return {"format": "png", "width": mask.width, "height": mask.height, "mask_bytes": len(mask.data),
                         "number": picture.number, "t_node_ns": picture.t_node_ns
                         }, mask.data + encode_still(picture, "jpeg").data
@@ -272,24 +271,24 @@ class Responder:
 
     def revoke(self, admits: Callable[[str], bool]) -> None:
         """The masters have changed: forget the keys of those that are not admitted any more, and stop streaming."""
-        if self._keys is not None:
-            self._keys.forget(admits)
-            self._sessions.stop(0)
-            self._videos.stop()
+        if self.keys is not None:
+            self.keys.forget(admits)
+            self.sessions.stop(0)
+            self.videos.stop()
 
     def _set_settings(self, request: SetSettingsRequest) -> dict[str, Any]:
-        if request.settings.get("trust", self._store.current.trust) != self._store.current.trust:
+        if request.settings.get("trust", self.store.current.trust) != self.store.current.trust:
             raise SettingsError("trust is changed only in the settings file, on the node itself.")
-        return {"restart": self._store.change(request.settings, save=request.save)}
+        return {"restart": self.store.change(request.settings, save=request.save)}
 
     def _link(self, request: LinkRequest, master: str) -> dict[str, Any]:
-        if self._keys is None:
+        if self.keys is None:
             raise NodeError("this node is open to everybody; its datagrams have no key.")
-        link = self._keys.grant(master, request.name)
+        link = self.keys.grant(master, request.name)
         return {"name": link.name, "key": link.key.hex()}
 
     def _take_still(self, kind: StillFormat) -> tuple[dict[str, Any], bytes]:
-        picture = self._pictures.next_still(STILL_S)
+        picture = self.pictures.next_still(STILL_S)
         if picture is None:
             raise NodeError(f"no frame came within {STILL_S:.0f} s; ask for the state to see what the camera does.")
         still = encode_still(picture, kind)
@@ -303,11 +302,11 @@ class Responder:
             host = str(ipaddress.IPv4Address(request.host))
         except ValueError as exc:
             raise NodeError(f"host {request.host!r} is not an IPv4 address such as 192.168.1.10.") from exc
-        link = None if self._keys is None else self._keys.find(master, request.link)
-        if self._keys is not None and link is None:
+        link = None if self.keys is None else self.keys.find(master, request.link)
+        if self.keys is not None and link is None:
             raise NodeError(f"there is no link {request.link!r} of yours; ask for one with the request \"link\".")
-        verdict = self._sessions.start(request.session, (host, request.port), request.t_start_node_ns,
-                                       now_node_ns=self._clock.now_ns(), now_s=time.monotonic(),
+        verdict = self.sessions.start(request.session, (host, request.port), request.t_start_node_ns,
+                                       now_node_ns=self.clock.now_ns(), now_s=time.monotonic(),
                                        seal=None if link is None else link.seal)
         if verdict == "stale":
             raise NodeError(f"session {request.session} is over; every start needs a new session number.")

@@ -50,7 +50,7 @@ class StreamingNode(TrustedNode):
         self.link.close()
         self.sessions.stop(0)
         self.keys = LinkKeys()
-        self.responder._keys = self.keys
+        self.responder.keys = self.keys
         self.boot_id += 1
         self.open_link(port, self.boot_id)
 
