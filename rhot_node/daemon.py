@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from rhot_node.capture.camera import FIRST_FRAME_S, READ_S, Camera, EndOfRecording, Frame, Reporting, Rewindable
+from rhot_node.capture.camera import FIRST_FRAME_S, READ_S, Camera, EndOfRecording, Frame, Rewindable, report_of
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings, NodeSettings
 from rhot_node.detect.image import Detector
@@ -108,7 +108,7 @@ class NodeDaemon:
     def report(self) -> dict[str, Any]:
         """State, for the control channel."""
         stream, camera = self.sessions.current, self._camera
-        said: dict[str, Any] = camera.report() if isinstance(camera, Reporting) else {}
+        said = {} if camera is None else report_of(camera)
         return {**self.introduce(), "message": self._hangs() or self._message,
                 "session": stream.session if stream else 0,
                 "width": self._size[0], "height": self._size[1], "detector": self._settings.detector,

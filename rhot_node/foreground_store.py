@@ -35,9 +35,6 @@ log = logging.getLogger(__name__)
 PICTURES_MIN: Final = 4
 """Pictures that a background needs at least: a pixel's noise is then known to 1/sqrt(2 n), 35 %."""
 
-PICTURE_S: Final = 2.0
-"""How long to wait for one picture; a node in fault has none."""
-
 MASK_STEP: Final = 2
 """Pixels of the picture to one of the mask."""
 
@@ -111,7 +108,7 @@ class ForegroundStore:
         """Learn the skin's colours from the next picture. False when it shows no skin; generic colours are then used.
         `save` as in `learn_background`. Raises NodeError without a picture, or when the file cannot be written."""
         self._require_idle()
-        image = self._picture(pictures)
+        image = rgb_of(pictures.still().image)
         model = self.of_size(image.shape[1], image.shape[0])
         self._use(learn_skin(image, model), save=save)
         return _skin_of(self.current) == "learnt"
@@ -171,7 +168,7 @@ class ForegroundStore:
     def mask(self, pictures: PictureBox) -> tuple[Encoded, Picture]:
         """The foreground probabilities, 0 to 255, of every MASK_STEP-th pixel of the next picture, as PNG, and this
         picture. Raises NodeError without a picture."""
-        picture = self._next(pictures)
+        picture = pictures.still()
         image = rgb_of(picture.image)
         probability = foreground_map(image, self.of_size(image.shape[1], image.shape[0]), MASK_STEP)
         _, data = cv2.imencode(".png", np.round(255.0 * probability).astype(np.uint8),
@@ -190,7 +187,7 @@ class ForegroundStore:
             while time.monotonic() < until_s or sums.count < PICTURES_MIN:
                 if ending.is_set():
                     return
-                sums.add(self._picture(pictures))
+                sums.add(rgb_of(pictures.still().image))
             with self._changing:
                 if ending.is_set():
                     return
@@ -200,15 +197,6 @@ class ForegroundStore:
             if not ending.is_set():
                 self._failure = f"The background was not learnt: {exc}"
                 log.error("%s", self._failure)
-
-    def _picture(self, pictures: PictureBox) -> NDArray[np.uint8]:
-        return rgb_of(self._next(pictures).image)
-
-    def _next(self, pictures: PictureBox) -> Picture:
-        picture = pictures.next_still(PICTURE_S)
-        if picture is None:
-            raise NodeError(f"no frame came within {PICTURE_S:.0f} s; ask for the state to see what the camera does.")
-        return picture
 
     def _use(self, model: Foreground, *, save: bool) -> None:
         """Keep the model if `save`, then use it as it is read. Raises NodeError when the file cannot be written."""

@@ -78,6 +78,11 @@ class Reporting(Protocol):
         ...
 
 
+def report_of(camera: Camera) -> dict[str, Any]:
+    """What a camera says of itself, if it does."""
+    return camera.report() if isinstance(camera, Reporting) else {}
+
+
 def i420_bytes(width: int, height: int) -> int:
     """Of a packed frame: a byte of luma a pixel, and two of chroma for four pixels."""
     return width * height + width * height // 2

@@ -13,7 +13,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Reporting, Rewindable
+from rhot_node.capture.camera import Camera, EndOfRecording, Frame, Rewindable, report_of
 from rhot_node.capture.paced import IMAGE_SUFFIXES, ImageFiles, ImageSource, PacedCamera, VideoFile, image_files
 from rhot_node.capture.stream import StreamCamera
 from rhot_node.capture.webcam import NetworkCamera, Webcam
@@ -158,7 +158,7 @@ class OrientedCamera:
 
     def report(self) -> dict[str, Any]:
         """What the camera says of itself."""
-        return self._camera.report() if isinstance(self._camera, Reporting) else {}
+        return report_of(self._camera)
 
     def close(self) -> None:
         """Release the camera."""
@@ -210,9 +210,8 @@ class PluginCamera:
 
     def report(self) -> dict[str, Any]:
         """What the camera says of itself, when it does."""
-        if isinstance(self._camera, Reporting):
-            with contextlib.suppress(*FOREIGN):
-                return dict(self._camera.report())
+        with contextlib.suppress(*FOREIGN):
+            return dict(report_of(self._camera))
         return {}
 
     def close(self) -> None:

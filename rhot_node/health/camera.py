@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_node.capture.camera import FIRST_FRAME_S, READ_S, Camera, Reporting
+from rhot_node.capture.camera import FIRST_FRAME_S, READ_S, Camera, report_of
 from rhot_node.errors import CameraError
 from rhot_node.health.checks import BLACK_PICTURE, STEP_PX, Check, is_black
 
@@ -117,5 +117,4 @@ def watch_camera(camera: Camera, asked_hz: float) -> list[Check]:
         if frame.t_node_ns - first_ns >= WINDOW_NS:
             break
     black = [BLACK_PICTURE] if is_black(frame.image.y) else []
-    report = camera.report() if isinstance(camera, Reporting) else {}
-    return black or camera_troubles(report, meter.rate_hz, brightness(frame.image.y), asked_hz)
+    return black or camera_troubles(report_of(camera), meter.rate_hz, brightness(frame.image.y), asked_hz)

@@ -12,7 +12,9 @@ import cv2
 
 from rhot_node.capture.camera import Frame
 from rhot_node.detect.image import YuvImage, to_bgr
+from rhot_node.errors import NodeError
 
+STILL_S = 2.0  # how long a still may take; a node in fault has no frames
 PREVIEW_WIDTH = 320  # px, at most
 JPEG_QUALITY = 80
 
@@ -61,7 +63,7 @@ class PictureBox:
         preview_due = self.wanted and now_s >= self._due_s + wait_s
         if not preview_due and not self._waiting:
             return
-        picture = _copy(frame)
+        picture = Picture(frame.image.copy(), frame.number, frame.t_node_ns)
         with self._changed:
             if preview_due:
                 self._preview = picture
@@ -88,6 +90,13 @@ class PictureBox:
             self._waiting -= 1
             return self._still
 
+    def still(self) -> Picture:
+        """The next frame. Raises NodeError when none comes within STILL_S."""
+        picture = self.next_still(STILL_S)
+        if picture is None:
+            raise NodeError(f"no frame came within {STILL_S:.0f} s; ask for the state to see what the camera does.")
+        return picture
+
 
 def encode_preview(picture: Picture) -> Encoded:
     """JPEG, at most PREVIEW_WIDTH wide."""
@@ -106,8 +115,3 @@ def encode_still(picture: Picture, kind: StillFormat = "png") -> Encoded:
     suffix, options = _STILL[kind]
     _, data = cv2.imencode(suffix, bgr, options)
     return Encoded(data.tobytes(), bgr.shape[1], bgr.shape[0])
-
-
-def _copy(frame: Frame) -> Picture:
-    image = frame.image
-    return Picture(YuvImage(image.y.copy(), image.u.copy(), image.v.copy()), frame.number, frame.t_node_ns)

@@ -29,7 +29,6 @@ from rhot_node.wire.messages import U64_MAX
 
 log = logging.getLogger(__name__)
 
-STILL_S = 2.0  # how long a still may take; a node in fault has no frames
 Report = Callable[[], dict[str, Any]]
 
 
@@ -288,9 +287,7 @@ class Responder:
         return {"name": link.name, "key": link.key.hex()}
 
     def _take_still(self, kind: StillFormat) -> tuple[dict[str, Any], bytes]:
-        picture = self.pictures.next_still(STILL_S)
-        if picture is None:
-            raise NodeError(f"no frame came within {STILL_S:.0f} s; ask for the state to see what the camera does.")
+        picture = self.pictures.still()
         still = encode_still(picture, kind)
         return {"format": kind, "width": still.width, "height": still.height, "number": picture.number,
                 "t_node_ns": picture.t_node_ns}, still.data

@@ -216,8 +216,7 @@ class _Take:
         """Copy the frame into the queue; the oldest that waits makes room for it."""
         if self._ending:
             return
-        image = frame.image
-        copy = YuvImage(image.y.copy(), image.u.copy(), image.v.copy())
+        copy = frame.image.copy()
         stamp = Stamp(frame.number & U32_MAX, frame.t_node_ns, frame.exposure_ns, frame.row_time_ns)
         with self._changed:
             if len(self._queue) >= self._queue_frames:

@@ -167,7 +167,7 @@ def test_a_still_is_the_whole_frame_without_loss_or_nearly_so(served: Served, as
 
 
 def test_a_node_without_frames_says_so(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rhot_node.network.requests.STILL_S", 0.1)
+    monkeypatch.setattr("rhot_node.network.pictures.STILL_S", 0.1)
     answer = served.ask(request="still")
     assert not answer["ok"] and "no frame" in answer["error"]
 

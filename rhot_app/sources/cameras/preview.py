@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.sources.cameras.camera_set import CameraSource, camera_controls
-from rhot_node.capture.camera import FIRST_FRAME_S, READ_S, Camera, EndOfRecording, Reporting, Rewindable
+from rhot_node.capture.camera import FIRST_FRAME_S, READ_S, Camera, EndOfRecording, Rewindable, report_of
 from rhot_node.capture.open import open_camera
 from rhot_node.clock import NodeClock
 from rhot_node.config import CameraSettings
@@ -100,8 +100,8 @@ class CameraPreview:
                 if now_s - shown_s >= PICTURE_S:
                     shown_s = now_s
                     self._fault = fault_of(frame.image)
-                    said = camera.report() if isinstance(camera, Reporting) else {}
-                    self._troubles = camera_troubles(said, self.rate_hz, brightness(frame.image.y), self.source.fps)
+                    self._troubles = camera_troubles(report_of(camera), self.rate_hz, brightness(frame.image.y),
+                                                     self.source.fps)
                     self.picture = to_bgr(frame.image)
         except CameraError as exc:
             self._lost = str(exc)
