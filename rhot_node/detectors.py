@@ -17,7 +17,7 @@ from rhot_node.config import NodeSettings, network_model
 from rhot_node.detect.image import Detector, YuvImage
 from rhot_node.errors import KeypointError, PluginError
 from rhot_node.health.checks import Check
-from rhot_node.keypoints import PaintedMarkers, keypoint_detector
+from rhot_node.keypoints import KeypointDetector, PaintedMarkers, card_path
 from rhot_node.markers import MarkerSet
 from rhot_node.plugins import about_plugin, load_plugin
 from rhot_node.threads import FOREIGN, TimedCalls
@@ -158,7 +158,7 @@ class DetectorChoice:
         kind, _, name = settings.detector.partition(":")
         try:
             if kind == "keypoints":
-                return keypoint_detector(name, settings.markers)
+                return KeypointDetector(card_path(name), settings.markers)
             if kind == "plug":
                 self._detector = PluginDetector(name, settings.markers, instead)
                 return self._detector

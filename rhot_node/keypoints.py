@@ -322,11 +322,6 @@ class KeypointDetector:
         return math.exp(-0.5 * max(float(np.mean(apart * apart)) - 1.0, 0.0))
 
 
-def keypoint_detector(name: str, markers: MarkerSet) -> KeypointDetector:
-    """The detector of the card NAME in the node's folder of cards. Raises KeypointError."""
-    return KeypointDetector(card_path(name), markers)
-
-
 class PaintedMarkers:
     """Implements `Detector` by the fast one for the painted markers of a set. Its landmarks are lost."""
 
