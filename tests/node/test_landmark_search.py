@@ -150,7 +150,7 @@ def test_a_search_that_is_spared_goes_on_when_nobody_says_so_any_more(monkeypatc
     search.search.spare()
     search.offer(2)
     assert not search.search.step() and not search.search.wanted
-    monkeypatch.setattr("rhot_node.landmark_search.SPARED_S", 0.0)
+    monkeypatch.setattr("rhot_node.landmark_search.RETRY_S", 0.0)
     search.search.spare()
     search.offer()
     assert search.search.step() and len(search.sent()) == 1
