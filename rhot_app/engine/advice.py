@@ -41,6 +41,8 @@ _REFUSALS = {
                        "sends in its place."),
     "untagged": ("warning", "Datagrams without a tag are refused at the port of node {name}: somebody sends in its "
                             "place, or the node was made open after it was paired."),
+    "failed": ("error", "An observation kind failed over datagrams of node {name}. The log has its exception; "
+                        "remove the plug-in that adds it, or report this."),
     "jump": ("warning", "Node {name} jumped in its sequence numbers; if this does not end, restart the node."),
     "kernel_overflow": ("warning", "The kernel drops datagrams of node {name}: this computer is too busy to read "
                                    "them. Close other programs, or allow a larger buffer with "

@@ -187,7 +187,8 @@ class NodeReceiver:
                     break
         if verified:
             self.skipped += max(0, len(verified) - NEWEST)
-            self.deliver([self.door.convert(frame) for frame in verified[-NEWEST:]])
+            frames = [self.door.convert(frame) for frame in verified[-NEWEST:]]
+            self.deliver([frame for frame in frames if frame is not None])
         sink = self.sink
         if sink is not None:
             sink.count_refused(time.monotonic_ns())

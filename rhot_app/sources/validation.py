@@ -6,6 +6,7 @@ No sockets and no threads. Nothing in a datagram raises past `DatagramValidator.
 from __future__ import annotations
 
 import functools
+import logging
 import re
 from collections import Counter
 from collections.abc import Callable
@@ -24,6 +25,8 @@ from rhot_node.errors import WireError
 from rhot_node.wire.codec import Seal, SequenceVerdict, SequenceWindow, decode, decode_sealed, is_tagged
 from rhot_node.wire.fields import IMAGE_SIZE_MAX
 from rhot_node.wire.messages import FrameMessage, MarkerFlag, Message, Observations
+
+log = logging.getLogger(__name__)
 
 # -- authentication ----------------------------------------------------------------------------------------------------
 
@@ -47,6 +50,9 @@ def refuse_without_key(data: bytes) -> Message:
 
 OLDEST_FRAME_NS = 1_000_000_000
 """A frame taken longer ago than this is not worth a state, or its time is wrong."""
+
+FAILED = "failed"
+"""Reason to drop a datagram over which a kind of observations failed."""
 
 Verified = Collected | CameraObservations
 """What is verified and waits for `DatagramValidator.convert`; text needs no second half."""
@@ -129,6 +135,8 @@ class DatagramValidator:
             verified = self._verify_text(data, t_receive_ns) if self._text else self._verify(data, t_receive_ns)
         except WireError as exc:
             verified = exc.reason
+        except Exception:  # in a kind of another package: it costs this datagram only
+            verified = self._failed()
         if isinstance(verified, str):
             self.drop(verified)
             if self.taken == taken:
@@ -140,12 +148,22 @@ class DatagramValidator:
         self.last_t_receive_ns = t_receive_ns
         return verified
 
-    def convert(self, verified: Verified) -> CameraFrame:
-        """Second half of `admit`: arrays in the rig's marker order, times in master time."""
+    def convert(self, verified: Verified) -> CameraFrame | None:
+        """Second half of `admit`: arrays in the rig's marker order, times in master time. None when it failed."""
         if isinstance(verified, CameraObservations):
             return verified
         kind, collected, times = verified
-        return kind.observe(collected, times)
+        try:
+            return kind.observe(collected, times)
+        except Exception:  # as in `verify`
+            self.drop(self._failed())
+            return None
+
+    def _failed(self) -> str:
+        """The reason to drop what a kind fails over, which is logged once."""
+        if FAILED not in self.dropped:
+            log.exception("a kind of observations failed over a datagram; further failures are counted")
+        return FAILED
 
     def _verify_text(self, data: bytes, t_receive_ns: int) -> Verified | str:
         if not self._session:
@@ -183,7 +201,7 @@ class DatagramValidator:
         bound_s = estimate.bound_s(t_receive_ns)
         if not self._plausible(t_row0_ns, t_send_ns, t_receive_ns, bound_s):
             return "time"
-        if not self._travel.believed(t_receive_ns - t_send_ns, t_receive_ns, estimate):
+        if not self._travel.plausible(t_receive_ns - t_send_ns, t_receive_ns, estimate):
             return "clock_in_doubt"
         times = FrameTimes(t_row0_ns, t_send_ns, t_receive_ns, bound_s)
         collected = kind.collect(message, times)
@@ -233,11 +251,11 @@ class TravelTimes:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether the last datagram was not believed."""
+        """Whether the last datagram was dropped for its times."""
         return self._doubt_since_ns is not None
 
-    def believed(self, travel_ns: int, t_receive_ns: int, estimate: ClockEstimate) -> bool:
-        """Whether a datagram's times can be believed that took `travel_ns` by the clock `estimate`."""
+    def plausible(self, travel_ns: int, t_receive_ns: int, estimate: ClockEstimate) -> bool:
+        """Whether a datagram's times are plausible that took `travel_ns` by the clock `estimate`."""
         if self._known:
             slack_ns = SLACK_NS + 1e9 * estimate.bound_s(t_receive_ns)
             if not self._shortest_ns - slack_ns <= travel_ns <= self._longest_ns + slack_ns:

@@ -188,3 +188,32 @@ def test_it_takes_only_what_is_its_own(registered: None) -> None:
 
 def test_without_it_all_is_as_before() -> None:
     assert WristTagKind not in registry.KINDS
+
+
+class BrokenKind(WristTagKind):
+    """A plug-in with a fault in one place."""
+
+    def collect(self, message: Any, times: FrameTimes) -> Any:
+        if message.sequence == 1:
+            raise KeyError("collect")
+        return super().collect(message, times)
+
+    def observe(self, collected: Any, times: FrameTimes) -> HandFrame:
+        if collected.sequence == 2:
+            raise ZeroDivisionError("observe")
+        return super().observe(collected, times)
+
+
+def test_a_fault_in_a_kind_costs_its_datagrams_only(caplog: pytest.LogCaptureFixture) -> None:
+    registry.register(BrokenKind)
+    try:
+        rig = model_rig()
+        door = DatagramValidator(rig, 1, clock())
+        door.expect_session(SESSION)
+        frames = [door.admit(datagram(rig, number, EPOCH_NS, np.array([300.0, 200.0])), EPOCH_NS + 2 * 10**6)
+                  for number in (1, 2, 3)]
+    finally:
+        registry.KINDS.remove(BrokenKind)
+    assert frames[:2] == [None, None] and isinstance(frames[2], HandFrame)
+    assert door.dropped == {"failed": 2}
+    assert [record.exc_info[0] for record in caplog.records if record.exc_info] == [KeyError]

@@ -95,6 +95,7 @@ _UNUSED = {
     "image_size": "of another picture size than the rig's",
     "foreign_node": "of another node",
     "duplicate": "came twice",
+    "failed": "an observation kind failed over them",
     "tag": "not signed with the node's key",
     "untagged": "not signed",
 }
