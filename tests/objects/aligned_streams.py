@@ -58,9 +58,9 @@ def random_pose(rng, spread_m):
     return rigid(Rotation.random(random_state=rng).as_matrix(), rng.uniform(-spread_m, spread_m, 3))
 
 
-def make_scene(seed, poses=False, offset_s=0.037, seconds=20.0, spread_m=(SPREAD_M,) * 3, spread_rad=(SPREAD_RAD,) * 3,
+def make_scene(seed, offset_s=0.037, seconds=20.0, spread_m=(SPREAD_M,) * 3, spread_rad=(SPREAD_RAD,) * 3,
                slow=1.0, noise=1.0, outliers=OUTLIERS, rates=(RIG_HZ, FOREIGN_HZ), start_s=0.0):
-    """A scene; the rig reports positions of a point 5 to 10 cm away from the device, or poses."""
+    """A scene; the rig reports positions of a point 5 to 10 cm away from the device."""
     rng = np.random.default_rng(seed)
     motion = Motion(rng, np.array(spread_m), np.array(spread_rad), slow)
     rig_from_motion = random_pose(rng, 0.2)
@@ -72,10 +72,9 @@ def make_scene(seed, poses=False, offset_s=0.037, seconds=20.0, spread_m=(SPREAD
     foreign_s = np.arange(0.0, seconds, 1.0 / rates[1]) + rng.uniform(0.0, 0.005)
     device = inverse(rig_from_foreign) @ rig_from_motion @ motion.poses(foreign_s + offset_s)
     seen = rig_from_motion @ motion.poses(rig_s) @ body
-    place_sd, turn_sd = (POSE_NOISE_M, POSE_NOISE_RAD) if poses else (POINT_NOISE_M, 0.0)
     return Scene(recorded(rng, foreign_s + start_s, device, noise * POSE_NOISE_M, noise * POSE_NOISE_RAD, outliers),
-                 recorded(rng, rig_s + start_s, seen, noise * place_sd, noise * turn_sd if poses else None, outliers),
-                 rig_from_foreign, body if poses else rigid(np.eye(3), body[:3, 3]), offset_s)
+                 recorded(rng, rig_s + start_s, seen, noise * POINT_NOISE_M, None, outliers),
+                 rig_from_foreign, rigid(np.eye(3), body[:3, 3]), offset_s)
 
 
 def recorded(rng, times_s, poses, place_sd, turn_sd, outliers):

@@ -54,8 +54,9 @@ class RigidTransform(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Alignment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Where another tracker's world is in the rig.
 
-    `time_offset_s` is added to the other tracker's times. `covariance`: 10 or 13 rows in the order of
-    `rhot_app.objects.alignment.model.TRANSLATION`. `noise_m`: standard deviation of an axis' residual.
+    `time_offset_s` is added to the other tracker's times. `covariance`: 10 rows in the order of
+    `rhot_app.objects.alignment.fit.TRANSLATION`, or 13, of which the last three are not used. `noise_m`: standard
+    deviation of an axis' residual.
     """
 
     rig_from_foreign: RigidTransform

@@ -14,8 +14,17 @@ from rhot_app.estimation.quantiles import chi_squared_isf
 from rhot_app.estimation.se3 import skew
 from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.alignment.alignment_file import Alignment
-from rhot_app.objects.alignment.fit import KERNEL, LASTING_M, LASTING_S
-from rhot_app.objects.alignment.model import GAP_S, OFFSET, POINT, POINTS, ROTATION, TRANSLATION
+from rhot_app.objects.alignment.fit import (
+    GAP_S,
+    KERNEL,
+    LASTING_M,
+    LASTING_S,
+    OFFSET,
+    POINT,
+    ROTATION,
+    TRANSLATION,
+    UNKNOWNS,
+)
 from rhot_app.objects.alignment.motion_stream import SAMPLES, MotionStream
 
 Array = NDArray[np.float64]
@@ -116,7 +125,7 @@ class DriftMonitor:
         turned = (poses[:, :3, 3] + poses[:, :3, :3] @ body[:3, 3]) @ rig[:3, :3].T
         predicted = turned + rig[:3, 3]
         speed = np.gradient(median_filter(predicted, (5, 1)), times, axis=0)  # outliers would have the largest speeds
-        jacobian = np.zeros((len(times), 3, POINTS))
+        jacobian = np.zeros((len(times), 3, UNKNOWNS))
         jacobian[:, :, TRANSLATION], jacobian[:, :, ROTATION] = np.eye(3), -skew(turned)
         jacobian[:, :, POINT], jacobian[:, :, OFFSET.start] = rig[:3, :3] @ poses[:, :3, :3], -speed
         return observed - predicted, jacobian

@@ -29,7 +29,7 @@ OUTLIER_GATE = float(np.sqrt(chi_squared_isf(1e-6, 3) / chi_squared(0.5, 3)))
 million samples."""
 
 SAMPLES = 50
-"""Fewer samples are no stream: an alignment has 13 unknowns."""
+"""Fewer samples are no stream: an alignment has 10 unknowns."""
 
 _STENCIL_S = 0.2  # a longer stencil predicts nothing
 
@@ -59,11 +59,6 @@ class MotionStream:
     def of_poses(cls, times_s: Array, poses: Array) -> MotionStream:
         """From world_from_body (N, 4, 4)."""
         return cls(times_s, poses[:, :3, 3], poses[:, :3, :3])
-
-    @property
-    def has_rotations(self) -> bool:
-        """Whether it is a stream of poses."""
-        return self.rotations is not None
 
     @property
     def duration_s(self) -> float:

@@ -10,8 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, told_apart
-from rhot_app.objects.alignment.fit import LASTING_M, SEARCH_S, STEP_S, AlignmentFit, OffsetSearch, align
-from rhot_app.objects.alignment.model import OFFSET, POINT, ROTATION
+from rhot_app.objects.alignment.fit import (
+    LASTING_M,
+    OFFSET,
+    POINT,
+    ROTATION,
+    SEARCH_S,
+    STEP_S,
+    AlignmentFit,
+    OffsetSearch,
+    align,
+)
 from rhot_app.objects.alignment.motion_stream import MotionStream
 
 Array = NDArray[np.float64]
@@ -57,7 +66,7 @@ class Coverage:
 class AlignmentReport:
     """A solved alignment with its coverage and verdict.
 
-    `covariance` (n, n) in the order of `alignment.model.TRANSLATION`, by noise and by errors that last. Of it
+    `covariance` (n, n) in the order of `alignment.fit.TRANSLATION`, by noise and by errors that last. Of it
     `place_sd_m`: of a position in the middle of the motion; `rotation_sd_rad`; `point_sd_m`: of tracker_from_body;
     `offset_sd_s`. `scale`: size of the foreign world in the rig's metres.
     """
@@ -86,7 +95,7 @@ def judge_alignment(fit: AlignmentFit, search: OffsetSearch) -> AlignmentReport:
     coverage, covariance = coverage_of(fit), fit.covariance + fit.lasting
     place, turn, point, offset = (math.sqrt(max(float(np.trace(block)), 0.0)) for block in (
         fit.centre_covariance, covariance[ROTATION, ROTATION], covariance[POINT, POINT], covariance[OFFSET, OFFSET]))
-    findings = [*_match(fit, search), *_rotation(coverage), *_translation(coverage, fit), *_time(coverage, offset, fit),
+    findings = [*_match(fit, search), *_rotation(coverage), *_translation(coverage), *_time(coverage, offset),
                 *_search(search, fit)]
     if not findings:
         findings += _statistics(place, turn, point)
@@ -137,10 +146,8 @@ def _rotation(coverage: Coverage) -> list[Finding]:
                     "Turn the tracker about a second axis as well.")]
 
 
-def _translation(coverage: Coverage, fit: AlignmentFit) -> list[Finding]:
+def _translation(coverage: Coverage) -> list[Finding]:
     """A lasting error e turns the alignment by e / spread; about the longest axis by e over that of the other two."""
-    if fit.poses:
-        return []
     grade = _grade(LASTING_M * REACH_M / max(float(np.linalg.norm(coverage.spread_m[1:])), 1e-9))
     enough = LASTING_M * REACH_M / FAIR_M
     spreads = ", ".join(f"{1e3 * spread:.0f}" for spread in coverage.spread_m)
@@ -155,7 +162,7 @@ def _translation(coverage: Coverage, fit: AlignmentFit) -> list[Finding]:
     return []
 
 
-def _time(coverage: Coverage, offset_sd_s: float, fit: AlignmentFit) -> list[Finding]:
+def _time(coverage: Coverage, offset_sd_s: float) -> list[Finding]:
     """A lasting error e shifts the offset by e / speed."""
     total = max(offset_sd_s, LASTING_M / max(coverage.speed_m_s, 1e-9))
     grade = _grade(total * FAST_M_S)
