@@ -2,7 +2,8 @@
 
 On a slice, the hand's edge is one of the edges found, or none of them (Isard and Blake 1998). Clutter is a Poisson
 process along the slice. An edge is weighted by the probability, at the present state, that it is the hand's. So a slice
-without edges, or with edges of other objects only, changes nothing.
+without edges, or with edges of other objects only, changes nothing. The Jacobian of a contour point is filled where the
+point is found: `contours.contour_on_slices`.
 
 The lengths and radii of the phalanges are uncertain parts of the state (`tracker.PHALANGES`). Two opposite edges then
 determine the axis, and one edge alone is less certain. The surface's error persists while the hand shows the same side,

@@ -105,7 +105,7 @@ class RigArrays:
     `shapes` (M, 3, 3) m^2: the markers' bodies as far as known without the hand's pose, zero for flat ones. `tips`
     (5,): marker index of each finger's tip, -1 without one; `wrist`: the same for the wrist. `band_half_axes`
     (3,) m along the palm's x, y, z; None when the wrist wears no band. `law` (7,): how distance follows from
-    disparity (`estimate.disparity_law`), empty when markers are triangulated. `reach` (M, M) m: the greatest
+    disparity (`disparity_law`), empty when markers are triangulated. `reach` (M, M) m: the greatest
     distance of two markers of the hand, infinite where either is not on the hand.
     """
 

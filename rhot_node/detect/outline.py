@@ -3,7 +3,7 @@
 The outline is a radius at every one of NODES angles about the marker's middle, linear in between, in axes along and
 across the marker in which it is about as long as wide: discs, painted fingertips - rounded, cut or tapered - and bands
 alike. A band bent by its tilt is straightened: along it, BEND sqrt(1 - (across / WIDTH)^2) is taken off
-(`position.band_center`); WIDTH is 0 for what is no band.
+(`band.band_center`); WIDTH is 0 for what is no band.
 A pixel at the signed distance d from it is modelled as
 
     a = out + (in - out) Phi(-d / blur),

@@ -74,3 +74,41 @@ def test_what_is_referred_to_is_there() -> None:
     assert missing(repository, stale) == [f"a.py:1: {nowhere}", f"a.py:2: {elsewhere}",
                                           f"a.py:2: {nowhere}.triangulate", f"a.py:2: tracking/{nowhere}.py"]
     assert not missing(repository, repository.texts)
+
+
+IMPORT = re.compile(r"^\s*from (rhot_\w+(?:\.\w+)*) import ([\w, ]+|\([^)]*\))", re.MULTILINE)
+BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
+FILE = re.compile(r"`((?!rhot_example)(?:[\w-]+/)*[\w-]+\.py)`")  # an example is the reader's own file
+WHERE = re.compile(r"`((?:[\w-]+/)*[\w-]+\.py)`: `(\w+)`")
+
+
+def missing_in_pages(pages: dict[str, str], code: dict[str, str]) -> list[str]:
+    """What the pages import, and files of code that they name, and names in them, which are not there."""
+    found = []
+    for page, text in pages.items():
+        for block in BLOCK.finditer(text):
+            for module, names in IMPORT.findall(block[1]):
+                source = next((code[path] for path in (f"{module.replace('.', '/')}.py",
+                                                       f"{module.replace('.', '/')}/__init__.py") if path in code), "")
+                found += [f"{page}: {module}.{name}" for name in WORD.findall(names)
+                          if not re.search(rf"^(def|class) {name}\b|^\s*{name}\b.*[=:]|import .*\b{name}\b", source,
+                                           re.MULTILINE) and f"{module}/{name}".replace(".", "/") + ".py" not in code]
+        found += [f"{page}: {name}" for name in FILE.findall(text)
+                  if not any(f"/{path}".endswith(f"/{name}") for path in code)]
+        found += [f"{page}: {name} in {file}" for file, name in WHERE.findall(text)
+                  if not any(f"/{path}".endswith(f"/{file}") and re.search(rf"\b{name}\b", PROSE.sub(" ", source))
+                             for path, source in code.items())]
+    return found
+
+
+def test_pages_import_and_name_what_is_there() -> None:
+    code = Repository().texts
+    pages = {str(path.relative_to(ROOT)): path.read_text()
+             for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "rhot_app/ui/README.md")
+             if path.exists() and path.name != "CHANGELOG.md"}
+    stale = "`tracking/locate.py` `nowhere.py` `tracking/locate.py`: `nobody`\n```python\n" \
+            "from rhot_app.tracking.locate import rig_table, nobody\nfrom rhot_app.nowhere import nothing\n```\n"
+    assert missing_in_pages({"page": stale}, code) == [
+        "page: rhot_app.tracking.locate.nobody", "page: rhot_app.nowhere.nothing", "page: nowhere.py",
+        "page: nobody in tracking/locate.py"]
+    assert not missing_in_pages(pages, code)

@@ -3,7 +3,7 @@
 Six markers leave nine of the 27 freedoms open. A filter that linearises anew with every frame sees a slightly different
 null space each time, and becomes overconfident in the open directions (Huang, Mourikis and Roumeliotis 2010). So they
 are reset to the pose prior before every prediction: the markers' places are kept, and the pose is the most probable
-one by these places and the prior.
+one by these places and the prior, within the joint limits: an angle beyond its limit is drawn back to it.
 """
 
 from __future__ import annotations

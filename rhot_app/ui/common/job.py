@@ -23,7 +23,7 @@ class CancelledError(RhotError):
 
 
 class Workers:
-    """A few threads that wait for work. Made before the window gives way (`environment.give_way`): on Linux each thread
+    """A few threads that wait for work. Made before the window gives way (`app.give_way`): on Linux each thread
     has a niceness of its own and hands it down, and the engine that a job starts must not be as nice as the window."""
 
     def __init__(self, count: int = 6) -> None:
