@@ -1,13 +1,16 @@
-"""One camera's frame of fiducial tags or colour markers as arrays, and which image points belong to an object."""
+"""One camera's frame of fiducial tags or colour markers as arrays, and which image points belong to an object.
+Poses that another tracker measured, and their records in logs."""
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.errors import RecordingError
 from rhot_app.objects.object_file import ObjectModel
 from rhot_node.wire.messages import Fiducials
 
@@ -144,3 +147,33 @@ def fiducial_frame(message: Fiducials, camera: int, t_row0_master_ns: int, t_rec
     numbers = np.array([one.covariances for one in message.fiducials], np.float64).reshape(count, 4, 3)
     return FiducialFrame(camera, t_row0_master_ns, message.row_time_ns, keys, corners,
                          numbers[:, :, [0, 1, 1, 2]].reshape(count, 4, 2, 2), t_receive_ns)
+
+
+# -- poses of another tracker in a log (docs/log.md) -------------------------------------------------------------------
+
+_HEAD = struct.Struct("<q12d21d")
+_UPPER = np.triu_indices(6)
+_ORTHONORMAL = 1e-6
+
+
+def encode_pose(pose: MeasuredPose) -> bytes:
+    """The record's data."""
+    return _HEAD.pack(pose.t_ns, *pose.world_from_object[:3].ravel(), *pose.covariance[_UPPER]) + pose.name.encode()
+
+
+def decode_pose(data: bytes) -> MeasuredPose:
+    """Raises RecordingError for what is no pose."""
+    try:
+        t_ns, *numbers = _HEAD.unpack_from(data)
+        name = data[_HEAD.size:].decode()
+    except (struct.error, UnicodeDecodeError) as exc:
+        raise RecordingError("a record of an object's pose is cut or damaged.") from exc
+    world, covariance = np.eye(4), np.empty((6, 6))
+    world[:3] = np.reshape(numbers[:12], (3, 4))
+    covariance[_UPPER] = numbers[12:]
+    covariance.T[_UPPER] = numbers[12:]
+    rotation = world[:3, :3]
+    if (not np.isfinite(numbers).all() or np.abs(rotation @ rotation.T - np.eye(3)).max() > _ORTHONORMAL
+            or (np.linalg.eigvalsh(covariance) <= 0.0).any()):
+        raise RecordingError("a record of an object's pose holds no pose.")
+    return MeasuredPose(name, t_ns, world, covariance)

@@ -54,7 +54,7 @@ class RecordKind(enum.IntEnum):
     STOP = 5  # sent to all nodes, as sent
     GAP = 6  # u32: records that could not be kept because the disk was too slow
     BOOKMARK = 7  # UTF-8 text about a moment (rhot_app.recording.bookmarks)
-    OBJECT_POSE = 8  # of another tracker, in the rig frame (rhot_app.tracking.kinds.poses)
+    OBJECT_POSE = 8  # of another tracker, in the rig frame (rhot_app.objects.observations)
     LANDMARKS = 9  # reserved
     SLICES = 10  # sent to a node, as sent
     REFUSED = 11  # JSON: datagrams of a node that were refused and are not recorded, by reason

@@ -13,11 +13,11 @@ import msgspec
 
 from rhot_app.barehand.observations import SliceRequest
 from rhot_app.errors import RecordingError
+from rhot_app.objects.observations import decode_pose
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, RecordSink
 from rhot_app.sources.node_link import CLOCK_REPLY, RigLinks
 from rhot_app.sources.receiver import Deliver, NodeReceiver, to_nobody
-from rhot_app.tracking.kinds.poses import decode_pose
 from rhot_app.tracking.tracker import CameraFrame
 from rhot_node.errors import WireError
 from rhot_node.files import decode_message

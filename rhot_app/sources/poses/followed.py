@@ -14,14 +14,13 @@ from rhot_app.errors import RhotError
 from rhot_app.estimation.se3 import rotation_from_quaternion, skew
 from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.alignment.alignment_file import Alignment, load_alignment
-from rhot_app.objects.observations import MeasuredPose
+from rhot_app.objects.observations import MeasuredPose, encode_pose
 from rhot_app.objects.pose import Validity
 from rhot_app.project import ObjectPoses, Rig
 from rhot_app.recording.raw_log import RecordKind, RecordSink
 from rhot_app.sources.poses.open_source import open_source
 from rhot_app.sources.poses.source import ForeignPose, PoseSource
 from rhot_app.sources.receiver import Deliver, to_nobody
-from rhot_app.tracking.kinds.poses import encode_pose
 from rhot_node.threads import ANSWER_S, FOREIGN, Worker
 
 log = logging.getLogger(__name__)

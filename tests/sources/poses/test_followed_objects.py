@@ -18,7 +18,7 @@ from rhot_app.estimation.se3 import exp_so3, log_so3, quaternion_from_rotation
 from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.alignment.alignment_file import Alignment, RigidTransform, save_alignment
 from rhot_app.objects.object_file import ObjectModel, SphereShape, cube, save_object
-from rhot_app.objects.observations import MeasuredPose
+from rhot_app.objects.observations import MeasuredPose, decode_pose, encode_pose
 from rhot_app.objects.pose import Validity
 from rhot_app.objects.state import Validity as ObjectValidity
 from rhot_app.project import ObjectPoses, Rig, RigObject, load_rig, save_rig
@@ -28,7 +28,6 @@ from rhot_app.sources.poses.open_source import open_source
 from rhot_app.sources.poses.source import ForeignPose
 from rhot_app.sources.receiver import same_network
 from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.kinds.poses import decode_pose, encode_pose
 from rhot_app.tracking.rig_objects import RigObjects
 from rhot_node.files import resource_path
 
