@@ -87,20 +87,19 @@ class IteratedFilter:
         """Take in `residuals` of the instant `t_s` and return its knot.
 
         `prediction`: what `predict(t_s)` returned, to save doing it again. `initial`: see `update`. An
-        observation from before the oldest knot enters that one.
+        observation from before the oldest knot enters that one, which keeps its label and its residuals.
         """
         place = bisect_right(self.knots, t_s, key=lambda knot: knot.t_s)
-        if place == 0:
-            oldest = self.knots[0]
-            prior = oldest.state, oldest.covariance
-            self.knots[0] = update(self.process, oldest.t_s, prior, residuals, None, self.partial)
-            place = 1
-        else:
+        if place:
             prior = self.predict(t_s) if prediction is None else prediction
             self.knots.insert(place, update(self.process, t_s, prior, residuals, initial, self.partial))
-            place += 1
-        added = self.knots[place - 1]
-        for later in range(place, len(self.knots)):
+        else:
+            oldest = self.knots[0]
+            knot = update(self.process, oldest.t_s, (oldest.state, oldest.covariance), residuals, None, self.partial)
+            self.knots[0] = replace(knot, residuals=[*knot.residuals, *oldest.residuals], label=oldest.label,
+                                    weights=np.concatenate([knot.weights, oldest.weights]))
+        added = self.knots[place]
+        for later in range(place + 1, len(self.knots)):
             before, knot = self.knots[later - 1], self.knots[later]
             prior = self.process.predict(before.state, before.covariance, knot.t_s - before.t_s)
             self.knots[later] = update(self.process, knot.t_s, prior, knot.residuals, None, self.partial)
@@ -127,14 +126,14 @@ def update(process: Process, t_s: float, prior: tuple[Array, Array], residuals: 
         state, away = initial, process.difference(initial, prior[0])
     cross, root, last = np.empty((process.size, 0)), np.empty((0, 0)), (state, away)
     for iteration in range(ITERATIONS):
-        error, jacobian, variances, cost, weights = stack(
+        error, jacobian, variances, cost, weighed = stack(
             [residual.linearise(state) for residual in residuals], process.size, weigh=iteration > 0)
         if not len(error):
             break
-        if iteration > 1 and cost + distance > before:  # the step was too long: half of it
-            state, away, distance = process.retract(last[0], 0.5 * last[1]), away - 0.5 * last[1], 0.5 * distance
-            continue
-        before = cost + distance
+        if iteration > 1 and cost + distance > before:  # the last step was too long: half of it, by its own weights
+            state = process.retract(last[0], 0.5 * last[1])
+            break
+        before, weights = cost + distance, weighed
         cross, root, reached, distance, moved = gauss_newton_step(covariance, jacobian, error, variances, away)
         reached[partial.columns] *= partial.share
         last = (state, reached - away)

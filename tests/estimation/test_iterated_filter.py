@@ -103,6 +103,17 @@ def test_two_observations_older_than_the_oldest_knot_both_count():
     assert_same(estimate.newest, expected.newest)
 
 
+def test_the_oldest_knot_keeps_its_label_and_its_residuals_under_a_later_one():
+    """A smoother weighs the residuals of a knot again."""
+    estimate = given(measurements(), knots=1)
+    oldest, late = estimate.newest, place(2.0, 0.01)
+    oldest.label = "a frame"
+    knot = estimate.add(0.2, [late])
+    assert knot.label == "a frame"
+    assert knot.residuals == [late, *oldest.residuals]
+    assert len(knot.weights) == 1 + len(oldest.weights)
+
+
 def test_starting_again_discards_all_knots():
     estimate = given(measurements())
     estimate.start(5.0, STATE, COVARIANCE)
@@ -220,6 +231,36 @@ def test_iterating_gets_nearer_to_the_mode_of_a_nonlinear_observation(truth):
     curvature = np.linalg.inv(np.linalg.inv(covariance)
                               + np.diag([np.exp(mode[0]) ** 2 / residual.sd**2, 0.0]))
     assert iterated.covariance[0, 0] == pytest.approx(curvature[0, 0], rel=0.3)
+
+
+class Flat:
+    """Two observations of the cube root of the place, of which every Gauss-Newton step is three times too long, and the
+    places where they were linearised."""
+
+    kernel = student(2.0)
+
+    def __init__(self):
+        self.places = []
+
+    def linearise(self, state):
+        self.places.append(state[0])
+        slope = np.cbrt(state[0]) / (3.0 * state[0])
+        return Rows(self.errors(state[0]), np.array([[slope, 0.0], [slope, 0.0]]), np.full(2, 0.01), self.kernel)
+
+    @staticmethod
+    def errors(x):
+        return np.array([0.0, 0.3]) - np.cbrt(x)
+
+
+def test_a_last_step_that_was_too_long_is_halved_and_has_its_own_weights():
+    """Not those where the longer one led to."""
+    residual = Flat()
+    knot = update(ConstantVelocity(), 0.0, (np.array([0.6, 0.0]), np.diag([100.0, 1.0])), [residual])
+    _, before, too_far = residual.places
+    assert knot.state[0] == pytest.approx(0.5 * (before + too_far))
+    weights, there = (residual.kernel.weights(residual.errors(x) ** 2 / 0.01, np.ones(2)) for x in (before, too_far))
+    np.testing.assert_allclose(knot.weights, weights)
+    assert np.abs(weights / there - 1.0).max() > 0.3
 
 
 class Resting:
