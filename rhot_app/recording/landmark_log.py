@@ -11,10 +11,10 @@ import csv
 import io
 import math
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
     FrameHead,
+    FrameMessage,
     HandLandmarks,
     LandmarkedHand,
     MarkerFlag,
@@ -76,6 +77,9 @@ class HandFilm:
 
     times_s: Array
     hands: Sequence[tuple[LandmarkedHand, ...]]
+
+
+Film = TypeVar("Film", LandmarkTable, HandFilm)
 
 
 def read_landmark_table(path: Path, fps: float | None) -> LandmarkTable:
@@ -144,48 +148,40 @@ def write_landmark_log(path: Path, rig: Rig, tables: Sequence[LandmarkTable]) ->
         raise RecordingError(f"rig {rig.name!r} has {len(rig.nodes)} cameras, but the landmark tables are "
                              f"{len(tables)}. Give one table for each, in the rig's order.")
     order = landmark_order(rig)
-
-    def frames(node: RigNode, table: LandmarkTable, times_ns: Times) -> Iterator[Record]:
-        for number, t_ns in enumerate(times_ns.tolist()):
-            yield Record(RecordKind.DATAGRAM, node.node_id, t_ns, encode(Observations(
-                *_head(node, number, t_ns), rig.markers.checksum, _observations(node, order, table, number))))
-
-    return _write(path, rig, [table.times_s for table in tables],
-                  lambda c, times_ns: frames(rig.nodes[c], tables[c], times_ns))
+    return _write(path, rig, tables, lambda node, table, number, head: Observations(
+        *head, rig.markers.checksum, _observations(node, order, table, number)))
 
 
 def write_hand_log(path: Path, rig: Rig, films: Sequence[HandFilm], about: Mapping[str, Any] | None = None) -> int:
     """Write what networks find in one film per node as their nodes would send it; returns the number of frames.
     `about`: what the header says beside. Raises RecordingError when the file cannot be written."""
-    def frames(node: RigNode, film: HandFilm, times_ns: Times) -> Iterator[Record]:
-        for number, t_ns in enumerate(times_ns.tolist()):
-            yield Record(RecordKind.DATAGRAM, node.node_id, t_ns,
-                         encode(HandLandmarks(*_head(node, number, t_ns), film.hands[number])))
-
-    return _write(path, rig, [film.times_s for film in films],
-                  lambda c, times_ns: frames(rig.nodes[c], films[c], times_ns), about)
+    return _write(path, rig, films, lambda node, film, number, head: HandLandmarks(*head, film.hands[number]), about)
 
 
-def _write(path: Path, rig: Rig, times_s: Sequence[Array], frames: Callable[[int, Times], Iterator[Record]],
+def _write(path: Path, rig: Rig, films: Sequence[Film],
+           message: Callable[[RigNode, Film, int, FrameHead], FrameMessage],
            about: Mapping[str, Any] | None = None) -> int:
-    """A log of the `frames` of each camera, which are called for with its number and their master times."""
-    first_s = min(float(times[0]) for times in times_s)
-    times_ns = [FIRST_NS + np.rint(1e9 * (times - first_s)).astype(np.int64) for times in times_s]
+    """A log of what was found in one film per node: `message` says it of frame `number`, with the head of its time."""
+    first_s = min(float(film.times_s[0]) for film in films)
+    times_ns = [FIRST_NS + np.rint(1e9 * (film.times_s - first_s)).astype(np.int64) for film in films]
     frames_ns = np.unique(np.concatenate(times_ns))
     exchanges_ns = _near(np.arange(_BEGIN_NS, frames_ns[-1] + _EXCHANGE_NS, _EXCHANGE_NS), frames_ns).tolist()
     stated = [Record(RecordKind.START, 0, _BEGIN_NS - 1, encode(Start(
         _SESSION, 0, tuple(StartEntry(node.node_id, 1, 0) for node in rig.nodes))))]
-    for c, node in enumerate(rig.nodes):
+    for node, film, times in zip(rig.nodes, films, times_ns, strict=True):
         for sequence, t_ns in enumerate(exchanges_ns):
             stated += _exchange(node, sequence, t_ns)
-        stated += frames(c, times_ns[c])
+        lens = node.intrinsics
+        for number, t_ns in enumerate(times.tolist()):
+            head = node.node_id, _SESSION, number, t_ns, t_ns, 0, 0, 0, lens.width, lens.height, number
+            stated.append(Record(RecordKind.DATAGRAM, node.node_id, t_ns, encode(message(node, film, number, head))))
     try:
         with replacing(path) as file:
             file.writelines(encode_log(rig, {**begun_now(_BEGIN_NS), "created_t_master_ns": None, **(about or {})},
                                        sorted(stated, key=lambda record: record.t_master_ns)))
     except OSError as exc:
         raise RecordingError(f"{path}: cannot be written ({exc.strerror}). Choose another --out.") from exc
-    return sum(len(times) for times in times_s)
+    return sum(len(times) for times in times_ns)
 
 
 def _near(times_ns: Times, frames_ns: Times) -> Times:
@@ -204,11 +200,6 @@ def _exchange(node: RigNode, sequence: int, t_ns: int) -> list[Record]:
     reply = ClockReply(node.node_id, _SESSION, sequence, t_ns, heard_ns, heard_ns, 1, NodeState.STREAMING)
     return [Record(RecordKind.CLOCK_REQUEST, node.node_id, t_ns, encode(request)),
             Record(RecordKind.CLOCK_REPLY, node.node_id, t_ns + 2 * _BOUND_NS, encode(reply))]
-
-
-def _head(node: RigNode, number: int, t_ns: int) -> FrameHead:
-    lens = node.intrinsics
-    return node.node_id, _SESSION, number, t_ns, t_ns, 0, 0, 0, lens.width, lens.height, number
 
 
 def _observations(node: RigNode, order: list[int], table: LandmarkTable, number: int) -> tuple[MarkerObservation, ...]:
