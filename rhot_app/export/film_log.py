@@ -43,6 +43,7 @@ def log_films(rig_file: Path | None, films: Sequence[ChosenFilm], log: Path, *,
     """
     # numerical code, for which no window should wait
     from rhot_app.export.landmark_track import (
+        LandmarkRun,
         assumed_rig,
         landmark_rig_of,
         landmark_sentences,
@@ -64,6 +65,6 @@ def log_films(rig_file: Path | None, films: Sequence[ChosenFilm], log: Path, *,
     rig = landmark_rig_of(rig, tuple(film.camera for film in films))
     videos = on_one_clock(open_videos(rig, {film.camera: str(film.path) for film in films}, None),
                           {film.camera: film.offset_s for film in films})
-    summary = track_landmarks(rig, videos, either_side=rig_file is None, kept=log, again=True, progress=progress)
+    summary = track_landmarks(rig, videos, LandmarkRun(either_side=rig_file is None, kept=log, again=True), progress)
     return [*said, *landmark_sentences(summary.document() | {"out": None, "overlay": None, "log": str(log),
                                                     "hand_file": None})]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -31,7 +31,7 @@ from rhot_app.export.recording import one_of_each_instant
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
 from rhot_app.hand.landmarks import DISAGREEMENT_M
-from rhot_app.progress import Progress, silent
+from rhot_app.progress import Progress, silent, within
 from rhot_app.project import Intrinsics, Rig, RigNode, landmark_markers
 from rhot_app.recording.landmark_log import FIRST_NS, HandFilm, landmark_order, write_hand_log
 from rhot_app.recording.raw_log import FILMS, LogReader, filmed_at
@@ -159,30 +159,39 @@ def _measured_hand(rig: Rig, times_s: NDArray[np.float64], positions: NDArray[np
     return hand, f"Bones measured from the landmarks. {report.verdict.sentence}"
 
 
-def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: bool = False, measure: bool = True,
-                    unknown_size: bool = False, smooth: bool = False, out: Path | None = None,
-                    pictures: Path | None = None, kept: Path | None = None, again: bool = False,
-                    hand_file: Path | None = None, progress: Progress = silent) -> LandmarkSummary:
-    """Track the hands of `rig`, whose nodes are the videos' cameras in their order.
+@dataclass(frozen=True, slots=True)
+class LandmarkRun:
+    """How the hands of films are tracked, and which files are written; they appear when they are whole.
 
     `either_side`: the hand is a shipped one of the side that the networks find more often. `measure`: measure the
-    hands' bones first, and use them if they can be a hand's. `unknown_size`: where they are not
-    measured, estimate the hands' size. `out`: a table of the states (docs/export.md), one of every frame set, whose
-    times are the film's. `pictures`: an .avi or .mp4 file, or a folder of PNG files, with the landmarks and the hands.
-    `hand_file`: where the rig's hand is written with its measured bones; what was there is kept beside it, and a loss
-    is noted where they were not measured (`errors.note_loss`). `kept`: a raw log of what the networks found, with the
-    rig that was tracked and the names of the films, which is replayed and exported as any other. Files appear when they
-    are whole. Raises KeypointError without networks, RecordingError, ExportError, RigError.
+    hands' bones first, and use them if they can be a hand's. `unknown_size`: where they are not measured, estimate the
+    hands' size. `out`: a table of the states (docs/export.md), one of every frame set, whose times are the film's.
+    `pictures`: an .avi or .mp4 file, or a folder of PNG files, with the landmarks and the hands. `kept`: a raw log of
+    what the networks found, with the rig that was tracked and the names of the films, which is replayed and exported as
+    any other. `hand_file`: where the rig's hand is written with its measured bones; what was there is kept beside it,
+    and a loss is noted where they were not measured (`errors.note_loss`). `again`: files that exist are replaced.
     """
-    check_outputs(videos, out, pictures, again, hand_file, kept)
-    begun, share, base = time.perf_counter(), 0.9 / len(videos), rig
-    films = []
-    for number, video in enumerate(videos):
-        def report(text: str, part: float, number: int = number) -> None:
-            progress(text, share * (number + part))
 
-        films.append(find_hands(video, report))
-    if either_side:
+    either_side: bool = False
+    measure: bool = True
+    unknown_size: bool = False
+    smooth: bool = False
+    out: Path | None = None
+    pictures: Path | None = None
+    kept: Path | None = None
+    hand_file: Path | None = None
+    again: bool = False
+
+
+def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], run: LandmarkRun,
+                    progress: Progress = silent) -> LandmarkSummary:
+    """Track the hands of `rig`, whose nodes are the videos' cameras in their order. Raises KeypointError without
+    networks, RecordingError, ExportError, RigError."""
+    check_outputs(videos, run.out, run.pictures, run.again, run.hand_file, run.kept)
+    begun, share, base = time.perf_counter(), 0.9 / len(videos), rig
+    films = [find_hands(video, within(progress, share * number, share * (number + 1)))
+             for number, video in enumerate(videos)]
+    if run.either_side:
         rig = base = msgspec.structs.replace(rig, hand=load_hand(resource_path("hands", f"{_side_of(films)}.json")))
     first_s, half_s = min(float(film.times_s[0]) for film in films), 0.5e-9 * min(one.period_ns for one in videos)
     bones = "The bones are the rig's."
@@ -190,39 +199,31 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: boo
         log = Path(folder) / videos[0].path.with_suffix(".rhotlog").name
         write_hand_log(log, rig, films)
         still = any(video.still for video in videos)
-        if measure:
+        if run.measure:
             progress("measuring the bones", 0.9)
             rig, bones = with_measured_bones(rig, log)
             if still and len(videos) > 1:
                 bones += " They are of one picture: their spread says nothing."
-        if unknown_size and rig.hand == base.hand:
+        if run.unknown_size and rig.hand == base.hand:
             rig = msgspec.structs.replace(rig, tracker=msgspec.structs.replace(rig.tracker, float_scale=True))
-        if kept is not None:
-            write_hand_log(kept, rig, films, {FILMS: _names(videos, films, first_s), **_taken(videos, films, first_s)})
+        if run.kept is not None:
+            write_hand_log(run.kept, rig, films,
+                           {FILMS: _names(videos, films, first_s), **_taken(videos, films, first_s)})
         progress("tracking", 0.92)
         seen = _seen(rig, log)
-        states = list(one_of_each_instant(states_of_log(rig, log, smooth), round(1e9 * half_s)))
+        states = list(one_of_each_instant(states_of_log(rig, log, run.smooth), round(1e9 * half_s)))
         figures = summarise(rig, states)
     times_s = np.array([first_s + 1e-9 * (state.t_master_ns - FIRST_NS) for state in states])
     with contextlib.ExitStack() as stack:
-        if out is not None:
+        if run.out is not None:
             zero_ns = FIRST_NS - round(1e9 * first_s)
-            table = stack.enter_context(open_table(rig, videos[0].path.name, out, zero_ns))
+            table = stack.enter_context(open_table(rig, videos[0].path.name, run.out, zero_ns))
             for state in states:
                 table.add(state)
             table.finish()
-        if pictures is not None:
-            drawn = stack.enter_context(whole_pictures(pictures, 1e9 / min(video.period_ns for video in videos)))
-            cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
-            for frames in frame_sets(videos):
-                state = states[int(np.argmin(np.abs(times_s - 1e-9 * frames.first_ns)))]
-                hands = [state] if state.other is None else [state, state.other]
-
-                def draw(c: int, picture: Image, t_ns: Sequence[int] = frames.t_ns,
-                         hands: Sequence[HandState] = hands) -> Image:
-                    nearest = int(np.argmin(np.abs(films[c].times_s - 1e-9 * t_ns[c])))
-                    return _with_hands(cameras[c], picture, films[c].hands[nearest], hands)
-                drawn.add(side_by_side(cameras, frames.images, " ".join(hand.condition.value for hand in hands), draw))
+        if run.pictures is not None:
+            drawn = stack.enter_context(whole_pictures(run.pictures, 1e9 / min(video.period_ns for video in videos)))
+            _draw_hands(drawn.add, rig, videos, films, states, times_s)
     spent = [(round(1e9 * t), state.tracked) for t, state in zip(times_s, states, strict=True)]
     lost = tuple((1e-9 * spent[0][0] + begin, 1e-9 * spent[0][0] + end) for begin, end in lost_intervals(spent))
     return LandmarkSummary(
@@ -235,8 +236,23 @@ def track_landmarks(rig: Rig, videos: Sequence[CameraVideo], *, either_side: boo
                  for video, film, own in zip(videos, films, seen, strict=True)},
         bones=bones, side=rig.hand.side, seconds=time.perf_counter() - begun, left_out=frames_left_out(videos),
         figures=figures,
-        adapted=hand_file is not None and _adapted(
-            hand_file, rig.hand, rig.hand != base.hand and not still, bones))
+        adapted=run.hand_file is not None and _adapted(
+            run.hand_file, rig.hand, rig.hand != base.hand and not still, bones))
+
+
+def _draw_hands(add: Callable[[Image], object], rig: Rig, videos: Sequence[CameraVideo], films: Sequence[HandFilm],
+                states: Sequence[HandState], times_s: NDArray[np.float64]) -> None:
+    """Add a picture of each frame set with its landmarks, and the hands of the state nearest in time (`times_s`)."""
+    cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
+    for frames in frame_sets(videos):
+        state = states[int(np.argmin(np.abs(times_s - 1e-9 * frames.first_ns)))]
+        hands = [state] if state.other is None else [state, state.other]
+
+        def draw(c: int, picture: Image, t_ns: Sequence[int] = frames.t_ns,
+                 hands: Sequence[HandState] = hands) -> Image:
+            nearest = int(np.argmin(np.abs(films[c].times_s - 1e-9 * t_ns[c])))
+            return _with_hands(cameras[c], picture, films[c].hands[nearest], hands)
+        add(side_by_side(cameras, frames.images, " ".join(hand.condition.value for hand in hands), draw))
 
 
 def _names(videos: Sequence[CameraVideo], films: Sequence[HandFilm], first_s: float) -> Any:

@@ -82,6 +82,7 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
     for path in paths if rig is not None or len(paths) == 1 else ():
         input_file(path)  # refused before numba is loaded
     from rhot_app.export.landmark_track import (
+        LandmarkRun,
         assumed_rig,
         landmark_rig_of,
         landmark_sentences,
@@ -105,10 +106,10 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
     videos = opened_videos(args, rig, given, offsets)
     announce_compilation()
     line = ProgressLine("tracking")
-    summary = track_landmarks(rig, videos, either_side=args.rig is None, measure=args.bones == "measured",
-                              unknown_size=args.unknown_size, smooth=args.smooth, out=args.out,
-                              pictures=args.overlay, kept=args.log, again=args.force, hand_file=args.adapt,
-                              progress=line.report)
+    summary = track_landmarks(rig, videos, LandmarkRun(
+        either_side=args.rig is None, measure=args.bones == "measured", unknown_size=args.unknown_size,
+        smooth=args.smooth, out=args.out, pictures=args.overlay, kept=args.log, hand_file=args.adapt,
+        again=args.force), line.report)
     line.finish()
     if args.rig is None:
         said.append(f"The networks find mostly {summary.side} hands, so a {summary.side} hand is tracked.")
