@@ -10,7 +10,7 @@ import pytest
 from patience import eventually
 
 from rhot_app.sources.cameras.camera_set import CameraSource
-from rhot_app.sources.cameras.preview import CameraPreview, fault_of
+from rhot_app.sources.cameras.camera_source import CameraPreview, fault_of
 from rhot_node.capture.camera import EndOfRecording, Frame
 from rhot_node.detect.image import YuvImage, from_bgr
 from rhot_node.errors import CameraError

@@ -27,8 +27,7 @@ from PySide6.QtWidgets import (
 
 from rhot_app.errors import SourceError
 from rhot_app.sources.cameras.camera_set import NONE_FOUND, CameraSource, Prepared, Side, names_of, prepare
-from rhot_app.sources.cameras.camera_source import check_source, source_of
-from rhot_app.sources.cameras.preview import CameraPreview
+from rhot_app.sources.cameras.camera_source import CameraPreview, check_source, source_of
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
