@@ -127,7 +127,7 @@ def _ask(addresses: Sequence[NodeAddress], request: dict[str, Any], kind: type[T
     try:
         for address in addresses:
             try:
-                client = Client(context, f"tcp://{address}", longest=_ANSWER_MAX)
+                client = Client(context, f"tcp://{address}", longest=_ANSWER_MAX, once=True)
                 clients[address] = client, msgspec.json.encode(request)
             except (zmq.ZMQError, UnicodeError) as exc:
                 found[address] = PairingError(f"{str(address)!r} is not an address that can be asked ({exc}).")

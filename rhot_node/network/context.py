@@ -49,17 +49,20 @@ class Context(zmq.Context["zmq.Socket[bytes]"]):
 
 
 class Client:
-    """Requests to a node, and its answers. Never waits; nothing is queued for a node that is not there, to reach it
-    much later. One thread."""
+    """Requests to a node, and its answers. Never waits. One thread."""
 
     def __init__(self, context: Context, endpoint: str, own: KeyPair | None = None, node_key: str = "", *,
-                 kind: int = zmq.DEALER, longest: int = -1) -> None:
+                 kind: int = zmq.DEALER, longest: int = -1, once: bool = False) -> None:
         """With keys it talks encrypted to the holder of `node_key` and nobody else. `kind`: of the socket. `longest`:
-        bytes of a message part that ends the connection when it is longer, -1: none does. Raises zmq.ZMQError,
-        UnicodeError; nothing stays open then."""
+        bytes of a message part that ends the connection when it is longer, -1: none does.
+
+        Nothing is queued for a node that is not there, to reach it much later; but an answer is then lost when the
+        connection ends before it is read. `once`: for one request, which is queued, and whose answer is not lost.
+        Raises zmq.ZMQError, UnicodeError; nothing stays open then.
+        """
         self.socket = socket = context.socket(kind)
         socket.setsockopt(zmq.RECONNECT_IVL, _RECONNECT_MS)
-        socket.setsockopt(zmq.IMMEDIATE, 1)
+        socket.setsockopt(zmq.IMMEDIATE, int(not once))
         socket.setsockopt(zmq.RCVHWM, _ANSWERS_QUEUED)
         socket.maxmsgsize = longest
         if own is not None and node_key:
