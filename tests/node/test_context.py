@@ -10,7 +10,7 @@ from pathlib import Path
 import zmq
 from patience import PATIENCE_S
 
-from rhot_node.network.context import Context
+from rhot_node.network.context import Client, Context, ask_all
 
 ROOT = Path(__file__).parents[2]
 
@@ -50,6 +50,26 @@ def test_one_that_is_closed_waits_for_no_answer(tmp_path):
     context = Context()
     speak_to_nobody(context, tmp_path / "nobody")
     assert ends(context.destroy)
+
+
+def test_an_answer_arrives_although_the_connection_ends_behind_it():
+    def answer_and_go(server):
+        if server.poll(round(1e3 * PATIENCE_S)):
+            server.recv()
+            server.send(b"yes")
+        server.close()
+
+    for _ in range(40):
+        context = Context()
+        server = context.socket(zmq.REP)
+        port = server.bind_to_random_port("tcp://127.0.0.1")
+        server.setsockopt(zmq.LINGER, -1)
+        thread = threading.Thread(target=answer_and_go, args=(server,))
+        thread.start()
+        client = Client(context, f"tcp://127.0.0.1:{port}", once=True)
+        assert ask_all([(client, b"?")], PATIENCE_S) == [[b"yes"]]
+        thread.join()
+        context.destroy()
 
 
 def test_no_other_kind_is_made():
