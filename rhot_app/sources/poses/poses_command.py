@@ -84,12 +84,13 @@ def figures(poses: Sequence[ForeignPose]) -> dict[str, Any]:
     import numpy as np
 
     from rhot_app.objects.pose import Validity
-    from rhot_app.objects.stream import SAMPLES, PoseMeasurement, noise_of
-    from rhot_app.objects.track import ObjectTrack
+    from rhot_app.objects.stream import SAMPLES, noise_of
+    from rhot_app.sources.poses.source import PoseGate
 
-    tracked, track = [pose for pose in poses if pose.validity is Validity.TRACKED], ObjectTrack("tracker")
-    accepted = [track.take(PoseMeasurement(pose.t_master_ns, pose.world_from_body, pose.covariance))
-                for pose in tracked]
+    tracked = [pose for pose in poses if pose.validity is Validity.TRACKED]
+    gate = PoseGate("tracker")
+    for pose in tracked:
+        gate.take(pose)
     times_s = 1e-9 * np.array([pose.t_master_ns for pose in tracked], dtype=np.float64)
     steps_s = np.diff(times_s)
     sd = np.full(6, np.nan)
@@ -98,7 +99,7 @@ def figures(poses: Sequence[ForeignPose]) -> dict[str, Any]:
     return {"poses": len(poses), "tracked": len(tracked), "seconds": float(times_s[-1] - times_s[0]),
             "rate_hz": float((len(times_s) - 1) / (times_s[-1] - times_s[0])),
             "jitter_ms": 1e3 * float(np.std(steps_s)), "longest_gap_ms": 1e3 * float(steps_s.max()),
-            "rejected_ratio": accepted.count(False) / len(accepted),
+            "rejected_ratio": gate.rejected_ratio,
             "noise_mm": 1e3 * float(sd[0]) if len(tracked) >= SAMPLES else None,
             "noise_deg": float(np.degrees(sd[3])) if len(tracked) >= SAMPLES else None}
 

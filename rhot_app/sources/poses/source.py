@@ -1,4 +1,4 @@
-"""What a source of another tracker's poses offers, its noise, and a file as such a source."""
+"""What a source of another tracker's poses offers, its noise and its gate, and a file as such a source."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.objects.pose import Validity
-from rhot_app.objects.stream import PoseStream, noise_of, read_pose_stream
+from rhot_app.objects.stream import PoseMeasurement, PoseStream, noise_of, read_pose_stream
+from rhot_app.objects.track import ObjectState, ObjectTrack
 
 Array = NDArray[np.float64]
 
@@ -84,6 +85,32 @@ class StreamNoise:
             self._fresh = 0
             self.covariance = noise_of(np.array([pose for _, pose in self._samples]))
         return self.covariance
+
+
+class PoseGate:
+    """Rejects outliers by the innovation gate of tracked objects (`objects.track`), and filters the others."""
+
+    def __init__(self, name: str) -> None:
+        self._track = ObjectTrack(name)
+        self.offered = self.rejected = 0
+
+    def take(self, pose: ForeignPose) -> bool:
+        """Weigh a pose; whether it was accepted. One that is not TRACKED never is, and does not count."""
+        if pose.validity is not Validity.TRACKED:
+            return False
+        accepted = self._track.take(PoseMeasurement(pose.t_master_ns, pose.world_from_body, pose.covariance))
+        self.offered += 1
+        self.rejected += not accepted
+        return accepted
+
+    @property
+    def rejected_ratio(self) -> float:
+        """Share of the tracked poses that were rejected; 0 of none."""
+        return self.rejected / self.offered if self.offered else 0.0
+
+    def state(self, t_master_ns: int) -> ObjectState:
+        """The filtered state, in the other tracker's world."""
+        return self._track.state(t_master_ns)
 
 
 class FilePoses:
