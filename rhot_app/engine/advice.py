@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rhot_app.calibration.check.camera_calibration import NOT_CALIBRATED, calibration_finding, times_unknown
+from rhot_app.calibration.registry import STEREO
 from rhot_app.engine.node_meter import RECENT_NS, Recent
 from rhot_app.engine.status import Advice, Level, NodeStatus
 from rhot_app.project import Intrinsics, Rig
@@ -268,7 +269,7 @@ def one_camera_advice(rig: Rig) -> list[Advice]:
     if len(used) > 1 and not apart:
         return []
     names, by = " and ".join(apart), " and ".join(node.name for node in used)
-    mender = "stereo" if apart else ""
+    mender = STEREO.name if apart else ""
     if len(used) == 1 and rig.painted and rig.tracker.observe == "markers" and rig.tracker.palm_plane is None:
         remedy = f"Put {names} together with it" if apart else "Add a second camera"
         return [Advice("info", f"{by} alone does not find a hand by painted markers. {remedy}, or track a bare hand.",

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.follower import HandFollower
 from rhot_app.barehand.overlay import overlay
+from rhot_app.calibration.registry import ADAPTED
 from rhot_app.errors import ExportError, RecordingError, note_loss
 from rhot_app.export.export import check_place, format_of, make_writer, whole_file
 from rhot_app.export.pictures import check_pictures, side_by_side, whole_pictures
 from rhot_app.export.plan import Plan
 from rhot_app.export.states import BLOCK, states_of
-from rhot_app.handfit.adaptation import REASON, Adapted, adapt
+from rhot_app.handfit.adaptation import Adapted, adapt
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
 from rhot_app.rig_history import accept_hand, require_hand_place
@@ -129,7 +130,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
     if hand_file is not None and run.key_frames.sufficient:
         adapted = adapt(rig.hand, run.key_frames.kept)
         if adapted.verdict.acceptable:
-            accept_hand(hand_file, adapted.hand, REASON)
+            accept_hand(hand_file, adapted.hand, ADAPTED.reason)
         else:
             note_loss(str(hand_file), f"{hand_file}: not written. {adapted.verdict.findings[0].sentence}")
             adapted = None

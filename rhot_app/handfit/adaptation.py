@@ -41,7 +41,6 @@ from rhot_app.handfit.hand_shape import SHAPE_LIMIT, SIZE, Shapes
 
 Array = NDArray[np.float64]
 
-REASON = "hand adapted while it was tracked"
 """In the history of a hand file or a rig."""
 
 EDGE_SD_PX = 4.0, 2.0, 1.0

@@ -79,7 +79,7 @@ def _advice_notice(advice: Advice) -> Notice:
     if wizard is None:
         return Notice(advice.level, advice.text, lasting=advice.lasting, subject=advice.subject)
     action = "Calibrate …" if advice.lasting else f"{wizard.title} …"
-    return Notice(advice.level, advice.text, action, f"{OPEN_WIZARD}{wizard.module}", advice.lasting,
+    return Notice(advice.level, advice.text, action, f"{OPEN_WIZARD}{wizard.name}", advice.lasting,
                   advice.subject)
 
 

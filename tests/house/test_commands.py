@@ -17,7 +17,8 @@ import pytest
 
 from rhot_app.__main__ import SUBCOMMANDS, parse
 from rhot_app.__main__ import main as rhot
-from rhot_app.calibration.calibrate_command import ALIASES, FILES, KINDS
+from rhot_app.calibration.calibrate_command import FILES
+from rhot_app.calibration.registry import COMMANDS as CALIBRATING
 from rhot_app.ui.wizards.framework.plan import WIZARDS
 from rhot_node.__main__ import daemon_parser
 from rhot_node.commands import COMMANDS, parser_of
@@ -150,7 +151,7 @@ def test_a_program_starts_as_a_module(module: str) -> None:
 
 
 EVERY_COMMAND = ("rhot", *(f"rhot {name}" for name in SUBCOMMANDS),
-                 *(f"rhot calibrate {kind}" for kind in KINDS | FILES),
+                 *(f"rhot calibrate {kind}" for kind in (command.word for command in (*CALIBRATING, *FILES))),
                  "rhot-node", *(f"rhot-node {name}" for name in COMMANDS))
 
 
@@ -180,7 +181,8 @@ def test_help_ends_with_two_examples_that_are_valid(command: str, tmp_path: Path
             daemon_parser().parse_args(arguments)
 
 
-@pytest.mark.parametrize(("word", "kind"), ALIASES.items())
+@pytest.mark.parametrize(("word", "kind"), [(alias, command.word) for command in CALIBRATING
+                                            for alias in command.aliases])
 def test_a_calibration_has_one_name_and_its_former_ones_still_run_it(
         word: str, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Each refuses to begin without its input."""
@@ -195,7 +197,7 @@ def test_a_calibration_has_one_name_and_its_former_ones_still_run_it(
 def test_wizards_and_commands_call_a_calibration_by_one_name() -> None:
     """Every kind of `rhot calibrate` is a word of its wizard's title, and no former title is left in the documents."""
     titles = " ".join(wizard.title.lower() for wizard in WIZARDS)
-    assert [kind for kind in KINDS if kind not in titles] == []
+    assert [command.word for command in CALIBRATING if command.word not in titles] == []
     told = " ".join(path.read_text() for path in (ROOT / "docs").rglob("*.md"))
     assert not re.findall(r"put the cameras together|find the lens", told, re.IGNORECASE)
 

@@ -79,7 +79,7 @@ class Opener:
 
 
 def wizard(one: Wizard) -> Opener:
-    return Opener(one.module, lambda window: window.wizards.open(one), lambda window: window.wizards.wizard)
+    return Opener(one.name, lambda window: window.wizards.open(one), lambda window: window.wizards.wizard)
 
 
 def dialog(name: str, open_: Callable[[MainWindow], Any]) -> Opener:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.registry import BONES, COLOURS, STEREO, TIME
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import FINGERS, TIP_ROLES, WRIST_ROLE
@@ -39,15 +39,12 @@ WEAK_QUALITY = 0.45
 
 DOUBLED_PART = 0.3
 
-Mender = Literal["lens", "stereo", "time", "bones", "colours"]
-"""The calibration that mends a finding, named as its wizard; `lens` is ``rhot calibrate intrinsics``."""
-
 
 @dataclass(frozen=True, slots=True)
 class HealthFinding:
-    """A finding and the calibration that mends it."""
+    """A finding and the name of the calibration that mends it (`calibration.registry`)."""
 
-    mender: Mender
+    mender: str
     finding: Finding
 
 
@@ -113,13 +110,13 @@ def findings_of(figures: HealthFigures) -> tuple[HealthFinding, ...]:
 def _geometry(figures: HealthFigures) -> list[HealthFinding]:
     error, slow, fast = figures.errors_px
     if slow < FAIR_ERROR_PX < fast and fast > 2.0 * slow:
-        return [HealthFinding("time", Finding(
+        return [HealthFinding(TIME.name, Finding(
             "late_camera", Grade.FAIR, f"Rays of fast markers miss each other by {fast:.1f} px, of slow ones by "
             f"{slow:.1f} px only.", "One camera's times are off.",
             "Calibrate the cameras' times with a waving hand (Calibrate menu)."))]
     if not error > FAIR_ERROR_PX:
         return []
-    return [HealthFinding("stereo", Finding(
+    return [HealthFinding(STEREO.name, Finding(
         "stale_geometry", Grade.POOR if error > POOR_ERROR_PX else Grade.FAIR,
         f"The cameras' rays miss each other by {error:.1f} px.", figures.misfit,
         "Do the stereo calibration with a board (Calibrate menu)."))]
@@ -131,7 +128,7 @@ def _rigid(figures: HealthFigures) -> list[HealthFinding]:
         return []
     figure = (f"{' and '.join(worst.markers)} sit on one bone; they were {1e3 * worst.learnt_m:.1f} mm apart and are "
               f"{1e3 * worst.now_m:.1f} mm now.")
-    return [HealthFinding("bones", Finding(
+    return [HealthFinding(BONES.name, Finding(
         "rigid_drift", Grade.FAIR, figure, "A marker slipped, or a camera was moved.",
         "Press the markers on and measure the hand again (Calibrate menu)."))]
 
@@ -146,7 +143,8 @@ def _reach(figures: HealthFigures) -> list[HealthFinding]:
     cause = "It sits elsewhere than the rig says, something else has its colour, or a camera was turned."
     if len(far) > 1:
         cause = "This hand is larger than the hand file says, or the rig's cameras stand further apart than it says."
-    return [HealthFinding("bones", Finding("reach", Grade.FAIR, figure, cause, "Measure this hand (Calibrate menu)."))]
+    remedy = "Measure this hand (Calibrate menu)."
+    return [HealthFinding(BONES.name, Finding("reach", Grade.FAIR, figure, cause, remedy))]
 
 
 def _weak(figures: HealthFigures) -> list[HealthFinding]:
@@ -155,7 +153,7 @@ def _weak(figures: HealthFigures) -> list[HealthFinding]:
         return []
     worst = min(weak, key=lambda one: one.quality)
     names = ", ".join(dict.fromkeys(one.marker for one in weak))
-    return [HealthFinding("colours", Finding(
+    return [HealthFinding(COLOURS.name, Finding(
         "weak_colour", Grade.FAIR, f"The colour of {names} is hardly told from its surroundings (quality "
         f"{worst.quality:.2f} in camera {worst.camera}).", "The light has changed, or the paint is dirty.",
         "Give more light, or learn the colours again (Calibrate menu)."))]
@@ -166,7 +164,7 @@ def _doubled(figures: HealthFigures) -> list[HealthFinding]:
                 default=None)
     if worst is None:
         return []
-    return [HealthFinding("colours", Finding(
+    return [HealthFinding(COLOURS.name, Finding(
         "doubled_colour", Grade.FAIR, f"In {100 * worst.ambiguous:.0f} % of its pictures camera {worst.camera} sees "
         f"something else in the colour of {worst.marker}.", "",
         "Take it out of the picture, or choose another paint (Calibrate menu)."))]

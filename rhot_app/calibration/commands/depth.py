@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
+from rhot_app.calibration.registry import DEPTH
 from rhot_app.errors import CalibrationError, input_file, positive_number
 from rhot_node.terminal import add_examples
 
@@ -55,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     verdict, written = report.verdict, ""
     if rig is not None and args.out is not None and verdict.acceptable:
         verdict = judged_anew(verdict, replaced_calibration(rig))
-        accept(args.out, msgspec.structs.replace(rig, depth=report.settings), "depth calibration")
+        accept(args.out, msgspec.structs.replace(rig, depth=report.settings), DEPTH.reason)
         written = str(args.out)
     return show(_fields(report), _lines(report), verdict, as_json=args.json, written=written)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.calibration.registry import FILTERS
 from rhot_app.errors import CalibrationError, input_file, positive_number
 from rhot_node.terminal import add_examples
 
@@ -49,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     line.finish()
     choice, written = report.choice(per_marker=args.per_marker), ""
     if args.out is not None and choice.verdict.acceptable:
-        accept(args.out, report.apply(rig, per_marker=args.per_marker), "filter tuning")
+        accept(args.out, report.apply(rig, per_marker=args.per_marker), FILTERS.reason)
         written = str(args.out)
     return show(_fields(report, choice), _lines(report, choice), choice.verdict, as_json=args.json, written=written)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
+from rhot_app.calibration.registry import LENS
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         save_intrinsics(args.out, report)
         written.append(str(args.out))
     if report.verdict.acceptable and rig is not None:
-        accept(args.rig, with_lens(rig, args.node, report.intrinsics), f"intrinsics of {args.node}")
+        accept(args.rig, with_lens(rig, args.node, report.intrinsics), f"{LENS.reason} {args.node}")
         written.append(str(args.rig))
     return show(fields_of(report), lines_of(report), report.verdict, as_json=args.json, written=", ".join(written))
 

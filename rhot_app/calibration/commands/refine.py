@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
+from rhot_app.calibration.registry import REFINED
 from rhot_app.errors import CalibrationError, RecordingError, RhotError, input_file
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
@@ -40,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.project import load_rig
     from rhot_app.recording.raw_log import LogReader
     from rhot_app.rig_history import accept
-    from rhot_app.tracking.refinement.refined_rig import REASON, Scale, figure_rows, refined_rig, verdict_of
+    from rhot_app.tracking.refinement.refined_rig import Scale, figure_rows, refined_rig, verdict_of
 
     if args.use and (args.rig is None or args.out is not None):
         raise CalibrationError("--use writes to the file that --rig names; give it, and leave --out away.")
@@ -56,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     verdict = verdict_of(found, rig.nodes[0].name, scale)
     written = ""
     if target is not None and verdict.acceptable and not found.holds:
-        accept(target, refined, REASON)
+        accept(target, refined, REFINED.reason)
         written = str(target)
     rows = figure_rows(found, scale)
     wide = max(len(what) for what, _, _ in rows)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
+from rhot_app.calibration.registry import STEREO
 from rhot_app.errors import CalibrationError, finite, positive_number
 from rhot_node.terminal import add_examples
 
@@ -158,7 +159,7 @@ def run(args: argparse.Namespace) -> int:
         verdict = rig_verdict(report, rig, frame)
     written = ""
     if rig is not None and args.out is not None and verdict.acceptable:
-        accept(args.out, rig, "stereo calibration")
+        accept(args.out, rig, STEREO.reason)
         written = str(args.out)
     return show(fields_of(report, frame), lines_of(report, frame), verdict, as_json=args.json, written=written)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.calibration.registry import TIME
 from rhot_app.errors import input_file
 from rhot_node.terminal import add_examples
 
@@ -41,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     line.finish()
     written = ""
     if args.out is not None and report.verdict.acceptable:
-        accept(args.out, report.apply(rig), "time calibration")
+        accept(args.out, report.apply(rig), TIME.reason)
         written = str(args.out)
     return show(_fields(report, rig), _lines(report), report.verdict, as_json=args.json, written=written)
 

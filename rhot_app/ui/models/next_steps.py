@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rhot_app.calibration.check.camera_calibration import calibration_finding, times_text, times_unknown
+from rhot_app.calibration.registry import ADAPTED, BONES, COLOURS, LENS, MEASURED, STEREO, TIME
 from rhot_app.hand.anatomy import is_shipped
 from rhot_app.project import Rig
 
@@ -14,7 +15,7 @@ Wear = Literal["paint", "bare", "landmarks"]
 """What shows the hand: painted or taped markers; a bare hand, by the networks; landmarks or nodes of one's own."""
 
 CAMERAS, TRACKER, NETWORKS, BOARD = "cameras", "tracker", "networks", "board"
-"""Actions that are no wizard; the others are the modules of `wizards.framework.plan.WIZARDS`."""
+"""Actions that are no wizard; the others are names of `calibration.registry.CALIBRATIONS`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,19 +59,19 @@ def next_steps(answers: Answers, rig: Rig, *, networks: bool, printed: bool, rea
                       printed or exact or bool(measured), BOARD))
     steps.append(Step("Calibrate each lens", "Until then distances are a guess." if len(missing) == len(rig.nodes) else
                       f"Missing: {', '.join(missing)}." if missing else "All lenses are known.",
-                      exact or not missing, "lens"))
+                      exact or not missing, LENS.name))
     if two:
         steps.append(Step("Put the cameras together", "Where they stand to each other, from the board before both.",
-                          _together(rig), "stereo"))
+                          _together(rig), STEREO.name))
         steps.append(Step("Compare the cameras' times", times_text(rig), _together(rig) and not times_unknown(rig),
-                          "time"))
+                          TIME.name))
     if answers.wear == "paint":
         steps.append(Step("Teach the colours", "Which colour each marker has in this light.",
-                          exact or _noted(reasons, "colour calibration"), "colours"))
+                          exact or _noted(reasons, COLOURS.reason), COLOURS.name))
     if answers.wear == "paint" or two:
         steps.append(Step("Measure your hand", "How long its bones are, from a minute of movement.",
-                          not is_shipped(rig.hand) or _noted(reasons, "bones", "hand adapted"),
-                          "bones" if answers.wear == "paint" else "measured"))
+                          not is_shipped(rig.hand) or _noted(reasons, BONES.reason, MEASURED.reason, ADAPTED.reason),
+                          (BONES if answers.wear == "paint" else MEASURED).name))
     return steps
 
 

@@ -14,7 +14,7 @@ To add one:
 2. write the pages and ``make_plan(kit) -> Plan`` in ``NAME.py``; the last page is a `framework.page.AcceptPage` on an
    `AcceptStep` whose function gives a `models.proposal.Proposal`: rows before and after, the verdict, and
    the changes (`RigChange`, `NodeChange`) that put it into force and take it back. Nothing else writes anything;
-3. add a row to `framework.plan.WIZARDS`; the Calibrate menu follows;
+3. add a record to `rhot_app/calibration/registry.py`; the Calibrate menu, `rhot calibrate` and the history follow;
 4. test it as a person would: tests/ui/wizards, `Hands` clicks, `FakeRigAsker` draws pictures, and once on the real
    simulated rig; add its pages to tests/ui/wizards/test_wizard_screenshots.py, open the pictures, explain them in
    docs/guide/calibration.md.

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QLineEdit, QPushButton
 
+from rhot_app.calibration.registry import ALIGNMENT
 from rhot_app.errors import EngineError
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.backend.pose_feed import PoseFeed
@@ -46,7 +47,7 @@ def make_plan(kit: Kit, poses: PoseFeed | None = None, now_ns: Callable[[], int]
 
     pages = (SourcePage(source, kit.memory), TogetherPage(together, states, kit), ChartPage(solve, kit.scheme),
              AcceptPage(accept, kit.scheme))
-    return Plan("Alignment with another tracker", pages, solver="rhot_app.ui.wizards.steps.alignment_steps",
+    return Plan(ALIGNMENT.title, pages, solver="rhot_app.ui.wizards.steps.alignment_steps",
                 put_back=end)
 
 

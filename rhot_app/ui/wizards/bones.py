@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 
 from rhot_app.calibration.hand.bones import BONE_NAMES
 from rhot_app.calibration.hand.bones_report import BoneLength, BonesReport
+from rhot_app.calibration.registry import BONES
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.movement_page import Movements
@@ -38,7 +39,7 @@ def make_plan(kit: Kit) -> Plan:
     page.movement.unneeded = lambda: "Press Next: the bones were entered." if entry.report is not None else ""
     hand = HandStep(entry, page.movement, kit.rig)
     accept = AcceptStep(lambda: propose(hand.report, kit.rig, kit.rig_path), "Record the movement first.")
-    return Plan("Bones of the hand", (EntryPage(entry), page, HandPage(hand, kit.scheme),
+    return Plan(BONES.title, (EntryPage(entry), page, HandPage(hand, kit.scheme),
                                       AcceptPage(accept, kit.scheme)),
                 solver="rhot_app.calibration.hand.bones", put_back=movements.end)
 

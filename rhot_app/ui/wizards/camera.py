@@ -11,6 +11,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
+from rhot_app.calibration.registry import CAMERA
 from rhot_app.errors import RhotError
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.job import Job
@@ -42,7 +43,7 @@ def make_plan(kit: Kit) -> Plan:
                     in_force[change.node_id]["camera"].update(change.after["camera"])
         tryout.put_back(in_force)
 
-    return Plan("Set the cameras", (page, AcceptPage(accept, kit.scheme)), put_back=put_back)
+    return Plan(CAMERA.title, (page, AcceptPage(accept, kit.scheme)), put_back=put_back)
 
 
 # -- the knobs of the camera wizard ------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFormLayout, QLabel, QWidget
 
+from rhot_app.calibration.registry import CERTIFICATE
 from rhot_app.certificate.latency import flash_edges
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
@@ -64,7 +65,7 @@ def make_plan(kit: Kit) -> Plan:
              MovementPage(made["plumb"], kit.connect, movements.states))
     solve = SolveStep(lambda: task_of(said, made), verdict_of, charts_of)
     keep = KeepStep(lambda: propose(solve.report, lambda: _place(kit.rig.name)), "Record a step first.")
-    return Plan("Certificate", (*pages, ChartPage(solve, kit.scheme), KeepPage(keep, kit.scheme)),
+    return Plan(CERTIFICATE.title, (*pages, ChartPage(solve, kit.scheme), KeepPage(keep, kit.scheme)),
                 solver="rhot_app.certificate.certify", put_back=movements.end)
 
 

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 from rhot_app.calibration.colour.colours import ColourReport
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.colour.verdict import OVERLAP
+from rhot_app.calibration.registry import COLOURS
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.colour_list import PaintList, PaintRow
@@ -42,7 +43,7 @@ def make_plan(kit: Kit) -> Plan:
                         "Pick the markers' colours first.")
     pages = (PickPage(picks, kit.scheme), BoundsPage(bounds, kit.scheme), ApartPage(apart, kit.scheme),
              AcceptPage(accept, kit.scheme))
-    return Plan("Colours of the markers", pages, solver="rhot_app.calibration.colour.colours")
+    return Plan(COLOURS.title, pages, solver="rhot_app.calibration.colour.colours")
 
 
 # -- the page of the separability --------------------------------------------------------------------------------------

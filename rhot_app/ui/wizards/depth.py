@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.calibration.depth.table import DepthRow
+from rhot_app.calibration.registry import DEPTH
 from rhot_app.errors import EngineError
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page, shrinkable
@@ -36,7 +37,7 @@ def make_plan(kit: Kit, clock: Callable[[], float] = time.monotonic) -> Plan:
     law = LawStep(distances)
     accept = AcceptStep(lambda: propose(distances.report, kit.rig, kit.rig_path), "Measure some distances first.")
     pages = (DistancePage(distances, states), ChartPage(law, kit.scheme), AcceptPage(accept, kit.scheme))
-    return Plan("Depth without a board", pages, put_back=states.stop)
+    return Plan(DEPTH.title, pages, put_back=states.stop)
 
 
 # -- the page of the distances -----------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QTableWidgetItem,
 )
 
+from rhot_app.calibration.registry import FILTERS
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.models.palette import Scheme
@@ -50,7 +51,7 @@ def make_plan(kit: Kit) -> Plan:
     tune = TuneStep(lambda: (still.movement.log, fast.movement.log), kit.rig)
     accept = AcceptStep(lambda: propose(tune.report, kit.rig, kit.rig_path, per_marker=tune.per_marker),
                         "Record both movements first.")
-    return Plan("Filters", (still, fast, TunePage(tune, kit.scheme), AcceptPage(accept, kit.scheme)),
+    return Plan(FILTERS.title, (still, fast, TunePage(tune, kit.scheme), AcceptPage(accept, kit.scheme)),
                 solver="rhot_app.calibration.filters.tuning", put_back=movements.end)
 
 

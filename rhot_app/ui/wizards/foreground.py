@@ -6,6 +6,7 @@ import contextlib
 
 from PySide6.QtWidgets import QPushButton
 
+from rhot_app.calibration.registry import FOREGROUND
 from rhot_app.errors import RhotError
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
@@ -32,7 +33,7 @@ def make_plan(kit: Kit) -> Plan:
                     with contextlib.suppress(RhotError):  # a node that is gone has forgotten it anyway
                         ask_node(asker.command, node_id, "revert_foreground")
 
-    return Plan("Background and skin", pages, put_back=put_back)
+    return Plan(FOREGROUND.title, pages, put_back=put_back)
 
 
 class LearnPage(Page):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QCheckBox, QComboBox, QHeaderView, QTableWidget, QTableWidgetItem
 
+from rhot_app.calibration.registry import LENS
 from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
 from rhot_app.ui.wizards.framework.films_page import FilmsPage
@@ -34,7 +35,7 @@ def make_plan(kit: Kit) -> Plan:
 
     pages = (LensBoardPage(board, kit.memory), FilmsPage(show), LensResultPage(solve),
              AcceptPage(AcceptStep(propose), kit.scheme))
-    return Plan("Intrinsics of a camera", pages, solver="rhot_app.calibration.lens.intrinsics")
+    return Plan(LENS.title, pages, solver="rhot_app.calibration.lens.intrinsics")
 
 
 def _next(cameras: tuple[str, ...], done: str) -> str:

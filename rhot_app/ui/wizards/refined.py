@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from rhot_app.calibration.registry import REFINED
 from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, Step
 from rhot_app.ui.wizards.steps.refined_steps import ASK_S, EngineFeed, MakeProposal, MoveStep, propose
-
-TITLE = "Use refined calibration"
 
 
 class MovePage(Page):
@@ -27,7 +26,7 @@ class MovePage(Page):
 def make_plan(kit: Kit, ask_s: float = ASK_S) -> Plan:
     """Move, compare, use it. The engine is asked every `ask_s`."""
     feed = EngineFeed(kit.connect, "refined", ask_s)
-    return compared(kit, TITLE, feed, MoveStep(feed), propose,
+    return compared(kit, REFINED.title, feed, MoveStep(feed), propose,
                     "The calibration in force still holds, or too little of the hand was seen.")
 
 

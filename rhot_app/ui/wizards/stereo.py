@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout, QPushButton
 
+from rhot_app.calibration.registry import STEREO
 from rhot_app.simulator.scene.scene_description import RulerShow
 from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
@@ -38,7 +39,7 @@ def make_plan(kit: Kit) -> Plan:
 
     accept = AcceptPage(AcceptStep(propose), kit.scheme)
     pages = (BoardPage(board, kit.memory), FilmsPage(show), KnownPage(known), Page(solve), Page(table), accept)
-    return Plan("Stereo calibration", pages, solver="rhot_app.ui.wizards.steps.stereo_steps")
+    return Plan(STEREO.title, pages, solver="rhot_app.ui.wizards.steps.stereo_steps")
 
 
 # -- the fields of the second known length, and clicks on the ruler's ends ---------------------------------------------

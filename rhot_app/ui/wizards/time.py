@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rhot_app.calibration.registry import TIME
 from rhot_app.ui.wizards.framework.movement_page import Movements
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
 from rhot_app.ui.wizards.framework.plan import Kit, Plan
@@ -24,5 +25,5 @@ def make_plan(kit: Kit) -> Plan:
     solve = SolveStep(task, lambda report: report.verdict, charts_of)
     accept = AcceptStep(lambda: propose(solve.report, kit.rig, kit.rig_path, kit.node_settings),
                         "Record a movement first.")
-    return Plan("Time of the cameras", (wave, ChartPage(solve, kit.scheme), AcceptPage(accept, kit.scheme)),
+    return Plan(TIME.title, (wave, ChartPage(solve, kit.scheme), AcceptPage(accept, kit.scheme)),
                 solver="rhot_app.calibration.time.offset", put_back=movements.end)

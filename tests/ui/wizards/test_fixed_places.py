@@ -77,7 +77,7 @@ def places(window):
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-@pytest.mark.parametrize("module", [one.module for one in WIZARDS])
+@pytest.mark.parametrize("module", [one.name for one in WIZARDS])
 def test_nothing_moves_when_the_sentences_change(module, size, frame_of):
     window, frame, plan = frame_of(module, size)
     frame.offer_twin(QMenu(window))
@@ -111,7 +111,7 @@ def known_sentences():
 def test_every_sentence_is_seen_whole_in_a_small_window(frame_of):
     sentences = set(known_sentences())
     for one in WIZARDS:
-        *_, plan = frame_of(one.module, SIZES[-1])
+        *_, plan = frame_of(one.name, SIZES[-1])
         sentences |= {page.step.view().sentence for page in plan.pages}
     assert len(sentences) > 60
     _, frame, plan = frame_of("lens", SIZES[-1])
@@ -141,7 +141,7 @@ def test_the_simulated_rig_says_what_a_person_would_measure(frame_of):
     entries = {*FIRST.values(), *(text for _, text, _ in THINGS), "Shows one marker at"}
     told = {}
     for one in WIZARDS:
-        window, frame, plan = frame_of(one.module, SIZES[-1])
+        window, frame, plan = frame_of(one.name, SIZES[-1])
         for number, page in enumerate(plan.pages):
             frame.show_page(page, number)
             assert frame.twin_facts.text() == "", "a real rig has nobody to be told"
@@ -152,6 +152,6 @@ def test_the_simulated_rig_says_what_a_person_would_measure(frame_of):
             assert not text or text.partition(":")[0].removesuffix(".") in entries, text
             QApplication.processEvents()
             assert frame.twin_facts.whole
-            told[one.module] = told.get(one.module, "") + text
+            told[one.name] = told.get(one.name, "") + text
     assert all(told[module] for module in ("lens", "stereo", "depth", "time", "filters", "bones", "alignment"))
     assert all("25 mm" in told[module] for module in ("lens", "stereo")) and "200 mm" in told["stereo"]

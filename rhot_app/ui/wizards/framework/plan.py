@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from rhot_app.calibration.registry import CALIBRATIONS, Calibration
 from rhot_app.project import Rig
 from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.backend.solver import Solver
@@ -61,62 +62,29 @@ class Plan:
     put_back: Callable[[], None] | None = None
 
 
-# -- All wizards, in the order in which a new rig needs them -----------------------------------------------------------
+# -- All wizards -------------------------------------------------------------------------------------------------------
 
-@dataclass(frozen=True, slots=True)
-class Wizard:
-    """One wizard. `module` in this package has ``make_plan(kit)``; `reason` begins what it writes into a rig's history,
-    so that the menu can tell when it was used last."""
+class Wizard(Calibration):
+    """A calibration with a wizard: the module of its name in this package has ``make_plan(kit)``."""
 
-    module: str
-    title: str
-    meaning: str
-    reason: str
+    __slots__ = ()
 
     def load(self) -> None:
         """Import what it needs; takes a moment the first time, so call it in a worker."""
-        importlib.import_module(f"rhot_app.ui.wizards.{self.module}")
+        importlib.import_module(f"rhot_app.ui.wizards.{self.name}")
 
     def make_plan(self, kit: Kit) -> Plan:
         """Its pages for the rig at hand."""
-        plan: Plan = importlib.import_module(f"rhot_app.ui.wizards.{self.module}").make_plan(kit)
+        plan: Plan = importlib.import_module(f"rhot_app.ui.wizards.{self.name}").make_plan(kit)
         return plan
 
 
 OPEN_WIZARD = "wizard "
-"""A notice's key that opens the wizard whose module it names."""
+"""A notice's key that opens the wizard of the calibration that it names."""
 
-WIZARDS: tuple[Wizard, ...] = (
-    Wizard("camera", "Set the cameras", "Exposure, gains, white balance: what each camera is told, tried out live.",
-           "camera settings"),
-    Wizard("lens", "Intrinsics of a camera", "Focal length, centre and distortion of one camera's lens, from a board "
-           "that is held all over its picture.", "intrinsics of"),
-    Wizard("stereo", "Stereo calibration", "Where the cameras stand to each other and to the table, from a board "
-           "that they see at the same time.", "stereo calibration"),
-    Wizard("refined", "Use refined calibration", "How the cameras stand now, from the hand that moves while it is "
-           "tracked.", "refined calibration"),
-    Wizard("colours", "Colours of the markers", "Which colour each marker has, and what may be mistaken for it.",
-           "colour calibration"),
-    Wizard("foreground", "Background and skin", "What the empty scene and your skin look like, so that a bare hand can "
-           "be tracked.", "background and skin"),
-    Wizard("adapted", "Adapt the hand's shape", "How long and how thick the fingers are, from a bare hand that moves "
-           "while it is tracked.", "hand adapted while it was tracked"),
-    Wizard("measured", "Use measured bones", "How long the bones are, from the landmarks of a hand that two cameras "
-           "see while it is tracked.", "bones measured while the hand was tracked"),
-    Wizard("time", "Time of the cameras", "When each camera sees, from a hand that waves.", "time calibration"),
-    Wizard("depth", "Depth without a board", "Distance from disparity, from a marker at measured distances.",
-           "depth calibration"),
-    Wizard("bones", "Bones of the hand", "How long the bones are, from a minute of movement or by a ruler.",
-           "bones calibration"),
-    Wizard("filters", "Filters", "How much jitter and how much lag, from a hand held still and one that moves fast.",
-           "filter tuning"),
-    Wizard("alignment", "Alignment with another tracker", "Where a Vive tracker's world is in the rig, from a movement "
-           "of both.", "alignment with another tracker"),
-    Wizard("certificate", "Certificate", "How good this rig is, measured as the thesis did, with 95 % intervals: five "
-           "minutes.", "certificate"),
-)
+WIZARDS = tuple(Wizard(*one) for one in CALIBRATIONS)
 
 
-def wizard_named(module: str) -> Wizard | None:
-    """The wizard of that module; None when there is none."""
-    return next((wizard for wizard in WIZARDS if wizard.module == module), None)
+def wizard_named(name: str) -> Wizard | None:
+    """The wizard of that calibration; None when there is none."""
+    return next((wizard for wizard in WIZARDS if wizard.name == name), None)

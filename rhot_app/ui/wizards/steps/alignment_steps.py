@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.registry import ALIGNMENT
 from rhot_app.errors import CalibrationError
 from rhot_app.objects.alignment.alignment_file import (
     Alignment,
@@ -42,7 +43,6 @@ from rhot_app.ui.wizards.models.step import Bar, Chart, Curve, Step, StepView, T
 Array = NDArray[np.float64]
 
 SECONDS = 20.0
-REASON = "alignment with another tracker"
 
 ENOUGH_RAD = LASTING_M / FAIR_M
 ENOUGH_M = LASTING_M * REACH_M / FAIR_M
@@ -341,7 +341,7 @@ class AlignmentSolver:
                     *(Row(what, old, new) for what, old, new in zip(
                         _WHATS, _figures(self.before), _figures(after), strict=True)))
             self._proposed = result, Proposal(
-                REASON, result.report.verdict, rows, (AlignmentChange(self.before, after, self.path),),
+                ALIGNMENT.reason, result.report.verdict, rows, (AlignmentChange(self.before, after, self.path),),
                 "" if self.path is None else f"It is in {self.path.name}, beside the rig.")
         return self._proposed[1]
 

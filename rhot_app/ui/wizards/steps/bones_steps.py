@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from rhot_app.calibration.hand.bones_collector import BonesCollector
     from rhot_app.calibration.hand.bones_report import BoneLength, BonesReport
 
-REASON = "bones calibration"
 SECONDS = 60.0
 
 _NAMES = {"movement": "measured by movement", "reach": "measured by movement", "entered": "measured with a ruler",
@@ -227,7 +226,8 @@ def propose(report: Any, rig: Rig, path: Path | None) -> Proposal | None:
         return None
     after = msgspec.structs.replace(rig, hand=msgspec.structs.replace(report.hand, name=_NAMES[report.method]))
     size = Row("size", "100 %", f"{100 * report.size:.1f} ± {100 * report.size_std:.1f} %")
-    return Proposal(REASON, report.verdict, (size, *rig_rows(rig, after)), (RigChange(rig, after, path, REASON),))
+    return Proposal(BONES.reason, report.verdict, (size, *rig_rows(rig, after)),
+                    (RigChange(rig, after, path, BONES.reason),))
 
 
 def _roles(rig: Rig) -> tuple[dict[str, str], frozenset[str]]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.check.camera_advice import CameraAdvice, CameraAdvisor
 from rhot_app.calibration.check.exposure import BRIGHT, DARK
+from rhot_app.calibration.registry import CAMERA
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.project import RigNode
@@ -145,7 +146,6 @@ def value_text(control: Control, settings: CameraSettings) -> str:
 
 # -- Step: set the cameras ---------------------------------------------------------------------------------------------
 
-REASON = "camera settings"
 _BURNT, _BLACK = (255, 60, 60), (70, 120, 255)
 _STRIPE_PX = 4
 SETTLE_NS = 400_000_000
@@ -342,13 +342,13 @@ class SettingsStep(Step):
         if self.verdict is None or not self._current:
             return None
         if not self.choices.changed:
-            return Proposal(REASON, self.verdict, self.choices.rows(self.choices.nodes)) \
+            return Proposal(CAMERA.reason, self.verdict, self.choices.rows(self.choices.nodes)) \
                 if self.verdict.acceptable else None
         verdict = self.verdict
         if verdict.grade is Grade.POOR and self._before is Grade.POOR:
             verdict = judge(f"{verdict.sentence.partition(': ')[2]} The settings in force are no better.",
                             [replace(finding, grade=Grade.FAIR) for finding in verdict.findings])
-        return Proposal(REASON, verdict, self.choices.rows(self.choices.changed),
+        return Proposal(CAMERA.reason, verdict, self.choices.rows(self.choices.changed),
                         tuple(NodeChange(node.node_id, *self.choices.differences(node.node_id))
                               for node in self.choices.changed))
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from rhot_app.calibration.registry import CERTIFICATE
 from rhot_app.calibration.verdict import Finding, Grade, Verdict
 from rhot_app.certificate.collect import SECONDS
 from rhot_app.certificate.document import Certificate, Line, in_words
@@ -31,7 +32,6 @@ from rhot_app.ui.wizards.models.step import AcceptStep, Chart, Curve, StepView, 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-REASON = "certificate"
 
 _SENTENCES: dict[str, str] = {
     "static": "Rest your hand, palm to the cameras, fingers spread; or rest a board. Then press Record.",
@@ -238,7 +238,7 @@ def propose(report: tuple[ProtocolFile, Certificate] | None, folder: Callable[[]
         return None
     rows = tuple(Row(line.title, line.verdict, _headline(line)) for line in report[1].lines)
     place = folder()
-    return Proposal(REASON, verdict_of(report), rows, (WriteCertificate(place, report),),
+    return Proposal(CERTIFICATE.reason, verdict_of(report), rows, (WriteCertificate(place, report),),
                     f"It stands in {place}: certificate.html, .pdf and .json, with the recordings.")
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from rhot_app.calibration.colour.colours import ColourReport, solve_colours
 from rhot_app.calibration.colour.surroundings import HUE_STEP_DEG
+from rhot_app.calibration.registry import COLOURS
 from rhot_app.calibration.verdict import Finding, judged_anew
 from rhot_app.project import Rig
 from rhot_app.ui.models.palette import hex_of
@@ -182,7 +183,6 @@ def learning(picks: PickStep, given: dict[str, ChromaModel], title: str) -> Task
 
 # -- Step: separability of the colours, and what is proposed -----------------------------------------------------------
 
-REASON = "colour calibration"
 
 _HEADROOM = 1.05  # of the chart above the highest column
 
@@ -294,7 +294,7 @@ def propose(report: ColourReport | None, rig: Rig, path: Path | None,
         return None
     after = msgspec.structs.replace(rig, markers=report.markers)
     markers = msgspec.to_builtins(report.markers)
-    changes: list[Change] = [RigChange(rig, after, path, REASON)]
+    changes: list[Change] = [RigChange(rig, after, path, COLOURS.reason)]
     shown = {f"{old.id}: colour": (old.display_rgb, new.display_rgb)
              for old, new in zip(rig.markers.markers, report.markers.markers, strict=True)}
     rows = [replace(row, swatches=shown.get(row.what)) for row in rig_rows(rig, after)]
@@ -306,4 +306,4 @@ def propose(report: ColourReport | None, rig: Rig, path: Path | None,
                             else "not the rig's", "the new ones"))
         elif not node.text_datagrams:
             rows.append(Row(f"colours in camera {node.name}", "not known", "not changed: the node does not answer"))
-    return Proposal(REASON, report.verdict, tuple(rows), tuple(changes))
+    return Proposal(COLOURS.reason, report.verdict, tuple(rows), tuple(changes))

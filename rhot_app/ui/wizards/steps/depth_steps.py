@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthReport, fit_depth, geometry_of, replaced_calibration
 from rhot_app.calibration.depth.table import DepthRow, DepthTable
+from rhot_app.calibration.registry import DEPTH
 from rhot_app.calibration.verdict import Verdict, judged_anew
 from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
@@ -23,7 +24,6 @@ from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
 from rhot_node.wire.messages import MarkerObservation
 
-REASON = "depth calibration"
 ENOUGH = 8
 LOOK_S = 1.0
 
@@ -192,7 +192,7 @@ def propose(report: DepthReport | None, rig: Rig, path: Path | None) -> Proposal
     rows = (Row("distance from", _way(rig.depth), _way(after.depth)),
             Row("k", _number(rig.depth.k, "m"), _number(after.depth.k, "m")),
             Row("z", _number(rig.depth.z, ""), _number(after.depth.z, "")))
-    return Proposal(REASON, verdict_of(report, rig), rows, (RigChange(rig, after, path, REASON),))
+    return Proposal(DEPTH.reason, verdict_of(report, rig), rows, (RigChange(rig, after, path, DEPTH.reason),))
 
 
 def _way(depth: DepthSettings) -> str:

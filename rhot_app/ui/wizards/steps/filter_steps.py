@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from rhot_app.calibration.filters.meters import BRISK_M_S, MOVING_M_S, FilterMeter, FilterTargets, MeterReading
+from rhot_app.calibration.registry import FILTERS
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_app.state import HandState
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from rhot_app.calibration.filters.tuning import FilterCurves, FilterReport
 
 
-REASON = "filter tuning"
 STILL_S, FAST_S = 10.0, 15.0
 
 FilterStage = Literal["pixel", "position"]
@@ -111,7 +111,7 @@ def propose(report: FilterReport | None, rig: Rig, path: Path | None, *, per_mar
                             _figure(1e3 * one.jitter_m, 2, "mm")))
             rows.append(Row(f"{one.marker_id}: lag", _figure(1e3 * one.lag_now_s, 1, "ms"),
                             _figure(1e3 * one.lag_s, 1, "ms")))
-    return Proposal(REASON, choice.verdict, tuple(rows), (RigChange(rig, after, path, REASON),))
+    return Proposal(FILTERS.reason, choice.verdict, tuple(rows), (RigChange(rig, after, path, FILTERS.reason),))
 
 
 def _figure(value: float, decimals: int, unit: str) -> str:

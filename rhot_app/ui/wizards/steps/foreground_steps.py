@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.registry import FOREGROUND
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, judged_anew, told_apart
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.ui.backend.contract import Asker
@@ -24,8 +25,6 @@ from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Pictures, Ste
 from rhot_node.detect.foreground import BackgroundSums, no_foreground, skin_mask
 from rhot_node.errors import PictureError
 from rhot_node.pictures import decode_picture
-
-REASON = "background and skin"
 
 SECONDS = 3.0
 """s of the empty scene: a hundred pictures at 30 Hz, after which a pixel's noise is known to 7 %."""
@@ -366,7 +365,7 @@ def propose(empty: EmptyStep, skin: SkinStep) -> Proposal | None:
     rows = [row for name in empty.nodes for row in (
         Row(f"{name}: background", _background(empty.before.get(name, {})), "learnt now"),
         Row(f"{name}: skin", str(empty.before.get(name, {}).get("skin", "none")), "learnt now"))]
-    return Proposal(REASON, verdict, tuple(rows), (ForegroundChange(empty.nodes, empty.tried + skin.tried),),
+    return Proposal(FOREGROUND.reason, verdict, tuple(rows), (ForegroundChange(empty.nodes, empty.tried + skin.tried),),
                     "Calibrate, Tracker chooses the bare hand.")
 
 

@@ -16,6 +16,7 @@ from rhot_app.calibration.check.camera_calibration import with_lens
 from rhot_app.calibration.lens.coverage import CaptureGuide, Coverage
 from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
 from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
+from rhot_app.calibration.registry import LENS
 from rhot_app.project import Intrinsics, Rig
 from rhot_app.ui.backend.feed import Image, Picture
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
@@ -180,7 +181,6 @@ class LensShowStep(FilmedStep):
 
 # -- Step: solve for the lens ------------------------------------------------------------------------------------------
 
-REASON = "intrinsics of"
 ARROW_PX = 20.0
 """Residuals are hundredths or tenths of a pixel; the longest arrow should be about so long in the picture."""
 
@@ -277,7 +277,7 @@ def residual_marks(report: IntrinsicsReport) -> Overlay:
 def lens_proposal(rig: Rig, path: Path | None, camera: str, report: IntrinsicsReport) -> Proposal:
     """The rig with the new lens, and its figures beside the old ones."""
     after = with_lens(rig, camera, report.intrinsics)
-    reason = f"{REASON} {camera}"
+    reason = f"{LENS.reason} {camera}"
     return Proposal(reason, report.verdict, _rows(rig, after, camera, report), (RigChange(rig, after, path, reason),),
                     what_follows(rig, after))
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import msgspec
 
+from rhot_app.calibration.registry import REFINED
 from rhot_app.calibration.verdict import Finding, Grade, Verdict
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import Rig, parse_rig
-from rhot_app.tracking.refinement.refined_rig import REASON
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import rig_rows
@@ -116,5 +116,5 @@ def propose(answer: Answer, rig: Rig, path: Path | None) -> Proposal | None:
                   in zip(rig.nodes, after.nodes, strict=True))
     refined = msgspec.structs.replace(rig, nodes=nodes, calibration=after.calibration)
     figures = tuple(Row(what, before, now) for what, before, now in answer["rows"])
-    return Proposal(REASON, verdict_from(answer), (*figures, *rig_rows(rig, refined)),
-                    (RigChange(rig, refined, path, REASON),))
+    return Proposal(REFINED.reason, verdict_from(answer), (*figures, *rig_rows(rig, refined)),
+                    (RigChange(rig, refined, path, REFINED.reason),))

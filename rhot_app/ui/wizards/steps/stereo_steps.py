@@ -13,6 +13,7 @@ from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.check.camera_calibration import lengths_text
 from rhot_app.calibration.lens.fit import LensStart, find_lens
+from rhot_app.calibration.registry import STEREO
 from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate, calibrated_rig, lens_of, rig_findings
 from rhot_app.calibration.stereo.collector import Guidance, Offer, StereoCollector
 from rhot_app.calibration.stereo.report import WORKING_DISTANCE_M, PairFigures, StereoFigures, StereoReport
@@ -304,7 +305,6 @@ class TableStep(BoardFinder):
 
 # -- The proposed rig and its figures ----------------------------------------------------------------------------------
 
-REASON = "stereo calibration"
 
 
 def stereo_proposal(rig: Rig, path: Path | None, report: StereoReport, world: WorldFrame | None) -> Proposal | None:
@@ -316,8 +316,8 @@ def stereo_proposal(rig: Rig, path: Path | None, report: StereoReport, world: Wo
     found = [*report.verdict.findings, *rig_findings(after, report.cameras)]
     found += world.verdict.findings if world is not None else ()
     unique = {finding.figure: finding for finding in found}
-    return Proposal(REASON, judge(report.summary, list(unique.values())), _rows(rig, after, figures),
-                    (RigChange(rig, after, path, REASON),))
+    return Proposal(STEREO.reason, judge(report.summary, list(unique.values())), _rows(rig, after, figures),
+                    (RigChange(rig, after, path, STEREO.reason),))
 
 
 def _rows(before: Rig, after: Rig, figures: StereoFigures) -> tuple[Row, ...]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 
+from rhot_app.calibration.registry import TIME
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_app.state import HandState
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from rhot_app.calibration.time.offset import TimeReport
 
 SECONDS = 20.0
-REASON = "time calibration"
 
 _FAST_PX_S = 120.0  # a hand that crosses half the picture in two seconds
 _REACH_PX = 250.0
@@ -106,5 +106,5 @@ def propose(report: TimeReport | None, rig: Rig, path: Path | None,
             correction_s = camera.with_row_time_s
         nodes.append(camera.applied(node, correction_s))
     after = msgspec.structs.replace(rig, nodes=tuple(nodes))
-    return Proposal(REASON, report.verdict, (*rig_rows(rig, after), *rows),
-                    (*changes, RigChange(rig, after, path, REASON)))
+    return Proposal(TIME.reason, report.verdict, (*rig_rows(rig, after), *rows),
+                    (*changes, RigChange(rig, after, path, TIME.reason)))

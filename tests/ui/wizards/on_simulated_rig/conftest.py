@@ -79,7 +79,7 @@ def open_on_rig(rig_launcher: Launcher) -> Callable[[str], Hands]:
     """Opens a wizard by its module's name, as the Calibrate menu does; returns hands on it."""
 
     def open_(module: str) -> Hands:
-        rig_launcher.open(next(wizard for wizard in WIZARDS if wizard.module == module))
+        rig_launcher.open(next(wizard for wizard in WIZARDS if wizard.name == module))
         return Hands(opened(rig_launcher, "wizard"))
 
     return open_
