@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from rhot_node.detect import outline_pixels as c
+from rhot_node.detect.image import EVEN
 
 BLUR_VARIANCE = 0.2  # px^2: point spread of about 0.7 luma px and the 2x2 chroma mean
 BAND_HALF_WIDTH_MIN = 3.5  # px; a narrower band shows no curvature
@@ -24,8 +25,16 @@ at most 0.84 for a capsule of any length."""
 ARC = 0.25 * math.pi  # mean of sqrt(1 - u^2) over -1..1: a band's centroid lies so much of its sag off the axis
 SAG_MOST = 0.3  # of half the band's length: what the sag may change before the outline is straightened anew
 SAG_SETTLE = 4.0  # frames that say what is no sag
-GAUSS_AT = 0.5 + 0.5 * np.polynomial.legendre.leggauss(4)[0]
-GAUSS_WEIGHT = 0.5 * np.polynomial.legendre.leggauss(4)[1]
+GAUSS_AT, GAUSS_WEIGHT = 0.5 * np.array(np.polynomial.legendre.leggauss(4)) + [[0.5], [0.0]]
+
+
+NEXT = (1, 2, 0)  # axes in cyclic order
+
+
+@njit(cache=True)
+def length_of(variance):
+    """Of a bar whose second moment along it is `variance`."""
+    return math.sqrt(variance / EVEN)
 
 
 # -- from the coverage ------------------------------------------------------------------------------------------------
@@ -42,7 +51,7 @@ def band_center(region, coverage, gain, result):
     if _cross_moment(region, coverage, result) < CROSS_MOMENT_MIN:
         result.round = 1.0
         return False
-    half_width = np.sqrt(max(3.0 * (result.var_major - BLUR_VARIANCE), 0.0))
+    half_width = 0.5 * length_of(max(result.var_major - BLUR_VARIANCE, 0.0))
     if half_width < BAND_HALF_WIDTH_MIN:
         return False
     length = result.area / (2.0 * half_width)
@@ -67,7 +76,7 @@ def band_center(region, coverage, gain, result):
             moments[2] += a * u**4
             moments[3] += a * along * along
     inverse, determinant = _inverse(normal)
-    if determinant < 1e-6 * moments[0] ** 3:
+    if not determinant > 0.0:
         return False
     solution = np.zeros(3)
     for i in range(3):
@@ -105,8 +114,8 @@ def _inverse(m):
     inverse = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
-            a, b = (j + 1) % 3, (j + 2) % 3
-            c, d = (i + 1) % 3, (i + 2) % 3
+            a, b = NEXT[j], NEXT[NEXT[j]]
+            c, d = NEXT[i], NEXT[NEXT[i]]
             inverse[i, j] = m[a, c] * m[b, d] - m[a, d] * m[b, c]
     determinant = m[0, 0] * inverse[0, 0] + m[0, 1] * inverse[1, 0] + m[0, 2] * inverse[2, 0]
     if determinant != 0.0:
@@ -125,7 +134,7 @@ def _band_coordinates(column, row, result):
 @njit(cache=True)
 def _arc(u, half_width):
     """sqrt(1 - u^2), averaged over a box as wide as the blur, as far as it falls on the band."""
-    spread = np.sqrt(3.0 * BLUR_VARIANCE) / half_width
+    spread = 0.5 * length_of(BLUR_VARIANCE) / half_width
     low, high = max(u - spread, -1.0), min(u + spread, 1.0)
     if high - low < 1e-6:
         return 0.0
@@ -142,7 +151,7 @@ def _is_a_band(moments, residual, length, half_width, sag):
     """Does the coverage look like a whole band: even across its width, and as thick as its area says?"""
     skew = moments[1] / moments[0]
     fourth = moments[2] / moments[0]  # 1/5 for an even box
-    thickness = residual / (length * length / 12.0 + BLUR_VARIANCE)
+    thickness = residual / (EVEN * length * length + BLUR_VARIANCE)
     return (abs(skew) < 0.04 and abs(fourth - 0.2) < 0.05 and 0.7 < thickness < 1.35
             and abs(sag) < 1.15 * half_width)
 
@@ -207,7 +216,7 @@ def mend_band(outline, fitted, track):
     fitted.v_xx += ay * ay * along
     fitted.v_xy -= ax * ay * along
     fitted.v_yy += ax * ax * along
-    return abs(outline.sag) < SAG_MOST * math.sqrt(max(3.0 * (half - spread), 0.0))
+    return abs(outline.sag) < SAG_MOST * 0.5 * length_of(max(half - spread, 0.0))
 
 
 @njit(**c.FAST)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_node.detect.image import GREY, YuvImage
+from rhot_node.detect.image import GREY, MAD_SD, WHITE, YuvImage
 from rhot_node.errors import SettingsError
 from rhot_node.markers import ChromaModel, MarkerSet
 
@@ -18,7 +18,9 @@ SAMPLES_MIN = 12  # chroma pixels
 MAGNITUDE_LEAST = 12.0  # grey levels of mean chroma; less is grey
 TOLERANCE_DEG = (8.0, 22.0)  # narrower loses paint in noise, wider takes the neighbour's colour
 SPREADS = 3.0  # robust standard deviations on both sides of the mean that the hue tolerance spans
-LIGHT_LEFT = 0.5  # of the weakest sample: shadow on the paint leaves about this much of its chroma
+WEAKEST = 10  # per cent of the samples that may be weaker: glints, and what is no paint
+LIGHT_LEFT = 0.5  # of the weakest sample: shadow on the paint leaves about this much of its chroma and luma
+MAGNITUDE_MIN = 8.0  # grey levels of chroma below which a paint shows no hue
 
 
 def box_mask(image: YuvImage, boxes: list[Box]) -> NDArray[np.bool_]:
@@ -32,8 +34,8 @@ def box_mask(image: YuvImage, boxes: list[Box]) -> NDArray[np.bool_]:
 def colours_of(image: YuvImage, mask: NDArray[np.bool_]) -> Colours:
     """(N, 3) mean luma, Cb and Cr (minus 128) of the chroma pixels where `mask` (H/2, W/2) is True."""
     rows, columns = np.nonzero(mask)
-    luma = sum(image.y[2 * rows + j, 2 * columns + i].astype(np.float32) for j in (0, 1) for i in (0, 1))
-    return np.stack([0.25 * np.asarray(luma), image.u[rows, columns] - np.float32(GREY),
+    luma = [image.y[2 * rows + j, 2 * columns + i].astype(np.float32) for j in (0, 1) for i in (0, 1)]
+    return np.stack([np.mean(luma, axis=0), image.u[rows, columns] - np.float32(GREY),
                      image.v[rows, columns] - np.float32(GREY)], axis=1)
 
 
@@ -65,15 +67,13 @@ def learn_chroma_from_colours(colours: Colours) -> ChromaModel:
     direction = mean_cb / magnitude, mean_cr / magnitude
     along = cb * direction[0] + cr * direction[1]
     hue = np.degrees(np.arctan2(cr * direction[0] - cb * direction[1], along))
-    spread = 1.4826 * float(np.median(np.abs(hue - np.median(hue))))
-    weakest = float(np.percentile(along, 10))
+    spread = MAD_SD * float(np.median(np.abs(hue - np.median(hue))))
+    weakest = float(np.percentile(along, WEAKEST))
     return ChromaModel(
         cb=round(mean_cb, 1), cr=round(mean_cr, 1),
         hue_tolerance_deg=round(min(max(SPREADS * spread, TOLERANCE_DEG[0]), TOLERANCE_DEG[1]), 1),
-        magnitude_min=round(max(LIGHT_LEFT * weakest, 8.0), 1),
-        luma_min=int(max(8.0, 0.4 * float(np.percentile(luma, 5)))),
-        luma_max=250 if float(np.percentile(luma, 95)) < 235.0 else 255,
-    )
+        magnitude_min=round(max(LIGHT_LEFT * weakest, MAGNITUDE_MIN), 1),
+        luma_min=int(LIGHT_LEFT * float(np.percentile(luma, WEAKEST))), luma_max=WHITE)
 
 
 # -- colour tables -----------------------------------------------------------------------------------------------------

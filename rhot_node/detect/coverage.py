@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect.image import GREY
+from rhot_node.detect.image import GREY, block_noise, luma_at
 
 RING = 2  # chroma pixels around the half level that an edge may reach (lens, 2x2 chroma mean, some motion)
 HOLES_MAX = 0.3  # holes (glints, noise) are filled up to this fraction of the component
@@ -32,12 +32,24 @@ SATURATED = 0.85  # of the strongest chroma: the edge pixels that are taken for 
 # Kinds of pixels in the plane `kind`.
 OUTSIDE, INTERIOR, HOLE, EDGE, RIM, _REACHED = range(6)
 
-NEAR = np.dtype([("paint", np.float64, (3,)), ("mean", np.float64, (3,)), ("covariance", np.float64, (3, 3))])
-"""Near a pixel: the paint's colour, and mean and covariance of the surroundings. Luma, U, V."""
 
-AREAS = np.dtype([("paint", np.float64, (6,)), ("around", np.float64, (10,))])
-"""A summed-area table: of the interior number, x, y and colour (luma, U, V); of the surroundings number, colour and its
-products (00, 11, 22, 10, 20, 21)."""
+class Near(NamedTuple):
+    """Near a pixel: the paint's colour (3,), and mean (3,) and covariance (3, 3) of the surroundings, luma, U, V; the
+    sums that they are taken from, as in `Areas`."""
+
+    paint: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    inside: NDArray[np.float64]
+    outside: NDArray[np.float64]
+
+
+class Areas(NamedTuple):
+    """Summed-area tables (H + 1, W + 1, n): of the interior number, x, y and colour; of the surroundings the lower
+    triangle, row by row, of the products of 1 and the colour."""
+
+    paint: NDArray[np.float64]
+    around: NDArray[np.float64]
 
 
 class Measured(NamedTuple):
@@ -46,8 +58,8 @@ class Measured(NamedTuple):
     Centroid, area, covariance; second moments along and across the major axis, and that; a band's sag (`band`) with its
     variance, and whether its rims were found (`fit`), or are none (`round`); `soft`: the mean of a (1 - a) over the
     area, a the coverage; `level`: of the chroma, grey levels; whether it is at the frame's border; pieces; costs of it
-    and of what else is in the window; sum of the noise's variances and their number; the paint: how many pixels are
-    all paint, its mean luma and chroma (minus 128), and the slope of its chroma, of itself per px.
+    and of what else is in the window; how many pixels are all paint, its mean luma and chroma (minus 128), and
+    the slope of its chroma, of itself per px; `careful`: as in `measure`.
     """
 
     x: float
@@ -70,14 +82,13 @@ class Measured(NamedTuple):
     fragments: float
     cost: float
     rival_cost: float
-    noise_sum: float
-    noise_count: float
     paint_pixels: float
     paint_y: float
     paint_cb: float
     paint_cr: float
     slope_x: float
     slope_y: float
+    careful: float
 
 
 class Scratch(NamedTuple):
@@ -86,13 +97,12 @@ class Scratch(NamedTuple):
     mask: NDArray[np.int16]
     kind: NDArray[np.uint8]
     colour: NDArray[np.float32]
-    sums: NDArray[np.void]
+    sums: Areas
     coverage: NDArray[np.float32]
     gain: NDArray[np.float32]
     stack: NDArray[np.int32]
     components: NDArray[np.void]
     own: NDArray[np.bool_]
-    near: NDArray[np.void]
 
 
 # -- kinds of pixels ---------------------------------------------------------------------------------------------------
@@ -111,8 +121,7 @@ def classify(region, own, mask, kind, stack):
             inside = number >= 2 and own[number - 2]
             kind[row, column] = INTERIOR if inside else OUTSIDE
             area += 1 if inside else 0
-    if _has_holes(region, np.sum(own), kind):
-        _fill_holes(region, area, kind, stack)
+    _fill_holes(region, area, kind, stack)
     interior = area
     height, width = kind.shape
     for row in range(y0, y1 + 1):
@@ -135,27 +144,6 @@ def classify(region, own, mask, kind, stack):
 
 
 @njit(cache=True)
-def _has_holes(region, pieces, kind):
-    """Does the interior enclose outside? By the Euler number of `pieces` 8-connected pieces, from its 2x2 patterns."""
-    x0, x1, y0, y1 = region
-    quads = 0  # four times the Euler number
-    for row in range(y0 - 1, y1 + 1):
-        for column in range(x0 - 1, x1 + 1):
-            a = row >= y0 and column >= x0 and kind[row, column] == INTERIOR
-            b = row >= y0 and column < x1 and kind[row, column + 1] == INTERIOR
-            c = row < y1 and column >= x0 and kind[row + 1, column] == INTERIOR
-            d = row < y1 and column < x1 and kind[row + 1, column + 1] == INTERIOR
-            count = a + b + c + d
-            if count == 1:
-                quads += 1
-            elif count == 3:
-                quads -= 1
-            elif count == 2 and a == d:
-                quads -= 2
-    return quads < 4 * pieces
-
-
-@njit(cache=True)
 def _fill_holes(region, area, kind, stack):
     """Outside pixels that are not connected (4) to the region's border become HOLE, unless they are too many."""
     x0, x1, y0, y1 = region
@@ -172,9 +160,7 @@ def _fill_holes(region, area, kind, stack):
         depth -= 1
         row = stack[depth] // width
         column = stack[depth] - row * width
-        for side in range(4):
-            near_y = row + (side == 0) - (side == 1)
-            near_x = column + (side == 2) - (side == 3)
+        for near_y, near_x in ((row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)):
             if y0 <= near_y <= y1 and x0 <= near_x <= x1 and kind[near_y, near_x] == OUTSIDE:
                 kind[near_y, near_x] = _REACHED
                 stack[depth] = near_y * width + near_x
@@ -201,7 +187,7 @@ def unmix(image, region, level, scratch, paint):
     along x and y. The pixels of the region are sorted already (`classify`).
     """
     kind, colour, sums, coverage, gain = scratch.kind, scratch.colour, scratch.sums, scratch.coverage, scratch.gain
-    near = scratch.near[0]
+    near = Near(np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(6), np.empty(10))
     _gather_colour(image, region, colour)
     paint[:] = 0.0
     origin = _paint_plane(region, kind, colour, paint)
@@ -238,9 +224,7 @@ def _gather_colour(image, region, colour):
     x0, x1, y0, y1 = region
     for row in range(y0, y1 + 1):
         for column in range(x0, x1 + 1):
-            total = (np.int64(y[2 * row, 2 * column]) + np.int64(y[2 * row, 2 * column + 1])
-                     + np.int64(y[2 * row + 1, 2 * column]) + np.int64(y[2 * row + 1, 2 * column + 1]))
-            colour[row, column, 0] = 0.25 * total
+            colour[row, column, 0] = luma_at(y, row, column)
             colour[row, column, 1] = u[row, column]
             colour[row, column, 2] = v[row, column]
 
@@ -326,73 +310,72 @@ def _mean_outside(region, kind, colour, mean):
 
 @njit(cache=True)
 def _sum_areas(region, kind, colour, backdrop, sums):
-    """Fill the summed-area table AREAS; row and column 0 are zero.
+    """Fill the summed-area tables; row and column 0 are zero.
 
     The surroundings count from their overall mean, which keeps products small.
     """
     x0, x1, y0, y1 = region
-    inside, around, d = np.zeros(6), np.zeros(10), np.zeros(3)
-    for column in range(x1 - x0 + 2):
-        sums[0, column].paint[:] = 0.0
-        sums[0, column].around[:] = 0.0
+    paint, around = sums
+    inside, outside, one = np.zeros(6), np.zeros(10), np.ones(4)
+    paint[0, :x1 - x0 + 2] = 0.0
+    around[0, :x1 - x0 + 2] = 0.0
     for row in range(y0, y1 + 1):
         inside[:] = 0.0
-        around[:] = 0.0
-        sums[row - y0 + 1, 0].paint[:] = 0.0
-        sums[row - y0 + 1, 0].around[:] = 0.0
+        outside[:] = 0.0
+        below = row - y0 + 1
+        paint[below, 0] = 0.0
+        around[below, 0] = 0.0
         for column in range(x0, x1 + 1):
             code = kind[row, column]
             if code == INTERIOR:
                 inside[0] += 1.0
                 inside[1] += column
                 inside[2] += row
-                for channel in range(3):
-                    inside[3 + channel] += colour[row, column, channel]
+                for i in range(3):
+                    inside[2 + 1 + i] += colour[row, column, i]
             elif code == OUTSIDE:
-                around[0] += 1.0
-                for channel in range(3):
-                    d[channel] = colour[row, column, channel] - backdrop[channel]
-                    around[1 + channel] += d[channel]
-                    around[4 + channel] += d[channel] * d[channel]
-                around[7] += d[1] * d[0]
-                around[8] += d[2] * d[0]
-                around[9] += d[2] * d[1]
-            here, above = sums[row - y0 + 1, column - x0 + 1], sums[row - y0, column - x0 + 1]
+                for i in range(3):
+                    one[1 + i] = colour[row, column, i] - backdrop[i]
+                k = 0
+                for i in range(4):
+                    for j in range(i + 1):
+                        outside[k] += one[i] * one[j]
+                        k += 1
+            right = column - x0 + 1
             for k in range(6):
-                here.paint[k] = above.paint[k] + inside[k]
+                paint[below, right, k] = paint[below - 1, right, k] + inside[k]
             for k in range(10):
-                here.around[k] = above.around[k] + around[k]
+                around[below, right, k] = around[below - 1, right, k] + outside[k]
 
 
 @njit(cache=True)
-def _fill_near(place, region, sums, paint, origin, backdrop, near):
+def _fill_near(pixel, region, sums, paint, origin, backdrop, near):
     """Fill `near` with the paint's colour at a pixel, and mean and covariance of the surroundings near it.
 
     The paint is the mean of the interior nearby, carried here along the marker's overall slopes.
     """
     x0, x1, y0, y1 = region
-    row, column = place
-    top, bottom = max(row - REACH, y0) - y0, min(row + REACH, y1) - y0 + 1
+    row, column = pixel
     left, right = max(column - REACH, x0) - x0, min(column + REACH, x1) - x0 + 1
-    a, b, c, d = sums[bottom, right], sums[top, right], sums[bottom, left], sums[top, left]
-    number = a.paint[0] - b.paint[0] - c.paint[0] + d.paint[0]
-    if number > 0.5:
-        dx = column - (a.paint[1] - b.paint[1] - c.paint[1] + d.paint[1]) / number
-        dy = row - (a.paint[2] - b.paint[2] - c.paint[2] + d.paint[2]) / number
-    else:
-        dx, dy = column - origin[0], row - origin[1]
-    n = max(a.around[0] - b.around[0] - c.around[0] + d.around[0], 1.0)
+    top, bottom = max(row - REACH, y0) - y0, min(row + REACH, y1) - y0 + 1
+    inside, outside = near.inside, near.outside
+    for k in range(6):
+        inside[k] = (sums.paint[bottom, right, k] - sums.paint[top, right, k] - sums.paint[bottom, left, k]
+                     + sums.paint[top, left, k])
+    for k in range(10):
+        outside[k] = (sums.around[bottom, right, k] - sums.around[top, right, k] - sums.around[bottom, left, k]
+                      + sums.around[top, left, k])
+    own, n = inside[0], max(outside[0], 1.0)
+    dx, dy = column - origin[0], row - origin[1]
+    if own > 0.5:
+        dx, dy = column - inside[1] / own, row - inside[2] / own
+    k = 1
     for i in range(3):
-        k = 3 + i
-        near.paint[i] = (a.paint[k] - b.paint[k] - c.paint[k] + d.paint[k]) / number if number > 0.5 else paint[i, 0]
-        near.paint[i] += paint[i, 1] * dx + paint[i, 2] * dy
-        k = 1 + i
-        near.mean[i] = (a.around[k] - b.around[k] - c.around[k] + d.around[k]) / n
-    for i in range(3):
+        near.paint[i] = (inside[2 + 1 + i] / own if own > 0.5 else paint[i, 0]) + paint[i, 1] * dx + paint[i, 2] * dy
+        near.mean[i] = outside[k] / n
         for j in range(i + 1):
-            k = 4 + i if i == j else 6 + i + j  # 10, 20, 21 are at 7, 8, 9
-            near.covariance[i, j] = ((a.around[k] - b.around[k] - c.around[k] + d.around[k]) / n
-                                     - near.mean[i] * near.mean[j])
+            near.covariance[i, j] = outside[k + 1 + j] / n - near.mean[i] * near.mean[j]
+        k += i + 2
     for i in range(3):
         near.mean[i] += backdrop[i]
 
@@ -419,10 +402,7 @@ def _least_noise(near, weight):
 
 @njit(cache=True)
 def chroma_noise(u, v, region, kind):
-    """(sum, count): squared mixed second differences / 4 inside the paint; their mean is one chroma plane's variance.
-
-    The mixed difference of a 2x2 block cancels any linear shading.
-    """
+    """(sum, count) of the noise's variance over 2x2 blocks inside the paint."""
     x0, x1, y0, y1 = region
     total = 0.0
     count = 0
@@ -430,11 +410,7 @@ def chroma_noise(u, v, region, kind):
         for column in range(x0, x1):
             if (kind[row, column] == INTERIOR and kind[row, column + 1] == INTERIOR
                     and kind[row + 1, column] == INTERIOR and kind[row + 1, column + 1] == INTERIOR):
-                du = (np.float64(u[row, column]) - u[row, column + 1]
-                      - u[row + 1, column] + u[row + 1, column + 1])
-                dv = (np.float64(v[row, column]) - v[row, column + 1]
-                      - v[row + 1, column] + v[row + 1, column + 1])
-                total += (du * du + dv * dv) * 0.125
+                total += block_noise(u, v, row, column)
                 count += 1
     return total, count
 

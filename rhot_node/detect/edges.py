@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_node.detect.foreground import Foreground, foreground_at, gain_of
+from rhot_node.detect.image import MAD_SD
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -44,7 +45,8 @@ SHADED_PX = 0.5
 drawn hands (`python benchmarks/bare_hand.py --only edges`, "skin")."""
 
 _BLEND_REACH = 3  # px from the steepest place to where hand and background are half and half
-_BLEND_SMOOTHED = 0.61  # noise of a mean of three with weights 1/4, 1/2, 1/4
+_BESIDE = 0.5 * 0.5  # weight of either neighbour in a mean of three
+_BLEND_SMOOTHED = math.sqrt(0.5 * 0.5 + 2.0 * _BESIDE**2)  # noise of that mean
 
 _HALF = 4
 _PLACES = np.arange(-_HALF, _HALF + 1.0)
@@ -80,9 +82,8 @@ def find_edges(image: Image, slices: Array, foreground: Foreground, noise: float
     """
     n = len(slices)
     edges = Edges(np.zeros(n, np.int64), *(np.zeros((n, EDGES_MAX)) for _ in range(5)))
-    longest = 2 * math.ceil(slices[:, 4].max()) + 1 + 2 * BEYOND if n else 1
-    _find(image, slices, foreground.hand, foreground.rest, foreground.mean, foreground.sd,
-          gain_of(image, foreground), noise, np.empty((4, longest)), np.empty(longest), np.empty(longest), *edges)
+    if n:
+        _find(image, slices, foreground, gain_of(image, foreground), noise, edges)
     return edges
 
 
@@ -90,7 +91,7 @@ def noise_of(image: Image) -> float:
     """Standard deviation of a pixel's noise, of 255: the median deviation of green from its neighbours' mean."""
     green = image[::2, :, 1].astype(np.float32)
     deviation = np.abs(green[:, 1:-1] - 0.5 * (green[:, :-2] + green[:, 2:]))
-    return max(1.0, float(np.median(deviation)) / (0.6745 * math.sqrt(1.5)))
+    return max(1.0, MAD_SD * float(np.median(deviation)) / math.sqrt(1.0 + 0.5))
 
 
 @njit(cache=True, error_model="numpy")
@@ -114,14 +115,16 @@ def _across(image, x, y, nx, ny):
     r, g, b = _bilinear(image, x, y)
     r1, g1, b1 = _bilinear(image, x - ny, y + nx)
     r2, g2, b2 = _bilinear(image, x + ny, y - nx)
-    return 0.5 * r + 0.25 * (r1 + r2), 0.5 * g + 0.25 * (g1 + g2), 0.5 * b + 0.25 * (b1 + b2)
+    return 0.5 * r + _BESIDE * (r1 + r2), 0.5 * g + _BESIDE * (g1 + g2), 0.5 * b + _BESIDE * (b1 + b2)
 
 
 @njit(cache=True, error_model="numpy")
-def _find(image, slices, hand, rest, mean, sd, gain, noise, profile, ours, slope, count, offset, spread, strength,
-          inside, outside):
-    noise_slope = noise * _TAPS_NOISE
-    derivative = np.empty(profile.shape)
+def _find(image, slices, foreground, gain, noise, edges):
+    count, offset, spread, strength, inside, outside = edges
+    noise_slope, mean = noise * _TAPS_NOISE, foreground.mean
+    longest = 2 * math.ceil(slices[:, 4].max()) + 1 + 2 * BEYOND
+    profile, derivative = np.empty((4, longest)), np.empty((4, longest))
+    ours, slope = np.empty(longest), np.empty(longest)
     for s in range(slices.shape[0]):
         cx, cy, nx, ny = slices[s, 0], slices[s, 1], slices[s, 2], slices[s, 3]
         half = math.ceil(slices[s, 4])
@@ -134,7 +137,7 @@ def _find(image, slices, hand, rest, mean, sd, gain, noise, profile, ours, slope
             if math.isnan(r):
                 continue
             first, last = min(first, i), i
-            ours[i] = foreground_at(image, int(y + 0.5), int(x + 0.5), hand, rest, mean, sd, gain)
+            ours[i] = foreground_at(image, int(y + 0.5), int(x + 0.5), foreground, gain)
             profile[0, i], profile[1, i], profile[2, i], profile[3, i] = r, g, b, FOREGROUND_STEP * ours[i]
         slope[:length] = 0.0
         if last - first >= 2 * _HALF:
@@ -161,9 +164,9 @@ def _find(image, slices, hand, rest, mean, sd, gain, noise, profile, ours, slope
             strength[s, place] = slope[i] if brighter >= 0.0 else -slope[i]
             inside[s, place] = _mean_beside(ours, i, -1, first, last)
             outside[s, place] = _mean_beside(ours, i, 1, first, last)
-            if mean.shape[0] and i - 5 >= first and inside[s, place] > 0.5 > outside[s, place]:
+            if mean.shape[0] and i - 1 - _HALF >= first and inside[s, place] > 0.5 > outside[s, place]:
                 along = i - half - BEYOND
-                shift, sd_px = _half_hand(mean, gain, noise, profile, i, cx + along * nx, cy + along * ny, nx, ny)
+                shift, sd_px = _half_hand(mean, gain, noise, profile, i, (cx + along * nx, cy + along * ny, nx, ny))
                 if sd_px < SHADED_PX:
                     offset[s, place], spread[s, place] = along + shift, max(sd_px, _LEAST_SD)
         count[s] = found
@@ -187,17 +190,18 @@ def _slopes(profile, derivative, slope):
 
 
 @njit(cache=True, error_model="numpy")
-def _half_hand(mean, gain, noise, profile, i, x, y, nx, ny):
-    """Where, px from sample `i` of the profile, which is at (x, y), hand and background each have half of a pixel, and
-    its standard deviation px; infinite where there is no such place or noise hides it.
+def _half_hand(mean, gain, noise, profile, i, at):
+    """Where, px from sample `i` of the profile, hand and background have half of a pixel each, and its standard
+    deviation px; infinite where there is no such place or noise hides it. `at`: x, y, px, and the unit normal's.
 
     A sample is a blend a f + (1 - b) g of the hand's colour f, a little inside, and of the background's g at the same
     place. The hand's part b differs from `a` by the hand's shading.
     """
+    x, y, nx, ny = at
     variance, prior = 0.5 * noise * noise, 1.0 / SHADE_SD**2
     hand, ff = np.zeros(3), prior
     for k in range(3):
-        hand[k] = (profile[k, i - 5] + profile[k, i - 4] + profile[k, i - 3]) / 3.0
+        hand[k] = np.mean(profile[k, i - 1 - _HALF:i - 1 - _HALF + _BLEND_REACH])
         ff += hand[k] * hand[k] / variance
     part, spread, behind = np.empty(2 * _BLEND_REACH + 4), np.empty(2 * _BLEND_REACH + 4), np.empty(3)
     for n in range(part.shape[0]):
@@ -217,9 +221,9 @@ def _half_hand(mean, gain, noise, profile, i, x, y, nx, ny):
         part[n] = (ff * g_side + fg * f_side) / determinant
         spread[n] = ff / determinant
     nearest, sd_px = math.inf, math.inf
-    before = 0.25 * part[0] + 0.5 * part[1] + 0.25 * part[2]
+    before = _BESIDE * (part[0] + part[2]) + 0.5 * part[1]
     for n in range(2, part.shape[0] - 1):
-        after = 0.25 * part[n - 1] + 0.5 * part[n] + 0.25 * part[n + 1]
+        after = _BESIDE * (part[n - 1] + part[n + 1]) + 0.5 * part[n]
         if before >= 0.5 > after:
             place = n - 2 - _BLEND_REACH + (before - 0.5) / (before - after)
             if abs(place) < abs(nearest):

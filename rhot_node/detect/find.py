@@ -14,22 +14,19 @@ from numpy.typing import NDArray
 
 from rhot_node.detect.colour import directions, sector_table
 from rhot_node.detect.coverage import INTERIOR, OUTSIDE, Measured
-from rhot_node.detect.follow import Followed, Noise, learn_noise, noise_level
+from rhot_node.detect.follow import Followed, Noise, noise_level
 from rhot_node.detect.illuminant import Illuminant
 from rhot_node.detect.image import YuvImage, rows_of, table_of
 from rhot_node.detect.search import AREA_MIN, Blob, ColourGate
 from rhot_node.detect.segment import Paint, measure, scratch
 from rhot_node.detect.track import (
-    FLOOR_VARIANCE,
     MARGIN,
     MEMORY_FRAMES,
     Report,
     Request,
     Track,
-    blob_cost,
     expect,
     is_outside,
-    mask_variance,
     new_tracks,
     observe,
 )
@@ -141,7 +138,7 @@ class Finder:
             if self._measure(image, index):
                 tracks[index] = self._unknown[index]
                 flags = observe(tracks, index, self._measured, noise_level(self._noise), MarkerFlag.ACQUIRED.value,
-                                FLOOR_VARIANCE, reports)
+                                reports)
                 everything[index].append(_observation(index, reports[index], flags))
         return [sorted(own, key=lambda seen: -seen.diameter) for own in everything]
 
@@ -159,27 +156,21 @@ class Finder:
         return True
 
     def _measure(self, camera_image: YuvImage, slot: int, careful: bool = True) -> bool:
-        """Measure the marker of a track as requested and learn the chroma noise from its paint.
-
-        `careful` as in `measure`. Returns False when the window does not show the marker.
-        """
+        """Measure the marker of a track as requested; False when the window does not show it."""
         if self._balanced is None:
             self._balanced = self._light.balanced(camera_image)
-        if not measure(self._balanced, self._paints[slot % self._count], self._request, self._scratch, careful,
-                       self._measured):
-            return False
-        learn_noise(self._noise, self._measured["noise_sum"].item(), self._measured["noise_count"].item())
-        return True
+        return bool(measure(self._balanced, self._paints[slot % self._count], self._request, self._scratch, careful,
+                            self._noise, self._measured))
 
-    def _observe(self, slot: int, flags: MarkerFlag, careful: bool = True) -> MarkerObservation:
-        """Take what was measured into a track and return it as an observation. `careful`: how it was measured."""
-        row, index = Measured._make(rows_of(self._measured)[0].tolist()), slot % self._count
+    def _observe(self, slot: int, flags: MarkerFlag) -> MarkerObservation:
+        """Take what was measured into a track and return it as an observation."""
+        index = slot % self._count
         if slot == self._best[index]:
-            self._paint_pixels[index] = row.paint_pixels
-            if careful:
-                self.paint[index] = self._light.unbalanced(np.array([row.paint_y, row.paint_cb, row.paint_cr]))
-        floor = FLOOR_VARIANCE if careful else mask_variance(row.area)
-        flag = observe(self._tracks, slot, self._measured, noise_level(self._noise), flags.value, floor, self._reports)
+            row = self._measured[0]
+            self._paint_pixels[index] = row["paint_pixels"]
+            if row["careful"]:
+                self.paint[index] = self._light.unbalanced(np.array([row["paint_y"], row["paint_cb"], row["paint_cr"]]))
+        flag = observe(self._tracks, slot, self._measured, noise_level(self._noise), flags.value, self._reports)
         return _observation(index, self._reports[slot], flag)
 
     def _follow(self, camera_image: YuvImage, slot: int, seen: MarkerObservation) -> bool:
@@ -252,23 +243,19 @@ class Finder:
 
     def _acquire(self, camera_image: YuvImage, index: int, own: list[Blob], seen: dict[int, MarkerObservation],
                  careful: bool) -> list[Blob]:
-        """Find a lost marker among its blobs `own` and add it to `seen`; returns the other blobs.
+        """Find a lost marker among its blobs `own`, in the order of `Blob.merit`, and add it to `seen`.
 
-        While the track is remembered, blobs are tried in the order of its motion and size, else by `Blob.merit`.
+        Returns the other blobs.
         """
         slot = self._best[index]
-        track = self._track(slot)
+        marker, shape = self._markers[index], self._scratch.mask.shape
         if len(own) > 1:
-            if track.missed < MEMORY_FRAMES:
-                own = sorted(own, key=lambda blob: blob_cost(track, blob))
-            else:
-                marker, shape = self._markers[index], self._scratch.mask.shape
-                own = sorted(own, key=lambda blob: -blob.merit(marker, shape))
+            own.sort(key=lambda blob: -blob.merit(marker, shape))
         for place, blob in enumerate(own[:CANDIDATES_MAX]):
             self._request_blob(index, blob)
             if self._measure(camera_image, slot, careful) and not self._is_pale(slot, self._measured["level"].item()):
                 self._measured["rival_cost"] = np.inf  # it was the best blob of the whole frame
-                seen[slot] = self._observe(slot, MarkerFlag.ACQUIRED, careful)
+                seen[slot] = self._observe(slot, MarkerFlag.ACQUIRED)
                 return own[:place] + own[place + 1:]
         return own[CANDIDATES_MAX:]
 

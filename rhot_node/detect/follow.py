@@ -20,25 +20,21 @@ from numpy.typing import NDArray
 
 from rhot_node.detect import outline_pixels as c
 from rhot_node.detect import track as t
-from rhot_node.detect.band import ARC, BLUR_VARIANCE, mend_band
-from rhot_node.detect.image import GREY, YuvImage, rows_of, table_of
+from rhot_node.detect.band import ARC, BLUR_VARIANCE, length_of, mend_band
+from rhot_node.detect.image import GREY, YuvImage, block_noise, rows_of, table_of
 from rhot_node.detect.outline import fit
 from rhot_node.detect.outline_pixels import project, workspace
 from rhot_node.wire.messages import MarkerObservation
 
 AREA_LEAST = 22.0  # px^2: a smaller marker has too little inside
 NOISE_MOST = 0.12  # of the contrast
-SOFT_LOW, SOFT_HIGH = 0.25, 0.75  # projected chroma that counts not at all, and as paint
+SOFT = 0.25  # projected chroma that counts not at all; so much below that of paint, it counts as paint
 OTHER_HUE = 0.4  # of the contrast: what lies further beside the line from surroundings to paint is another paint
 SOFT_RATIO = 1.35  # of the expected area: what the soft area may be off, both ways
 AREA_RATIO = 1.10  # and the outline's
-LEVEL_OFF = 0.10  # of the paint's level from one frame to the next: another light, or another paint
-AWAY_MOST = 0.8  # px from the soft centroid to the outline's
-DENT_MOST = 0.45  # px that a radius may move against the others in a frame
 MISFIT_NOISE, MISFIT_MOST = 2.0, 0.10  # standard deviations of the noise, and of the contrast
 TURN_MOST = 0.17  # rad: an elongated marker that has turned further gets new axes
 ELONGATED = 1.3
-SPEED_MOST = 8.0  # px per frame: a faster marker's edges are smeared, by one side more than by the other
 MARGIN = 3.0  # px around a resting marker
 
 NOISE_MIN = 0.5  # grey levels of chroma noise; quantisation alone leaves 0.3
@@ -150,7 +146,7 @@ def learn_noise(noises, total, count):
 
 @njit(**c.FAST)
 def _learn_noise_inside(image, fitted, noises):
-    """From the square inside the marker: mixed second differences, which cancel any linear shading."""
+    """From the square inside the marker."""
     u, v = image.u, image.v
     half = 0.5 * (fitted.m_xx + fitted.m_yy)
     short = half - math.hypot(0.5 * (fitted.m_xx - fitted.m_yy), fitted.m_xy)
@@ -160,9 +156,7 @@ def _learn_noise_inside(image, fitted, noises):
     count = 0
     for row in range(math.ceil(y - reach), int(y + reach)):
         for column in range(math.ceil(x - reach), int(x + reach)):
-            du = np.float64(u[row, column]) - u[row, column + 1] - u[row + 1, column] + u[row + 1, column + 1]
-            dv = np.float64(v[row, column]) - v[row, column + 1] - v[row + 1, column] + v[row + 1, column + 1]
-            total += (du * du + dv * dv) * 0.125
+            total += block_noise(u, v, row, column)
             count += 1
     learn_noise(noises, total, count)
 
@@ -179,13 +173,13 @@ def _soft(image, track, outline, fitted):
     px, py = track.x + track.vx + track.sag_x, track.y + track.vy + track.sag_y
     edge = 0.5 * track.extent + c.BAND + 0.5 * speed
     height, width = u.shape
-    if not speed < SPEED_MOST or not min(px, py, width - 1.0 - px, height - 1.0 - py) > edge:
+    if not min(px, py, width - 1.0 - px, height - 1.0 - py) > edge:
         return False
     x0, x1 = max(int(px - half), 0), min(int(px + half) + 1, width - 1)
     y0, y1 = max(int(py - half), 0), min(int(py + half) + 1, height - 1)
-    ramp = 1.0 / (SOFT_HIGH - SOFT_LOW)
+    ramp = 1.0 / (1.0 - 2.0 * SOFT)
     wu, wv = outline.w_u * ramp, outline.w_v * ramp
-    zero = wu * outline.around_u + wv * outline.around_v + SOFT_LOW * ramp
+    zero = wu * outline.around_u + wv * outline.around_v + SOFT * ramp
     du, dv = outline.paint_u - outline.around_u, outline.paint_v - outline.around_v
     tint = du * outline.around_v - dv * outline.around_u
     other = OTHER_HUE * (du * du + dv * dv)
@@ -211,18 +205,9 @@ def _soft(image, track, outline, fitted):
 @njit(**c.FAST)
 def _outline(image, track, outline, noise, work):
     """Fit the outline about the soft centroid; False when the marker is not as plainly in view as it was."""
-    fitted, radius = work.fitted[0], outline.radius
-    growth = math.exp(0.5 * track.rate)
-    for j in range(c.NODES + 1):
-        radius[j] *= growth
-    x, y, before_u, before_v = fitted.x, fitted.y, outline.paint_u, outline.paint_v
-    contrast = math.hypot(before_u - outline.around_u, before_v - outline.around_v)
-    if not fit(image, x, y, outline, np.int64(1), work):
-        return False
-    return (track.area < AREA_RATIO * fitted.area and fitted.area < AREA_RATIO * track.area
-            and math.hypot(outline.paint_u - before_u, outline.paint_v - before_v) < LEVEL_OFF * contrast
-            and math.hypot(fitted.x - x, fitted.y - y) < AWAY_MOST
-            and fitted.dent < DENT_MOST
+    fitted = work.fitted[0]
+    return (fit(image, fitted.x, fitted.y, outline, np.int64(1), work)
+            and track.area < AREA_RATIO * fitted.area and fitted.area < AREA_RATIO * track.area
             and _misfit_is_noise(outline, fitted, noise)
             and _axes_hold(outline, fitted))
 
@@ -251,7 +236,7 @@ def _axes_hold(outline, fitted):
 @njit(**c.FAST)
 def _state(track, fitted, outline, noise, report):
     """Report what was fitted, and take it into the track."""
-    extent = t.length_of(0.5 * (fitted.m_xx + fitted.m_yy
+    extent = length_of(0.5 * (fitted.m_xx + fitted.m_yy
                                 + math.hypot(fitted.m_xx - fitted.m_yy, 2.0 * fitted.m_xy)))
     bias = math.hypot(t.hidden_bias(fitted.area / track.area, max(extent, track.extent), fitted.area, t.SHARP),
                       t.smear_bias(outline.blur))
@@ -298,7 +283,7 @@ def start(image, tracks, outlines, slot, measured, noises, work):
     if not _levels(image, place.x - away * place.axis_y, place.y + away * place.axis_x, 2.0 * math.sqrt(long2),
                    2.0 * math.sqrt(high2), outline):
         return False
-    outline.bend, outline.width = place.sag, math.sqrt(3.0 * long2) if rims else 0.0
+    outline.bend, outline.width = place.sag, 0.5 * length_of(long2) if rims else 0.0
     _first_radii(outline, long2, max(high2 - ARC_VARIANCE * place.sag * place.sag, 0.5))
     x, y = place.x, place.y
     for _ in range(3):

@@ -22,7 +22,9 @@ Mask = NDArray[np.bool_]
 BINS = 32
 """Bins of a colour histogram per channel, as in Jones and Rehg 1999, section 3."""
 
-ANY = 1.0 / 256.0**3
+_BIN = 8  # values of a channel in one bin
+
+ANY = float(_BIN * BINS) ** -3
 """Density of a colour of which nothing is known."""
 
 SKIN_CB, SKIN_CR = (77, 127), (133, 173)
@@ -35,11 +37,9 @@ PRIOR_IMAGES = 8
 """Weight, in images, of the median variance of all pixels when one pixel's variance is estimated (shrinkage; chosen: as
 many as show a background in a quarter of a second)."""
 
-_BIN = 256 // BINS  # values of a channel in one bin
-_INVERSE_ROOT_2PI = 0.3989423
+_INVERSE_ROOT_2PI = 1.0 / math.sqrt(2.0 * math.pi)
 _SAMPLES = 1200  # pixels of which the exposure is estimated, about
 _DARK, _BRIGHT = 16.0, 240.0  # of 255: less is noise, more is clipped
-_GAIN_LOG, _GAIN_BINS = 0.7, 70  # exposures differ by a factor of 2 at most; bins of 2 %
 _LEAST_SAMPLES = 70  # the median of so many ratios errs by 15 % of one ratio's standard deviation
 _BEYOND_SD = 8.0  # a colour so far from the background is 10^7 times less probable there than an unusual one
 _FOREIGN = 4.0  # standard deviations of the background
@@ -57,16 +57,19 @@ class Foreground(NamedTuple):
     sd: Array32
 
     @property
+    def _has_colours(self) -> bool:
+        return bool(np.ptp(self.hand) > 0.0)
+
+    @property
     def informative(self) -> bool:
         """Whether it has a background or colours of the hand."""
-        return bool(self.mean.size) or float(self.hand.max()) > 1.001 * ANY
+        return bool(self.mean.size) or self._has_colours
 
     @property
     def sentence(self) -> str:
         """What is known, for the operator."""
         background = "The background is learnt" if self.mean.size else "No background is learnt"
-        learnt = self.hand.max() > 1.001 * ANY
-        colours = "the hand's colours are known" if learnt else "no colours of the hand are known"
+        colours = "the hand's colours are known" if self._has_colours else "no colours of the hand are known"
         return f"{background}; {colours}."
 
 
@@ -78,7 +81,7 @@ def no_foreground() -> Foreground:
 
 def skin_foreground() -> Foreground:
     """Skin of any tone, by its chroma alone."""
-    centres = (np.arange(BINS) * (256 // BINS) + 128 // BINS).astype(np.uint8)
+    centres = (np.arange(BINS) * _BIN + _BIN // 2).astype(np.uint8)
     grid = np.stack(np.meshgrid(centres, centres, centres, indexing="ij"), axis=-1).reshape(-1, 1, 3)
     skin = skin_mask(grid).ravel()
     hand = np.where(skin, (1.0 - UNUSUAL) / max(skin.mean(), 1e-6), UNUSUAL) * ANY
@@ -167,7 +170,8 @@ def _density(pixels: Image) -> Array32:
 
 def gain_of(image: Image, model: Foreground) -> Array32:
     """(3,) ratio of an image's brightness to the learnt background's, per channel: automatic exposure, white balance.
-    The mode over pixels, robust while the hand covers less than the background; 1 where it is beyond a factor of 2."""
+    That of the half of the pixels that agree best, robust while the hand covers less than the background; factors
+    beyond 2 are none of an exposure."""
     gain = np.ones(3, np.float32)
     if model.mean.size:
         _gain(image, model.mean, gain)
@@ -178,48 +182,37 @@ def gain_of(image: Image, model: Foreground) -> Array32:
 def _gain(image, mean, gain):
     step = max(1, int(np.sqrt(image.shape[0] * image.shape[1] / _SAMPLES)))
     rows, columns = image.shape[0] // step, image.shape[1] // step
-    ratio, whole, used = np.empty((rows * columns, 3)), np.empty(rows * columns), 0
-    counts = np.zeros(_GAIN_BINS, np.int64)
+    ratio, used = np.empty((rows * columns, 3)), 0
     for n in range(rows * columns):
         row, column = n // columns * step + step // 2, n % columns * step + step // 2
         usable = True
         for k in range(3):
             now, before = float(image[row, column, k]), float(mean[row, column, k])
-            usable = usable and _DARK < now < _BRIGHT and _DARK < before < _BRIGHT
-        if not usable:
-            continue
-        whole[used] = 0.0
-        for k in range(3):
-            ratio[used, k] = np.log(float(image[row, column, k]) / float(mean[row, column, k]))
-            whole[used] += ratio[used, k] / 3.0
-        place = int((whole[used] / _GAIN_LOG + 1.0) * 0.5 * _GAIN_BINS)
-        if whole[used] > -_GAIN_LOG and place < _GAIN_BINS:
-            counts[place] += 1
-            used += 1
+            usable = usable and _DARK < now < _BRIGHT and _DARK < before < _BRIGHT and 0.5 < now / before < 2.0
+            ratio[used, k] = now / before if usable else 1.0
+        used += usable
     if used < _LEAST_SAMPLES:
         return
-    top, most = 1, -1
-    for k in range(1, _GAIN_BINS - 1):
-        number = counts[k - 1] + counts[k] + counts[k + 1]
-        if number > most:
-            top, most = k, number
-    low, high = (top - 1) * 2.0 / _GAIN_BINS - 1.0, (top + 2) * 2.0 / _GAIN_BINS - 1.0
-    kept = (whole[:used] >= low * _GAIN_LOG) & (whole[:used] < high * _GAIN_LOG)
+    ratio = ratio[:used]
+    whole = ratio[:, 0] * ratio[:, 1] * ratio[:, 2]
+    ordered, half = np.sort(whole), used // 2  # the shortest half: Rousseeuw 1984, least median of squares
+    first = np.argmin(ordered[half:] / ordered[:used - half])
+    kept = (whole >= ordered[first]) & (whole <= ordered[first + half])
     for k in range(3):
-        gain[k] = np.exp(np.median(ratio[:used, k][kept]))
+        gain[k] = np.median(ratio[:, k][kept])
 
 
 @njit(cache=True, error_model="numpy")
-def foreground_at(image, row, column, hand, rest, mean, sd, gain):
+def foreground_at(image, row, column, model, gain):
     """Probability that a pixel shows the hand, in an image `gain` (3,) times brighter than the background's."""
     r, g, b = image[row, column, 0], image[row, column, 1], image[row, column, 2]
     index = (np.int64(r) // _BIN * BINS + np.int64(g) // _BIN) * BINS + np.int64(b) // _BIN
-    ours, theirs = hand[index], rest[index]
+    ours, theirs, mean = model.hand[index], model.rest[index], model.mean
     if mean.shape[0] == 0:
         return ours / (ours + theirs)
     squared, density = 0.0, 1.0
     for k in range(3):
-        precision = 1.0 / (sd[row, column, k] * max(gain[k], np.float32(1.0)))
+        precision = 1.0 / (model.sd[row, column, k] * max(gain[k], np.float32(1.0)))
         z = (image[row, column, k] - gain[k] * mean[row, column, k]) * precision
         squared += z * z
         density *= _INVERSE_ROOT_2PI * precision
@@ -230,14 +223,14 @@ def foreground_at(image, row, column, hand, rest, mean, sd, gain):
 
 
 @njit(cache=True)
-def _fill(image, hand, rest, mean, sd, gain, step, out):
+def _fill(image, model, gain, step, out):
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
-            out[i, j] = foreground_at(image, i * step + step // 2, j * step + step // 2, hand, rest, mean, sd, gain)
+            out[i, j] = foreground_at(image, i * step + step // 2, j * step + step // 2, model, gain)
 
 
 def foreground_map(image: Image, model: Foreground, step: int = 4) -> Array32:
     """(H // step, W // step) foreground probabilities of an image (H, W, 3) RGB, of every `step`-th pixel."""
     out = np.empty((image.shape[0] // step, image.shape[1] // step), np.float32)
-    _fill(image, model.hand, model.rest, model.mean, model.sd, gain_of(image, model), step, out)
+    _fill(image, model, gain_of(image, model), step, out)
     return out

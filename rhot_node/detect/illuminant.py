@@ -16,8 +16,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect.image import GREY, YuvImage
-from rhot_node.detect.search import ColourGate
+from rhot_node.detect.colour import MAGNITUDE_MIN
+from rhot_node.detect.image import GREY, WHITE, YuvImage, luma_at
+from rhot_node.detect.search import AREA_MIN, ColourGate
 from rhot_node.markers import Marker, MarkerSet
 
 Array = NDArray[np.float64]
@@ -29,14 +30,13 @@ WARMTH_MOST = 1.3
 DEAD_ZONE = 0.05  # less is no other light: hues move by 3 degrees at most
 STEP = 0.05  # of the table of predicted hues
 WARMTH_SIGMA = 0.35  # how far lights are from the light of the calibration
+TURN_DEG = 360.0
 HUE_SIGMA_DEG = 3.0  # how well a paint's hue is known
 HUE_CAP_DEG = 15.0  # a marker that is further off is not itself, and counts no more than this
 INFORMATION_LEAST = 50.0  # 1 / variance of a warmth that is worth as much as the last known one
-INFORMATION_SURE = 300.0  # the same of a warmth known to 0.06
 MARKERS_LEAST = 3  # the hues of fewer markers agree with several lights
 SWITCHED = 0.12  # of warmth in one frame: no lamp drifts so fast
 STRENGTH_LEAST = 0.3  # of the chroma that a paint should show in this light: less is something else, or deep shade
-MAGNITUDE_MIN = 8.0  # grey levels of chroma below which a paint shows no hue
 
 KR, KB = 0.299, 0.114
 """Shares of red and blue in luma (ITU-R BT.601)."""
@@ -59,8 +59,8 @@ def paint_rgb(marker: Marker) -> Array:
     """
     shown = YCC_FROM_RGB @ np.array(marker.display_rgb, dtype=np.float64)
     strength = marker.chroma.magnitude / max(float(np.hypot(shown[1], shown[2])), 1.0)
-    luma = min(max(float(shown[0]) * min(max(strength, 0.3), 3.0), 10.0), 245.0)
-    return np.clip(RGB_FROM_YCC @ np.array([luma, marker.chroma.cb, marker.chroma.cr]), 1.0, 255.0)
+    colour = RGB_FROM_YCC @ np.array([strength * shown[0], marker.chroma.cb, marker.chroma.cr])
+    return np.clip(colour, 1.0, WHITE)
 
 
 class Illuminant:
@@ -68,9 +68,9 @@ class Illuminant:
 
     def __init__(self, markers: MarkerSet) -> None:
         self.temperature_shift = 0.0
-        self._grid = np.arange(-WARMTH_MOST, WARMTH_MOST + 0.5 * STEP, STEP)
-        self._hues = predicted_hues(markers.markers, self._grid)
-        self._strengths = np.hypot(*predicted_chroma(markers.markers, self._grid).transpose(2, 0, 1))
+        self.grid = np.arange(-WARMTH_MOST, WARMTH_MOST + 0.5 * STEP, STEP)
+        self._hues = predicted_hues(markers.markers, self.grid)
+        self._strengths = np.hypot(*predicted_chroma(markers.markers, self.grid).transpose(2, 0, 1))
         self._u = self._v = np.zeros((0, 0), dtype=np.uint8)
 
     def balanced(self, image: YuvImage, step: int = 1, first: int = 0) -> YuvImage:
@@ -95,7 +95,7 @@ class Illuminant:
     def strong(self, indices: list[int], colours: Array) -> NDArray[np.bool_]:
         """(N,) whether colours (N, 3) Y, Cb, Cr, as the camera shows them, are as strong as the paints of the markers
         `indices` should be in this light."""
-        here = int(np.argmin(np.abs(self._grid - self.temperature_shift)))
+        here = int(np.argmin(np.abs(self.grid - self.temperature_shift)))
         expected = STRENGTH_LEAST * self._strengths[np.asarray(indices, dtype=np.intp), here]
         return np.asarray(np.hypot(colours[:, 1], colours[:, 2]) >= np.maximum(expected, MAGNITUDE_MIN))
 
@@ -110,11 +110,11 @@ class Illuminant:
         if not strong.any():
             return 0.0
         hues = np.degrees(np.arctan2(colours[strong, 2], colours[strong, 1]))
-        fitted, information = fit_temperature_shift(hues, self._hues[chosen[strong]], self._grid)
-        if np.count_nonzero(strong) >= MARKERS_LEAST and abs(fitted - self.temperature_shift) >= SWITCHED \
-                and information >= INFORMATION_SURE:
+        fitted, information = fit_temperature_shift(hues, self._hues[chosen[strong]], self.grid)
+        away = fitted - self.temperature_shift
+        if np.count_nonzero(strong) >= MARKERS_LEAST and abs(away) >= max(SWITCHED, 2.0 / math.sqrt(information + 1.0)):
             steady = 0.0
-        change = (1.0 - steady) * information / (information + INFORMATION_LEAST) * (fitted - self.temperature_shift)
+        change = (1.0 - steady) * information / (information + INFORMATION_LEAST) * away
         self.temperature_shift += change
         return abs(change)
 
@@ -145,8 +145,7 @@ def balance(y, u, v, matrix, step, first, out_u, out_v):
     """
     for row in range(first, u.shape[0], step):
         for column in range(u.shape[1]):
-            luma = 0.25 * (np.float64(y[2 * row, 2 * column]) + y[2 * row, 2 * column + 1]
-                           + y[2 * row + 1, 2 * column] + y[2 * row + 1, 2 * column + 1])
+            luma = luma_at(y, row, column)
             cb, cr = np.float64(u[row, column]) - GREY, np.float64(v[row, column]) - GREY
             out_u[row, column] = _byte(matrix[0, 0] * luma + matrix[0, 1] * cb + matrix[0, 2] * cr)
             out_v[row, column] = _byte(matrix[1, 0] * luma + matrix[1, 1] * cb + matrix[1, 2] * cr)
@@ -154,7 +153,7 @@ def balance(y, u, v, matrix, step, first, out_u, out_v):
 
 @njit(cache=True)
 def _byte(chroma):
-    return min(max(int(np.floor(chroma + GREY + 0.5)), 0), 255)
+    return min(max(int(np.floor(chroma + GREY + 0.5)), 0), WHITE)
 
 
 @njit(cache=True)
@@ -167,8 +166,9 @@ def fit_temperature_shift(hues, predicted, grid):
     misfit = np.zeros(len(grid))
     for k in range(len(grid)):
         for n in range(len(hues)):
-            away = min(abs((hues[n] - predicted[n, k] + 180.0) % 360.0 - 180.0), HUE_CAP_DEG)
-            misfit[k] += (away / HUE_SIGMA_DEG) ** 2
+            away = hues[n] - predicted[n, k]
+            away -= TURN_DEG * np.floor(away / TURN_DEG + 0.5)
+            misfit[k] += (min(abs(away), HUE_CAP_DEG) / HUE_SIGMA_DEG) ** 2
     costs = (grid / WARMTH_SIGMA) ** 2 + misfit
     best = np.argmin(costs)
     if best == 0 or best == len(grid) - 1:
@@ -181,12 +181,10 @@ def fit_temperature_shift(hues, predicted, grid):
 
 # -- illuminant estimation without a prior -----------------------------------------------------------------------------
 
-GUESSES = np.arange(-6, 7) * (WARMTH_MOST / 6.5)
-GUESS_SIGMA_DEG = 6.0  # what a guess half a step beside the light leaves
+GUESS_EVERY = 4  # steps of the grid: as far as a guess beside the light leaves twice HUE_SIGMA_DEG
 COMPACT = 0.5  # of the bounding box: a marker fills as much
 RECOGNISED = 0.25  # score of a marker
 ADVANTAGE = 1.0  # markers more than in the last known light
-GUESS_AREA_MIN = 12  # chroma pixels
 ROW_STEP = 4  # chroma rows: every fourth is searched
 ALL_THERE = 0.6  # of the greatest score: no other light can be much better
 
@@ -203,7 +201,7 @@ def guess_illuminant(image: YuvImage, light: Illuminant, gate: ColourGate, marke
     if scores.sum() >= ALL_THERE * len(hues):
         return False
     best, best_score = present, float(scores.sum()) + ADVANTAGE
-    for guess in GUESSES:
+    for guess in light.grid[::GUESS_EVERY]:
         light.temperature_shift = float(guess)
         scores = _scores(image, light, gate, hues)
         if scores.sum() > best_score and np.count_nonzero(scores > RECOGNISED) >= MARKERS_LEAST:
@@ -215,8 +213,8 @@ def guess_illuminant(image: YuvImage, light: Illuminant, gate: ColourGate, marke
 def _scores(image: YuvImage, light: Illuminant, gate: ColourGate, marker_hues: Array) -> Array:
     """(M,) 0..1: how well each marker's best blob has its hue, as far as it is compact."""
     scores = np.zeros(len(marker_hues))
-    for blob in gate.blobs(light.balanced(image, ROW_STEP), range(len(marker_hues)), GUESS_AREA_MIN, ROW_STEP):
+    for blob in gate.blobs(light.balanced(image, ROW_STEP), range(len(marker_hues)), 2 * AREA_MIN, ROW_STEP):
         index = int(blob.label) - 1
-        match = math.exp(-0.5 * (blob.off_hue(marker_hues[index]) / math.radians(GUESS_SIGMA_DEG)) ** 2)
+        match = math.exp(-0.5 * (blob.off_hue(marker_hues[index]) / math.radians(2.0 * HUE_SIGMA_DEG)) ** 2)
         scores[index] = max(scores[index], min(blob.compactness / COMPACT, 1.0) * match)
     return scores

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_node.detect.coverage import FLATNESS
 from rhot_node.detect.image import table_of
 
 # -- records -----------------------------------------------------------------------------------------------------------
@@ -20,9 +21,11 @@ SINES = np.sin(STEP_RAD * np.arange(NODES))
 HALF_COSINES = np.cos(STEP_RAD * (np.arange(NODES) + 0.5))
 HALF_SINES = np.sin(STEP_RAD * (np.arange(NODES) + 0.5))
 
+FINE = 256
+ANGLES = np.arctan(np.arange(FINE + 2.0) / FINE)  # rad, by the tangent in FINE steps
+
 BAND = 1.5  # px on either side of the outline that its blurred edge reaches
 RING_NEAR, RING_FAR = 1.4, 2.8  # px outside the outline: what surrounds the marker
-FLATNESS = 4.0  # grey levels^2 that surroundings are taken to vary by at least, as in `coverage`
 INSIDE_MIN = 4  # pixels that the paint's level is taken from at least
 BLUR_START, BLUR_LEAST, BLUR_MOST = 0.455, 0.38, 0.9  # px: point spread of 0.7 luma px and the 2x2 mean
 SLOW = 0.1  # gain of what changes slowly: shading, rim, blur
@@ -59,8 +62,8 @@ _NODE = np.dtype([(name, np.float64) for name in (
 
 
 class Fitted(NamedTuple):
-    """An outline's fit: centroid, area, covariance per unit variance of the noise, second moments, misfit, the farthest
-    that a radius moved against the others, and the paint's level. Chroma px."""
+    """An outline's fit: centroid, area, covariance per unit variance of the noise, second moments, misfit, and the
+    paint's level. Chroma px."""
 
     x: float
     y: float
@@ -72,7 +75,6 @@ class Fitted(NamedTuple):
     m_xy: float
     m_yy: float
     misfit: float
-    dent: float
     level: float
 
 
@@ -107,10 +109,9 @@ def _turn(u, v):
     """The angle of (u, v) in steps of NODES per turn, 0 <= turn <= NODES, to 1e-3 of a step's tenth."""
     a, b = abs(u), abs(v)
     low, high = min(a, b), max(a, b)
-    z = low / high
-    z2 = z * z
-    angle = z * (0.99997726 + z2 * (-0.33262347 + z2 * (0.19354346 + z2 * (-0.11643287
-                                                                         + z2 * (0.05265332 - z2 * 0.01172120)))))
+    place = FINE * low / high
+    first = np.uint64(place)
+    angle = ANGLES[first] + (place - first) * (ANGLES[first + ONE] - ANGLES[first])
     if b > a:
         angle = 0.5 * math.pi - angle
     if u < 0.0:
@@ -131,7 +132,7 @@ def gather(image, cx, cy, outline, pixels, nodes):
     ax, ay, long, high = outline.axis_x, outline.axis_y, 1.0 / outline.long, 1.0 / outline.high
     bend, width = outline.bend, 1.0 / max(outline.width, 1.0)
     wu, wv, bu, bv = outline.w_u, outline.w_v, outline.around_u, outline.around_v
-    deep, beyond = least - (BAND + 0.2) * max(long, high), most + RING_FAR * max(long, high)
+    deep, beyond = least - BAND * max(long, high), most + RING_FAR * max(long, high)
     deep2, beyond2 = deep * deep if deep > 0.0 else 0.0, beyond * beyond
     x0, x1, y0, y1 = _box(cx, cy, outline, beyond, u.shape)
     with_luma = outline.age % RESTING == 0.0

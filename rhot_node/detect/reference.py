@@ -10,7 +10,7 @@ import math
 import cv2
 import numpy as np
 
-from rhot_node.detect.image import Plane, YuvImage, to_bgr
+from rhot_node.detect.image import EVEN, GREY, WHITE, Plane, YuvImage, to_bgr
 from rhot_node.markers import Marker, MarkerSet, RangeModel
 from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
@@ -20,8 +20,9 @@ ROI_MARGIN = 40  # px around the last box (RHOT 7.2.1)
 BLUR = (5, 5)
 KERNEL = np.ones((3, 3), dtype=np.uint8)
 CONTOUR_AREA_MIN = 12.0  # px^2; smaller is noise
-BOX_VARIANCE = 1.0 / 12.0 + 0.25  # px^2: half-pixel steps of a box centre, and a noisy pixel on either side
+BOX_VARIANCE = EVEN + 0.5 * 0.5  # px^2: half-pixel steps of a box centre, and a noisy pixel on either side
 
+HUES = 180  # of OpenCV
 HUE_SLACK = 0.5  # OpenCV hue steps of 2 degrees per degree of the chroma model's tolerance
 SATURATION_LEFT = 0.55  # of the displayed colour's saturation
 VALUE_MIN = 50  # RHOT 6.3.2: at least 50
@@ -96,7 +97,7 @@ def _observe(index: int, box: Box, area: float, size: tuple[int, int], flags: Ma
     if x == 0 or y == 0 or x + width == size[0] or y + height == size[1]:
         flags |= MarkerFlag.EDGE
     return MarkerObservation(
-        index=index, x=x + 0.5 * (width - 1), y=y + 0.5 * (height - 1), diameter=math.sqrt(4.0 * area / math.pi),
+        index=index, x=x + 0.5 * (width - 1), y=y + 0.5 * (height - 1), diameter=2.0 * math.sqrt(area / math.pi),
         cov_xx=BOX_VARIANCE, cov_xy=0.0, cov_yy=BOX_VARIANCE, quality=min(1.0, area / (0.5 * width * height)),
         flags=flags)
 
@@ -114,14 +115,13 @@ def threshold_hsv(hsv: Plane, model: RangeModel) -> Plane:
     if lower[0] <= upper[0]:
         return _in_range(hsv, lower, upper)
     below = _in_range(hsv, (0, lower[1], lower[2]), upper)  # across red: from 0, and up to 179
-    return below | _in_range(hsv, lower, (179, upper[1], upper[2]))
+    return below | _in_range(hsv, lower, (HUES - 1, upper[1], upper[2]))
 
 
 def clean_mask(mask: Plane) -> Plane:
-    """Blur the mask, take its half level, close, then open (RHOT 6.3.3)."""
+    """Blur the mask (0, 255), take its half level, close, then open (RHOT 6.3.3)."""
     blurred = cv2.GaussianBlur(mask, BLUR, 0)
-    _, binary = cv2.threshold(blurred, 127, 255, cv2.THRESH_BINARY)
-    closed = cv2.morphologyEx(binary, cv2.MORPH_CLOSE, KERNEL)
+    closed = cv2.morphologyEx(cv2.compare(blurred, GREY, cv2.CMP_GE), cv2.MORPH_CLOSE, KERNEL)
     return np.asarray(cv2.morphologyEx(closed, cv2.MORPH_OPEN, KERNEL), dtype=np.uint8)
 
 
@@ -132,8 +132,8 @@ def range_of(marker: Marker) -> RangeModel:
     pixel = np.array([[marker.display_rgb[::-1]]], dtype=np.uint8)
     hue, saturation, value = (int(c) for c in cv2.cvtColor(pixel, cv2.COLOR_BGR2HSV)[0, 0])
     slack = max(4, round(HUE_SLACK * marker.chroma.hue_tolerance_deg))
-    lower = ((hue - slack) % 180, round(SATURATION_LEFT * saturation), min(VALUE_MIN, value // 2))
-    return RangeModel(space="hsv", lower=lower, upper=((hue + slack) % 180, 255, 255))
+    lower = ((hue - slack) % HUES, round(SATURATION_LEFT * saturation), min(VALUE_MIN, value // 2))
+    return RangeModel(space="hsv", lower=lower, upper=((hue + slack) % HUES, WHITE, WHITE))
 
 
 def _in_range(image: Plane, lower: tuple[int, ...], upper: tuple[int, ...]) -> Plane:

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from rhot_node.detect.band import band_center
 from rhot_node.detect.coverage import (
-    AREAS,
-    NEAR,
     PAD,
+    Areas,
     Scratch,
     centroid,
     chroma_noise,
@@ -23,6 +22,7 @@ from rhot_node.detect.coverage import (
     mask_centroid,
     unmix,
 )
+from rhot_node.detect.follow import learn_noise
 from rhot_node.detect.image import GREY, table_of
 
 ATTEMPTS = 5  # windows and levels tried before the marker counts as lost
@@ -63,17 +63,20 @@ def scratch(height: int, width: int) -> Scratch:
     """To measure in chroma planes of this size."""
     size = height, width
     return Scratch(np.zeros(size, np.int16), np.zeros(size, np.uint8), np.zeros((*size, 3), np.float32),
-                   np.zeros((height + 1, width + 1), AREAS), np.zeros(size, np.float32), np.zeros(size, np.float32),
+                   Areas(np.zeros((height + 1, width + 1, 6)), np.zeros((height + 1, width + 1, 10))),
+                   np.zeros(size, np.float32), np.zeros(size, np.float32),
                    np.zeros(height * width, np.int32), np.zeros(COMPONENTS_MAX, table_of(Component)),
-                   np.zeros(COMPONENTS_MAX, np.bool_), np.zeros(1, NEAR))
+                   np.zeros(COMPONENTS_MAX, np.bool_))
 
 
 @njit(cache=True)
-def measure(image, paint, request, scratch, careful, measured):
-    """Fill `measured` (1,) for the marker of a `paint`; False when the window of the `request` (1,) does not show it.
+def measure(image, paint, request, scratch, careful, noises, measured):
+    """Fill `measured` (1,) for the marker of a `paint`, and learn the chroma noise from that.
+
+    False when the window of the `request` (1,) does not show it.
 
     `careful` False: by the pixels that are more than half paint, without partial coverage. What is measured of the
-    paint, its noise and shading, and of a band's sag is then 0.
+    paint, its shading, and of a band's sag is then 0, and no noise is learnt.
     """
     expected, result = request[0], measured[0]
     components, own = scratch.components, scratch.own
@@ -105,20 +108,19 @@ def measure(image, paint, request, scratch, careful, measured):
             found = False
     if not found:
         return False
-    result.level = level
+    result.level, result.careful = level, careful
     if careful:
-        return _place(image, window, count, expected, scratch, result)
+        return _place(image, window, count, expected, scratch, noises, result)
     if here == 0.0 and components[best].area >= SEAM:
         return False
     result.v_xx = result.v_xy = result.v_yy = result.sag = result.sag_variance = result.fit = result.round = 0.0
-    result.soft = result.noise_sum = result.noise_count = 0.0
-    result.paint_pixels = result.paint_y = result.paint_cb = result.paint_cr = result.slope_x = result.slope_y = 0.0
+    result.soft = result.paint_pixels = result.slope_x = result.slope_y = 0.0
     result.at_border = mask_centroid(scratch.mask, components, own, count, result)
     return True
 
 
 @njit(cache=True)
-def _place(image, window, count, request, scratch, result):
+def _place(image, window, count, request, scratch, noises, result):
     """Coverage, position and noise of the components marked in `own`."""
     u, v, own, kind = image.u, image.v, scratch.own, scratch.kind
     x0 = y0 = 1e9
@@ -142,7 +144,8 @@ def _place(image, window, count, request, scratch, result):
     if request.band > 0.0 and not at_border:
         band_center(region, scratch.coverage, scratch.gain, result)
     result.at_border = 1.0 if at_border else 0.0
-    result.noise_sum, result.noise_count = chroma_noise(u, v, region, kind)
+    total, blocks = chroma_noise(u, v, region, kind)
+    learn_noise(noises, total, blocks)
     return True
 
 

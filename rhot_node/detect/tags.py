@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_node.detect.image import MAD_SD
 from rhot_node.errors import SettingsError
 from rhot_node.wire.messages import FAMILIES, Fiducial
 
@@ -117,7 +118,7 @@ def _luma_at(luma: Luma, x: float, y: float) -> float:
 def _edge_offset(luma: Luma, x: float, y: float, nx: float, ny: float, reach: float) -> tuple[float, float]:
     """Where an edge crosses the normal (nx, ny), dark to bright, px from (x, y), and its contrast: the centroid of the
     rise of luma within `reach`."""
-    count = math.ceil(4.0 * reach) + 1
+    count = 2 * math.ceil(2.0 * reach) + 1
     step = 2.0 * reach / (count - 1)
     total = moment = 0.0
     for k in range(count):
@@ -147,7 +148,7 @@ def _fit_line(along: Array, offsets: Array, used: NDArray[np.bool_], line: Array
             saa += along[k] * along[k]
             sao += along[k] * offsets[k]
     determinant = n * saa - sa * sa
-    if n < 3 or not determinant > 0.0:
+    if n < _LEAST or not determinant > 0.0:
         return 0
     line[1] = (n * sao - sa * so) / determinant
     line[0] = (so - line[1] * sa) / n
@@ -165,32 +166,31 @@ def _edge_line(luma: Luma, x0: float, y0: float, x1: float, y1: float, cells: in
     """Fit a line to the edge from corner 0 to corner 1 of a dark square on bright paper, whose inside lies to the right
     of that way (y down); `line` as in `_fit_line`, offsets outward. False without an edge."""
     length = math.hypot(x1 - x0, y1 - y0)
-    margin = max(_END_PX, 0.08 * length)
-    count = int(length - 2.0 * margin) + 1
+    count = int(length - 2.0 * _END_PX) + 1
     if count < _LEAST:
         return False
     dx, dy = (x1 - x0) / length, (y1 - y0) / length
     nx, ny = dy, -dx
-    reach = min(max(0.4 * length / cells, _NEAREST), _FARTHEST)
+    reach = min(max(0.5 * length / cells, _NEAREST), _FARTHEST)
     along, offsets, contrasts = np.empty(count), np.empty(count), np.empty(count)
     for k in range(count):
-        along[k] = margin + (length - 2.0 * margin) * k / (count - 1)
+        along[k] = _END_PX + (length - 2.0 * _END_PX) * k / (count - 1)
         offsets[k], contrasts[k] = _edge_offset(luma, x0 + along[k] * dx, y0 + along[k] * dy, nx, ny, reach)
     used = contrasts > 0.5 * np.median(contrasts)
     if np.count_nonzero(used) < _LEAST:
         return False
     middle = np.median(offsets[used])
-    spread = max(1.4826 * np.median(np.abs(offsets[used] - middle)), 0.1)
+    spread = max(MAD_SD * np.median(np.abs(offsets[used] - middle)), FLOOR_PX)
     for k in range(count):
         used[k] = used[k] and abs(offsets[k] - middle) < 2.0 * _OUTLIER * spread
     for _ in range(2):
         n = _fit_line(along, offsets, used, line)
-        if n < _LEAST:
+        if n == 0:
             return False
         sd = math.sqrt(line[5] / (n - 2)) + 1e-9
         for k in range(count):
             used[k] = used[k] and abs(offsets[k] - line[0] - line[1] * along[k]) < _OUTLIER * sd
-    return _fit_line(along, offsets, used, line) >= _LEAST
+    return _fit_line(along, offsets, used, line) > 0
 
 
 @njit(cache=True)
@@ -211,7 +211,7 @@ def _refine_corners(luma: Luma, corners: Array, cells: int, places: Array, covar
                 freedom += lines[side, 6] - 2.0
         variance = squares / freedom if freedom > 0.0 else 0.0
         for corner in range(4):
-            before = (corner + 3) % 4
+            before = corner - 1
             covariances[corner] = 0.0
             covariances[corner, 0, 0] = covariances[corner, 1, 1] = UNREFINED_PX**2
             if not (found[corner] and found[before]):
@@ -224,7 +224,7 @@ def _refine_corners(luma: Luma, corners: Array, cells: int, places: Array, covar
                 spans[row] = (normals[row, 0] * (anchors[side, 0] + lines[side, 0] * dy)
                               + normals[row, 1] * (anchors[side, 1] - lines[side, 0] * dx))
             determinant = normals[0, 0] * normals[1, 1] - normals[0, 1] * normals[1, 0]
-            if abs(determinant) < 0.1:
+            if determinant == 0.0:
                 continue
             x = (normals[1, 1] * spans[0] - normals[0, 1] * spans[1]) / determinant
             y = (normals[0, 0] * spans[1] - normals[1, 0] * spans[0]) / determinant

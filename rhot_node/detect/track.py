@@ -10,9 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect.band import ARC
-from rhot_node.detect.image import table_of
-from rhot_node.detect.search import Blob
+from rhot_node.detect.band import ARC, length_of
+from rhot_node.detect.image import EVEN, table_of
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import MarkerFlag
 
@@ -49,15 +48,6 @@ SMEAR_BIAS = 0.145  # px of bias per px^2 that the squared edge width exceeds th
 STEADY_AREA = 0.04  # relative change against the expectation beyond which the covariance covers what hiding,
 # uncovering or joining that much would do
 SMEAR_AREA = 3.0  # more of such change per px of smear and of the square root of the area
-
-
-EVEN = 1.0 / 12.0  # variance of what is evenly spread over a length of one
-
-
-@njit(cache=True)
-def length_of(variance):
-    """Of a bar whose second moment along it is `variance`."""
-    return math.sqrt(variance / EVEN)
 
 
 @njit(cache=True)
@@ -145,7 +135,7 @@ def state(place, floor, bias, level, noise, report):
     report.diameter = 2.0 * 2.0 * math.sqrt(place.area / math.pi)
     report.cov_xx, report.cov_xy = scale * place.v_xx + widened, scale * place.v_xy
     report.cov_yy = scale * place.v_yy + widened
-    report.quality = min(1.0, level / (15.0 * noise)) * min(1.0, place.area / 12.0)
+    report.quality = min(1.0, level / (15.0 * noise))
 
 
 @njit(cache=True)
@@ -162,31 +152,26 @@ def widen_band(axis_x, axis_y, breadth, report):
 
 MEMORY_FRAMES = 40  # how long a lost marker's motion and size are held against candidates
 VELOCITY_GAIN = 0.7
-AREA_GAIN, RATE_GAIN = 0.4, 0.1  # per frame, of the expected log area and its trend
-RATE_MAX = 0.08  # of log area per frame: 2 m/s of approach at 1 m, or a finger bending fast, at 40 frames/s
-HIDDEN_DECAY = 0.99  # per frame: what looks hidden for long is believed to be that small
+AREA_GAIN = 0.4  # per frame, of the expected log area
 PARTIAL_AREA = 0.82  # of the expected area: less is half hidden
-LITTER_AREA, LITTER_LEVEL = 0.25, 0.75  # of what is expected: less of both at once is no paint
 SLIVER_AREA = 0.15  # of the expected area: too little to be believed without the gate of a search
 JUMP_AREA = 1.35  # of the expected area: something else joined the marker
 RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
-SAG_STALE, SAG_HIDDEN = 0.15, 0.5  # of a band's last sag: what it may be off by, whole and partly hidden
+SAG_STALE = 0.5  # of a band's last sag: what it may be off by
 MARGIN = 5.0  # chroma px around a resting marker
 PARTIAL, EDGE, AMBIGUOUS = int(MarkerFlag.PARTIAL), int(MarkerFlag.EDGE), int(MarkerFlag.AMBIGUOUS)
 
 
 class Track(NamedTuple):
-    """Chroma px, and px per frame. `area`: expected in the next frame; `rate`: the trend of its logarithm per frame
-    (approach, foreshortening). `extent`: length along the major axis. `fitted`: a band's curvature is known; `sag_x`,
-    `sag_y`: from its centre to its centroid. `missed`: frames since the last observation. `limb_taken`, `limb_left`:
-    LIMB_OF_SHAPE; `sphere`, `band`: whether its marker is one."""
+    """Chroma px, and px per frame. `area`: expected in the next frame. `extent`: length along the major axis. `fitted`:
+    a band's curvature is known; `sag_x`, `sag_y`: from its centre to its centroid. `missed`: frames since the last
+    observation. `limb_taken`, `limb_left`: LIMB_OF_SHAPE; `band`: whether its marker is one."""
 
     x: float = 0.0
     y: float = 0.0
     vx: float = 0.0
     vy: float = 0.0
     area: float = 0.0
-    rate: float = 0.0
     extent: float = 0.0
     level: float = 0.0
     fitted: float = 0.0
@@ -196,7 +181,6 @@ class Track(NamedTuple):
     missed: float = MEMORY_FRAMES
     limb_taken: float = 0.0
     limb_left: float = 0.0
-    sphere: float = 0.0
     band: float = 0.0
 
 
@@ -217,7 +201,7 @@ class Request(NamedTuple):
 def new_tracks(shapes: Sequence[Shape]) -> NDArray[np.void]:
     """(S,) tracks of which nothing is known."""
     return np.array([Track(limb_taken=LIMB_OF_SHAPE[shape][0], limb_left=LIMB_OF_SHAPE[shape][1],
-                           sphere=shape == "sphere", band=shape == "band") for shape in shapes], table_of(Track))
+                           band=shape == "band") for shape in shapes], table_of(Track))
 
 
 @njit(cache=True)
@@ -233,34 +217,17 @@ def expect(tracks, slot, recall, request):
     out.area, out.level, out.band = track.area, track.level, track.band
 
 
-def blob_cost(track: Track, blob: Blob) -> float:
-    """How badly a blob of a full search fits the last observation, in squared standard deviations."""
-    gap = track.missed + 1.0
-    reach = track.extent + gap * (3.0 + 0.75 * math.hypot(track.vx, track.vy))
-    hold = min(gap, 4.0)  # a velocity says little after a few frames
-    x, y = blob.centroid
-    away = math.hypot(x - track.x - hold * track.vx, y - track.y - hold * track.vy) / reach
-    size = math.log(blob.area / track.area) / (0.35 + 0.02 * gap)
-    return away * away + size * size
-
-
 @njit(cache=True)
 def is_outside(tracks, slot, measured):
-    """Whether what was `measured` (1,) may be specks that lie where the marker was, so that a search should decide.
-
-    What hides a marker leaves some of it in its colour, and shade leaves it its size.
-    """
-    track, row = tracks[slot], measured[0]
-    pale = row.level < LITTER_LEVEL * track.level
-    return row.area < LITTER_AREA * track.area and (pale or row.area < SLIVER_AREA * track.area)
+    """Whether what was `measured` (1,) may be specks that lie where the marker was, so that a search should decide."""
+    return measured[0].area < SLIVER_AREA * tracks[slot].area
 
 
 @njit(cache=True)
-def observe(tracks, slot, measured, noise, flags, floor, reports):
+def observe(tracks, slot, measured, noise, flags, reports):
     """Judge what was `measured` (1,) by the last frames, take it into the track, and report it. Returns the flags.
 
-    `noise`: standard deviation of the chroma noise, grey levels. `flags`: bits of MarkerFlag. `floor`: luma px^2, the
-    variance of the position without any noise.
+    `noise`: standard deviation of the chroma noise, grey levels. `flags`: bits of MarkerFlag.
     """
     track, row, report = tracks[slot], measured[0], reports[slot]
     known = track.missed < MEMORY_FRAMES and track.area > 0.0
@@ -275,20 +242,20 @@ def observe(tracks, slot, measured, noise, flags, floor, reports):
                                                                                    track.limb_left * limb))
     if track.band > 0.0 and row.fit == 0.0 and (track.fitted > 0.0 or row.round == 0.0):
         row.x, row.y = row.x - track.sag_x, row.y - track.sag_y
-        stale = SAG_HIDDEN if flags & PARTIAL else SAG_STALE
-        off_axis = stale * math.hypot(track.sag_x, track.sag_y) if track.fitted > 0.0 else OFF_AXIS_SD * extent
+        off_axis = SAG_STALE * math.hypot(track.sag_x, track.sag_y) if track.fitted > 0.0 else OFF_AXIS_SD * extent
         bias = math.hypot(bias, off_axis)
     if not known:
-        track.vx = track.vy = track.area = track.rate = track.fitted = track.sag_x = track.sag_y = 0.0
+        track.vx = track.vy = track.area = track.fitted = track.sag_x = track.sag_y = 0.0
     take(track, row, extent, row.level, flags & (PARTIAL | EDGE) and ratio < 1.0)
+    floor = FLOOR_VARIANCE if row.careful > 0.0 else mask_variance(row.area)
     state(row, floor, bias, row.level, noise, report)
     if row.fit > 0.0:
         sag = ARC * row.sag
         track.fitted, track.sag_x, track.sag_y = 1.0, -row.axis_y * sag, row.axis_x * sag
         widen_band(row.axis_x, row.axis_y, extent, report)
     row.x, row.y = x, y  # as they were measured
-    report.quality *= ((min(ratio, 0.8) if flags & PARTIAL else 1.0) * (0.7 if flags & EDGE else 1.0)
-                       * (0.5 if flags & AMBIGUOUS else 1.0))
+    if flags & (PARTIAL | EDGE | AMBIGUOUS):
+        report.quality *= 0.5
     return flags
 
 
@@ -297,9 +264,8 @@ def _judge(track, row, ratio, known):
     flags = 0
     if row.at_border > 0.0:
         flags |= EDGE
-    elongated = track.sphere > 0.0 and row.var_major > 1.7 * row.var_minor + 1.0
     broken = track.band > 0.0 and track.fitted > 0.0 and row.fit == 0.0
-    if ratio < PARTIAL_AREA or row.fragments > 1.0 or elongated or (broken and ratio < 0.93):
+    if ratio < PARTIAL_AREA or row.fragments > 1.0 or broken:
         flags |= PARTIAL
     if row.rival_cost < row.cost + RIVAL_MARGIN or (known and ratio > JUMP_AREA):
         flags |= AMBIGUOUS
@@ -316,16 +282,14 @@ def _plausible_bias(track, row, ratio, width, flags):
         bias = hidden_bias(ratio, whole, row.area, width)
     if flags & PARTIAL:
         bias = max(bias, 0.05 * whole)
-    if flags & EDGE:
-        bias = max(bias, 0.15 * whole)
-    if flags & AMBIGUOUS:
-        bias = max(bias, 0.3 * whole)
+    if flags & (EDGE | AMBIGUOUS):  # it may lie anywhere along the marker
+        bias = max(bias, math.sqrt(EVEN) * whole)
     return bias
 
 
 @njit(cache=True)
 def take(track, place, extent, level, hidden):
-    """Take a measured place into a track: motion, and, unless something hides a part, size and its trend.
+    """Take a measured place into a track: motion, and, unless something hides a part, size.
 
     A track whose area is 0 knows nothing yet.
     """
@@ -334,13 +298,8 @@ def take(track, place, extent, level, hidden):
         gain = VELOCITY_GAIN if track.alive > 0.0 else 1.0
         track.vx += gain * ((place.x - track.x) / gap - track.vx)
         track.vy += gain * ((place.y - track.y) / gap - track.vy)
-        if hidden:
-            track.area *= HIDDEN_DECAY
-            track.rate = 0.0
-        else:
-            log_growth = math.log(place.area / track.area)
-            track.rate = min(max(track.rate + RATE_GAIN * log_growth, -RATE_MAX), RATE_MAX)
-            track.area *= math.exp(AREA_GAIN * log_growth + track.rate)
+        if not hidden:
+            track.area *= (place.area / track.area) ** AREA_GAIN
             track.extent = extent
     else:
         track.area, track.extent = place.area, extent
