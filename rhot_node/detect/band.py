@@ -16,7 +16,6 @@ from numba import njit
 from rhot_node.detect import outline_pixels as c
 from rhot_node.detect.image import EVEN
 
-BLUR_VARIANCE = 0.2  # px^2: point spread of about 0.7 luma px and the 2x2 chroma mean
 BAND_HALF_WIDTH_MIN = 3.5  # px; a narrower band shows no curvature
 CROSS_MOMENT_MIN = 0.92
 """Least normalised cross moment E[u^2 w^2] / (E[u^2] E[w^2]) of a band. It is 1 for a rectangle, 2/3 for an ellipse and
@@ -51,7 +50,7 @@ def band_center(region, coverage, gain, result):
     if _cross_moment(region, coverage, result) < CROSS_MOMENT_MIN:
         result.round = 1.0
         return False
-    half_width = 0.5 * length_of(max(result.var_major - BLUR_VARIANCE, 0.0))
+    half_width = 0.5 * length_of(max(result.var_major - c.BLUR_VARIANCE, 0.0))
     if half_width < BAND_HALF_WIDTH_MIN:
         return False
     length = result.area / (2.0 * half_width)
@@ -134,7 +133,7 @@ def _band_coordinates(column, row, result):
 @njit(cache=True)
 def _arc(u, half_width):
     """sqrt(1 - u^2), averaged over a box as wide as the blur, as far as it falls on the band."""
-    spread = 0.5 * length_of(BLUR_VARIANCE) / half_width
+    spread = 0.5 * length_of(c.BLUR_VARIANCE) / half_width
     low, high = max(u - spread, -1.0), min(u + spread, 1.0)
     if high - low < 1e-6:
         return 0.0
@@ -151,7 +150,7 @@ def _is_a_band(moments, residual, length, half_width, sag):
     """Does the coverage look like a whole band: even across its width, and as thick as its area says?"""
     skew = moments[1] / moments[0]
     fourth = moments[2] / moments[0]  # 1/5 for an even box
-    thickness = residual / (EVEN * length * length + BLUR_VARIANCE)
+    thickness = residual / (EVEN * length * length + c.BLUR_VARIANCE)
     return (abs(skew) < 0.04 and abs(fourth - 0.2) < 0.05 and 0.7 < thickness < 1.35
             and abs(sag) < 1.15 * half_width)
 

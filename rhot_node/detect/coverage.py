@@ -26,7 +26,8 @@ PAD = RING + REACH  # region around the component that coverage needs
 CLIP = 0.3  # coverage is clipped to -CLIP..1 + CLIP: noise must stay unbiased, glints must not count
 CONTRAST_MIN = 0.3  # of the marker's level; with less between paint and surroundings an edge cannot be unmixed
 FLATNESS = 4.0  # grey levels^2 that surroundings are taken to vary by at least, in every channel
-SLOPE_PIXELS = 4  # interior pixels that a shading slope is fitted to at least
+PIXELS_LEAST = 4  # pixels that are all paint: fewer show no colour and no shading to rely on
+COLLINEAR = 0.05  # of the product of both variances: with less determinant, pixels on one line show no slope
 SATURATED = 0.85  # of the strongest chroma: the edge pixels that are taken for paint when there is no interior
 
 # Kinds of pixels in the plane `kind`.
@@ -233,7 +234,7 @@ def _gather_colour(image, region, colour):
 def _paint_plane(region, kind, colour, paint):
     """Fit mean and slopes of the paint's colour over its interior (its most saturated edge pixels when it has none).
 
-    Returns the interior's centre, which the mean belongs to. Slopes stay 0 for fewer than SLOPE_PIXELS pixels.
+    Returns the interior's centre, which the mean belongs to. Slopes stay 0 for fewer than PIXELS_LEAST pixels.
     """
     x0, x1, y0, y1 = region
     wanted, threshold = INTERIOR, 0.0
@@ -261,7 +262,7 @@ def _paint_plane(region, kind, colour, paint):
     center_x /= count
     center_y /= count
     paint[:, 0] /= count
-    if wanted == INTERIOR and count >= SLOPE_PIXELS:
+    if wanted == INTERIOR and count >= PIXELS_LEAST:
         _paint_slopes(region, kind, colour, paint, center_x, center_y)
     return center_x, center_y
 
@@ -282,7 +283,7 @@ def _paint_slopes(region, kind, colour, paint, center_x, center_y):
                     c_x[channel] += dx * (colour[row, column, channel] - paint[channel, 0])
                     c_y[channel] += dy * (colour[row, column, channel] - paint[channel, 0])
     determinant = s_xx * s_yy - s_xy * s_xy
-    if determinant > 0.01 * s_xx * s_yy:
+    if determinant > COLLINEAR * s_xx * s_yy:
         for channel in range(3):
             paint[channel, 1] = (s_yy * c_x[channel] - s_xy * c_y[channel]) / determinant
             paint[channel, 2] = (s_xx * c_y[channel] - s_xy * c_x[channel]) / determinant

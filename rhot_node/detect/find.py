@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_node.detect.colour import directions, sector_table
-from rhot_node.detect.coverage import INTERIOR, OUTSIDE, Measured
+from rhot_node.detect.coverage import INTERIOR, OUTSIDE, PIXELS_LEAST, Measured
 from rhot_node.detect.follow import Followed, Noise, noise_level
 from rhot_node.detect.illuminant import Illuminant
 from rhot_node.detect.image import YuvImage, rows_of, table_of
 from rhot_node.detect.search import AREA_MIN, Blob, ColourGate
 from rhot_node.detect.segment import Paint, measure, scratch
 from rhot_node.detect.track import (
+    AWAY,
     MARGIN,
     MEMORY_FRAMES,
     Report,
@@ -36,7 +37,6 @@ from rhot_node.wire.messages import CANDIDATES_MAX, FLAGS, NO_FLAGS, MarkerFlag,
 NOISE_START, NOISE_START_BLOCKS = 1.5, 20.0  # grey levels of chroma noise, until so many blocks of paint have told
 LARGEST = 0.12  # of the picture: a larger blob is no marker
 TWIN_DISTANCE = 0.5  # of their length: nearer tracks of one marker are of one object
-PAINT_PIXELS_MIN = 4  # chroma pixels that are all paint: fewer show no colour to rely on
 DOUBTFUL = MarkerFlag.PARTIAL | MarkerFlag.EDGE | MarkerFlag.AMBIGUOUS
 PALE = 0.5  # of the least chroma that a search takes for paint: a tracked marker in shade has more
 SEARCH_STEP = 2  # chroma rows: every other one shows all markers
@@ -109,7 +109,7 @@ class Finder:
         candidate, whose colour is certainly that of their paint."""
         pixels, rivalled = self._paint_pixels.tolist(), {mark.index for mark in seen[self._count:]} if lone else set()
         return [mark.index for mark in seen[:self._count]
-                if not mark.flags.value & _NOT_PLAIN and pixels[mark.index] >= PAINT_PIXELS_MIN
+                if not mark.flags.value & _NOT_PLAIN and pixels[mark.index] >= PIXELS_LEAST
                 and mark.index not in rivalled]
 
     def paint_mask(self, image: YuvImage, seen: MarkerObservation) -> NDArray[np.bool_]:
@@ -208,7 +208,7 @@ class Finder:
         """Search for blobs without a track. The best blob of a lost marker becomes its track; of the others one in each
         picture is measured, all if `whole`. New tracks are added to `seen`, which is indexed by track.
         """
-        step, first = (SEARCH_STEP, 0) if whole else (8, INTERLACED[self._searches % len(INTERLACED)])
+        step, first = (SEARCH_STEP, 0) if whole else (2 * len(INTERLACED), INTERLACED[self._searches % len(INTERLACED)])
         self._searches += 1
         image = self._light.balanced(camera_image, step, first)
         left: list[tuple[int, Blob]] = []
@@ -282,7 +282,7 @@ class Finder:
         direction, (x, y) = self._paints[index].direction, blob.centroid
         self._request[0] = Request(
             x, y, max(blob.x_max - x, x - blob.x_min) + MARGIN, max(blob.y_max - y, y - blob.y_min) + MARGIN,
-            1.0 + 0.25 * math.sqrt(blob.area), blob.area,
+            1.0 + AWAY * math.sqrt(blob.area), blob.area,
             (blob.sum_u * direction[0] + blob.sum_v * direction[1]) / blob.area, self._markers[index].shape == "band")
 
     def _report(self, seen: dict[int, MarkerObservation]) -> tuple[MarkerObservation, ...]:

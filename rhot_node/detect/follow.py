@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from rhot_node.detect import outline_pixels as c
 from rhot_node.detect import track as t
-from rhot_node.detect.band import ARC, BLUR_VARIANCE, length_of, mend_band
+from rhot_node.detect.band import ARC, length_of, mend_band
+from rhot_node.detect.coverage import PIXELS_LEAST
 from rhot_node.detect.image import GREY, YuvImage, block_noise, rows_of, table_of
 from rhot_node.detect.outline import fit
 from rhot_node.detect.outline_pixels import project, workspace
 from rhot_node.wire.messages import MarkerObservation
 
-AREA_LEAST = 22.0  # px^2: a smaller marker has too little inside
 NOISE_MOST = 0.12  # of the contrast
 SOFT = 0.25  # projected chroma that counts not at all; so much below that of paint, it counts as paint
 OTHER_HUE = 0.4  # of the contrast: what lies further beside the line from surroundings to paint is another paint
@@ -35,7 +35,6 @@ AREA_RATIO = 1.10  # and the outline's
 MISFIT_NOISE, MISFIT_MOST = 2.0, 0.10  # standard deviations of the noise, and of the contrast
 TURN_MOST = 0.17  # rad: an elongated marker that has turned further gets new axes
 ELONGATED = 1.3
-MARGIN = 3.0  # px around a resting marker
 
 NOISE_MIN = 0.5  # grey levels of chroma noise; quantisation alone leaves 0.3
 NOISE_BLOCKS_MOST = 600.0  # that its mean is taken over
@@ -150,7 +149,7 @@ def _learn_noise_inside(image, fitted, noises):
     u, v = image.u, image.v
     half = 0.5 * (fitted.m_xx + fitted.m_yy)
     short = half - math.hypot(0.5 * (fitted.m_xx - fitted.m_yy), fitted.m_xy)
-    reach = math.sqrt(max(2.0 * short, 0.0)) - 0.7  # half a side of the square in a disc, less the edge
+    reach = math.sqrt(max(2.0 * short, 0.0)) - 1.0  # half a side of the square in a disc, less the edge
     x, y = fitted.x, fitted.y
     total = 0.0
     count = 0
@@ -169,7 +168,7 @@ def _soft(image, track, outline, fitted):
     """
     u, v = image.u, image.v
     speed = math.hypot(track.vx, track.vy)
-    half = 0.6 * track.extent + MARGIN + 0.5 * speed
+    half = t.half_window(track.extent, speed)
     px, py = track.x + track.vx + track.sag_x, track.y + track.vy + track.sag_y
     edge = 0.5 * track.extent + c.BAND + 0.5 * speed
     height, width = u.shape
@@ -272,13 +271,13 @@ def start(image, tracks, outlines, slot, measured, noises, work):
     rims = track.band > 0.0 and place.fit > 0.0
     if track.band > 0.0 and track.fitted > 0.0 and not rims:
         return False  # its rims have been visible and are now occluded
-    if place.area < AREA_LEAST:
+    if place.area < t.SMALL_AREA:
         return False
     outline.rims = 1.0 if rims else 0.0
     outline.off_axis = t.OFF_AXIS_SD if track.band > 0.0 and not rims and place.round == 0.0 else 0.0
     outline.axis_x, outline.axis_y = place.axis_x, place.axis_y
     outline.sag_variance, outline.sag = place.sag_variance, 0.0
-    long2, high2 = max(place.var_major - BLUR_VARIANCE, 0.5), max(place.var_minor - BLUR_VARIANCE, 0.5)
+    long2, high2 = max(place.var_major - c.BLUR_VARIANCE, 0.5), max(place.var_minor - c.BLUR_VARIANCE, 0.5)
     away = ARC * place.sag
     if not _levels(image, place.x - away * place.axis_y, place.y + away * place.axis_x, 2.0 * math.sqrt(long2),
                    2.0 * math.sqrt(high2), outline):
@@ -288,7 +287,7 @@ def start(image, tracks, outlines, slot, measured, noises, work):
     x, y = place.x, place.y
     for _ in range(3):
         project(outline)
-        if not outline.gain * noise < NOISE_MOST or not fit(image, x, y, outline, np.int64(3), work):
+        if not outline.gain * noise < NOISE_MOST or not fit(image, x, y, outline, np.int64(2), work):
             return False
         x, y = fitted.x, fitted.y
     outline.sag_frames = outline.sag_zero = 0.0
@@ -303,7 +302,8 @@ def start(image, tracks, outlines, slot, measured, noises, work):
 def _first_radii(outline, long2, high2):
     """Begin with an ellipse, or with a band's rectangle, of these second moments."""
     radius, aspect = outline.radius, math.sqrt(long2 / high2)
-    side = math.sqrt(math.sqrt(long2 * high2) * (3.0 if outline.rims > 0.0 else 4.0))
+    variance = math.sqrt(long2 * high2)
+    side = 0.5 * length_of(variance) if outline.rims > 0.0 else 2.0 * math.sqrt(variance)
     outline.long = outline.high = 1.0
     if aspect > ELONGATED:
         outline.long, outline.high = math.sqrt(aspect), 1.0 / math.sqrt(aspect)
@@ -317,7 +317,7 @@ def _first_radii(outline, long2, high2):
     radius[c.NODES] = radius[0]
     outline.rim[:] = 0.0
     outline.slope_x = outline.slope_y = outline.age = 0.0
-    outline.blur = c.BLUR_START
+    outline.blur = math.sqrt(c.BLUR_VARIANCE)
 
 
 @njit(**c.FAST)
@@ -346,7 +346,7 @@ def _levels(image, x, y_at, long, high, outline):
                 r_uu += cu * cu
                 r_uv += cu * cv
                 r_vv += cv * cv
-    if n < c.INSIDE_MIN or r_n < c.NODES:
+    if n < PIXELS_LEAST or r_n < c.NODES:
         return False
     m_u, m_v = r_u / r_n, r_v / r_n
     outline.paint_u, outline.paint_v = GREY + s_u / n, GREY + s_v / n

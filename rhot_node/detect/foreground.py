@@ -23,8 +23,9 @@ BINS = 32
 """Bins of a colour histogram per channel, as in Jones and Rehg 1999, section 3."""
 
 _BIN = 8  # values of a channel in one bin
+COLOURS = BINS * BINS * BINS  # bins of a histogram
 
-ANY = float(_BIN * BINS) ** -3
+ANY = 1.0 / (COLOURS * _BIN * _BIN * _BIN)
 """Density of a colour of which nothing is known."""
 
 SKIN_CB, SKIN_CR = (77, 127), (133, 173)
@@ -75,7 +76,7 @@ class Foreground(NamedTuple):
 
 def no_foreground() -> Foreground:
     """A model without information: every pixel has probability 1/2."""
-    flat, empty = np.full(BINS**3, ANY, np.float32), np.empty((0, 0, 3), np.float32)
+    flat, empty = np.full(COLOURS, ANY, np.float32), np.empty((0, 0, 3), np.float32)
     return Foreground(flat, flat, empty, empty)
 
 
@@ -158,14 +159,14 @@ def learn_skin(image: Image, model: Foreground | None = None) -> Foreground:
 
 def _density(pixels: Image) -> Array32:
     index = (pixels // _BIN).astype(np.int64)
-    counts = np.bincount((index[:, 0] * BINS + index[:, 1]) * BINS + index[:, 2], minlength=BINS**3)
+    counts = np.bincount((index[:, 0] * BINS + index[:, 1]) * BINS + index[:, 2], minlength=COLOURS)
     cube = counts.reshape(BINS, BINS, BINS).astype(np.float32)
     for axis in range(3):  # smoothed over neighbouring bins
         padded = np.pad(cube, [(1, 1) if k == axis else (0, 0) for k in range(3)], mode="edge")
         before, after = np.take(padded, range(BINS), axis), np.take(padded, range(2, BINS + 2), axis)
         cube = (0.5 * cube + 0.25 * (before + after)).astype(np.float32)
     total = max(float(cube.sum()), 1.0)
-    return ((1.0 - UNUSUAL) * BINS**3 * ANY * cube / total + UNUSUAL * ANY).astype(np.float32).ravel()
+    return ((1.0 - UNUSUAL) * COLOURS * ANY * cube / total + UNUSUAL * ANY).astype(np.float32).ravel()
 
 
 def gain_of(image: Image, model: Foreground) -> Array32:

@@ -82,7 +82,7 @@ def from_i420(buffer: Plane, width: int, height: int, stride: int | None = None)
     """
     stride = width if stride is None else stride
     flat = buffer.reshape(-1)
-    luma, chroma = stride * height, stride * height // 4
+    luma, chroma = stride * height, (stride // 2) * (height // 2)
     return YuvImage(
         flat[:luma].reshape(height, stride)[:, :width],
         flat[luma:luma + chroma].reshape(height // 2, stride // 2)[:, :width // 2],

@@ -21,10 +21,8 @@ from rhot_node.wire.messages import MarkerObservation
 Array = NDArray[np.float64]
 
 MIXED = 0.25
-"""Share of a paint's colour: what lies farther beside all mixtures of two paints, in any light, is something else."""
-
-PURE = 0.25
-"""Share of the other paint in a pixel of one marker, at most."""
+"""Share of a paint's colour: what lies farther beside all mixtures of two paints, in any light, is something else. A
+pixel of one marker has no more of the other paint."""
 
 DARK = 0.4
 """Share of a paint's brightness: what is darker is a gap between two markers."""
@@ -101,7 +99,7 @@ def _contact(y, u, v, one, other, mine, theirs):
     unmix = np.empty(9)
     if not _unmixing(mine, theirs, unmix):
         return 0.0, 0.0
-    side, lines, total = int(0.25 * max(one[2], other[2])), 0, 0.0
+    side, lines, total = int(0.5 * 0.5 * max(one[2], other[2])), 0, 0.0
     for k in range(-side, side + 1):
         at = _crossing(y, u, v, ax - k * way_y, ay + k * way_x, way_x, way_y, apart, unmix)
         if at >= 0.0:
@@ -151,11 +149,11 @@ def _crossing(y, u, v, x, y_at, way_x, way_y, apart, unmix):
             pure, place = -GAP - 1, -1.0
             continue
         share = second / (first + second)
-        if share < PURE:
+        if share < MIXED:
             pure, place = step, -1.0
         elif share >= 0.5 and place < 0.0:
             place = STEP * (step - (share - 0.5) / max(share - before, share - 0.5, 1e-6))
-        if share > 1.0 - PURE and step - pure <= GAP:
+        if share > 1.0 - MIXED and step - pure <= GAP:
             return place
         before = share
     return -1.0

@@ -180,13 +180,14 @@ def _centre(cx, cy, outline, nodes, result):
             return False
         r2 = r * r
         area += 0.5 * r2
-        mu += r * r2 * c / 3.0
-        mv += r * r2 * s / 3.0
-        uu += 0.25 * r2 * r2 * c * c
-        uv += 0.25 * r2 * r2 * c * s
-        vv += 0.25 * r2 * r2 * s * s
-    mu, mv = mu / area, mv / area
-    uu, uv, vv = uu / area - mu * mu, uv / area - mu * mv, vv / area - mv * mv
+        mu += r * r2 * c
+        mv += r * r2 * s
+        uu += r2 * r2 * c * c
+        uv += r2 * r2 * c * s
+        vv += r2 * r2 * s * s
+    third, fourth = 3.0 * area, 4.0 * area
+    mu, mv = mu / third, mv / third
+    uu, uv, vv = uu / fourth - mu * mu, uv / fourth - mu * mv, vv / fourth - mv * mv
     area *= STEP_RAD
     v_uu = v_uv = v_vv = 0.0
     for j in range(NODES):

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect.coverage import FLATNESS
+from rhot_node.detect.coverage import COLLINEAR, FLATNESS, PIXELS_LEAST
 from rhot_node.detect.image import table_of
 
 # -- records -----------------------------------------------------------------------------------------------------------
@@ -26,12 +26,13 @@ ANGLES = np.arctan(np.arange(FINE + 2.0) / FINE)  # rad, by the tangent in FINE 
 
 BAND = 1.5  # px on either side of the outline that its blurred edge reaches
 RING_NEAR, RING_FAR = 1.4, 2.8  # px outside the outline: what surrounds the marker
-INSIDE_MIN = 4  # pixels that the paint's level is taken from at least
-BLUR_START, BLUR_LEAST, BLUR_MOST = 0.455, 0.38, 0.9  # px: point spread of 0.7 luma px and the 2x2 mean
+BLUR_VARIANCE = 0.2  # px^2: point spread of about 0.7 luma px and the 2x2 chroma mean
+BLUR_LEAST, BLUR_MOST = 0.38, 0.9  # px
 SLOW = 0.1  # gain of what changes slowly: shading, rim, blur
 SETTLED, RESTING = 9.0, 3.0  # frames until rim and blur are learnt, and the luma read, in every third frame only
 RIM_PRIOR = 0.2  # pixels' worth of believing that paint and surroundings are at the edge as they are further off
 BARE = 0.02  # of a node's mean information: nodes with hardly any pixel stay where they were
+CORNER = 0.97  # of half a band's width: beyond, the slope of its bend grows without limit
 PIXELS_MAX = 4096  # near an outline
 
 FAST: Any = {"cache": True, "error_model": "numpy", "fastmath": {"nsz", "arcp", "contract", "afn", "reassoc"}}
@@ -180,7 +181,7 @@ def gather(image, cx, cy, outline, pixels, nodes):
                 s_xx, s_xy, s_yy = s_xx + dx * dx, s_xy + dx * dy, s_yy + dy * dy
                 if with_luma:
                     s_l += y[2 * row, 2 * column]
-    if n < INSIDE_MIN or r_n < NODES:
+    if n < PIXELS_LEAST or r_n < NODES:
         return 0
     _learn_slope(outline, n, (s_a, s_x, s_y), (s_ax, s_ay), (s_xx, s_xy, s_yy))
     _learn_colours(outline, n, (s_u, s_v), r_n, (r_u, r_v), (r_uu, r_uv, r_vv))
@@ -223,7 +224,7 @@ def _learn_slope(outline, n, first, level, second):
     xx, xy, yy = second[0] - s_x * s_x / n, second[1] - s_x * s_y / n, second[2] - s_y * s_y / n
     xa, ya = level[0] - s_x * s_a / n, level[1] - s_y * s_a / n
     determinant = xx * yy - xy * xy
-    if determinant > 0.05 * xx * yy:
+    if determinant > COLLINEAR * xx * yy:
         outline.slope_x += gain * ((yy * xa - xy * ya) / determinant - outline.slope_x)
         outline.slope_y += gain * ((xx * ya - xy * xa) / determinant - outline.slope_y)
     outline.inside = (s_a - outline.slope_x * s_x - outline.slope_y * s_y) / n
@@ -251,7 +252,7 @@ def _slopes(outline, nodes):
         gu = (COSINES[j] + slope * SINES[j]) / outline.long
         gv = (SINES[j] - slope * COSINES[j]) / outline.high
         if outline.bend != 0.0:
-            across = min(max(here * COSINES[j] * outline.long / outline.width, -0.97), 0.97)
+            across = min(max(here * COSINES[j] * outline.long / outline.width, -CORNER), CORNER)
             gu += gv * outline.bend * across / (outline.width * math.sqrt(1.0 - across * across))
         node.radius, node.scale = here, 1.0 / math.sqrt(gu * gu + gv * gv)
         node.ring_sum = node.ring_count = 0.0

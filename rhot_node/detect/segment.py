@@ -209,7 +209,7 @@ def _choose(components, count, request, own, result):
             best, best_cost = number, cost
     own[best] = True
     total = components[best].area
-    reach = FRAGMENT_REACH * np.sqrt(4.0 / np.pi * request.area)
+    reach = FRAGMENT_REACH * 2.0 * np.sqrt(request.area / np.pi)
     fragments = 1
     rival_cost = np.inf
     for number in range(count):

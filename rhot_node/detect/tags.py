@@ -171,7 +171,7 @@ def _edge_line(luma: Luma, x0: float, y0: float, x1: float, y1: float, cells: in
         return False
     dx, dy = (x1 - x0) / length, (y1 - y0) / length
     nx, ny = dy, -dx
-    reach = min(max(0.5 * length / cells, _NEAREST), _FARTHEST)
+    reach = min(max(0.4 * length / cells, _NEAREST), _FARTHEST)
     along, offsets, contrasts = np.empty(count), np.empty(count), np.empty(count)
     for k in range(count):
         along[k] = _END_PX + (length - 2.0 * _END_PX) * k / (count - 1)

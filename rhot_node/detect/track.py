@@ -34,8 +34,9 @@ SMALL_AREA, SMALL_VARIANCE = 22.0, 0.01  # px^2, luma px^2: too few inner pixels
 # a round body to its dark side: measured on capsules and spheres under Lambert's law. A fitted outline learns most of
 # it, the more the larger the marker is: of the outline, this is divided by the square root of the radius.
 LIMB_COVERAGE, LIMB_OUTLINE = 0.34, 0.33
-LIMB_OF_SHAPE = {"disc": (0.0, 0.0), "blob": (0.0, 1.0), "sphere": (0.8, 0.5), "capsule": (0.8, 0.5),
-                 "band": (0.8, 0.5)}
+LIMB_ROUND = 0.8, 0.5
+LIMB_OF_SHAPE = {"disc": (0.0, 0.0), "blob": (0.0, 1.0),
+                 "sphere": LIMB_ROUND, "capsule": LIMB_ROUND, "band": LIMB_ROUND}
 """Share of that shift that is taken off, and share that remains as a standard deviation (other lights and curvatures).
 A disc is flat; a blob may be either, and is left where it is seen."""
 OFF_AXIS_SD = 0.3
@@ -64,7 +65,7 @@ def edge_width(soft, area, major, minor):
     """Standard deviation of the blur at a marker's edge: for a blurred step the sum of a (1 - a) over the pixels,
     here `soft` times the area, is the outline's length times this / sqrt(pi). `major`, `minor`: second moments."""
     a, b = 2.0 * math.sqrt(major), 2.0 * math.sqrt(minor)
-    around = math.pi * (3.0 * (a + b) - math.sqrt((3.0 * a + b) * (a + 3.0 * b)))
+    around = math.pi * math.sqrt(2.0 * (a * a + b * b))
     return math.sqrt(math.pi) * soft * area / max(around, 1.0)
 
 
@@ -158,7 +159,8 @@ SLIVER_AREA = 0.15  # of the expected area: too little to be believed without th
 JUMP_AREA = 1.35  # of the expected area: something else joined the marker
 RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
 SAG_STALE = 0.5  # of a band's last sag: what it may be off by
-MARGIN = 5.0  # chroma px around a resting marker
+MARGIN = 4.0  # chroma px around a resting marker
+AWAY = 0.2  # of its length: standard deviation of its predicted place, beside a pixel and half a frame's way
 PARTIAL, EDGE, AMBIGUOUS = int(MarkerFlag.PARTIAL), int(MarkerFlag.EDGE), int(MarkerFlag.AMBIGUOUS)
 
 
@@ -205,6 +207,12 @@ def new_tracks(shapes: Sequence[Shape]) -> NDArray[np.void]:
 
 
 @njit(cache=True)
+def half_window(extent, speed):
+    """Half the side of the window in which a marker of this length and speed is measured, px."""
+    return 0.5 * (extent + speed) + MARGIN
+
+
+@njit(cache=True)
 def expect(tracks, slot, recall, request):
     """Fill the `request` (1,) for the next frame: constant velocity, with a margin that grows with speed and size.
     `recall`: for the very frame that was observed last."""
@@ -212,8 +220,8 @@ def expect(tracks, slot, recall, request):
     speed = math.hypot(track.vx, track.vy)
     ahead = 0.0 if recall else 1.0
     out.x, out.y = track.x + ahead * track.vx + track.sag_x, track.y + ahead * track.vy + track.sag_y
-    out.half_x = out.half_y = 0.65 * track.extent + MARGIN + 0.75 * speed
-    out.sigma = 1.5 + 0.15 * track.extent + 0.4 * speed
+    out.half_x = out.half_y = half_window(track.extent, speed)
+    out.sigma = 1.0 + AWAY * track.extent + 0.5 * speed
     out.area, out.level, out.band = track.area, track.level, track.band
 
 
