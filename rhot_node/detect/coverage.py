@@ -122,7 +122,8 @@ def classify(region, own, mask, kind, stack):
             inside = number >= 2 and own[number - 2]
             kind[row, column] = INTERIOR if inside else OUTSIDE
             area += 1 if inside else 0
-    _fill_holes(region, area, kind, stack)
+    if _has_holes(region, np.sum(own), kind):
+        _fill_holes(region, area, kind, stack)
     interior = area
     height, width = kind.shape
     for row in range(y0, y1 + 1):
@@ -142,6 +143,25 @@ def classify(region, own, mask, kind, stack):
                         if kind[near_y, near_x] == OUTSIDE:
                             kind[near_y, near_x] = RIM
     return area, interior
+
+
+@njit(cache=True)
+def _has_holes(region, pieces, kind):
+    """Does the interior enclose outside? By the Euler number of `pieces` 8-connected pieces, from its 2x2 patterns."""
+    x0, x1, y0, y1 = region
+    quads = 0  # four times the Euler number
+    for row in range(y0 - 1, y1 + 1):
+        for column in range(x0 - 1, x1 + 1):
+            a = row >= y0 and column >= x0 and kind[row, column] == INTERIOR
+            b = row >= y0 and column < x1 and kind[row, column + 1] == INTERIOR
+            c = row < y1 and column >= x0 and kind[row + 1, column] == INTERIOR
+            d = row < y1 and column < x1 and kind[row + 1, column + 1] == INTERIOR
+            count = a + b + c + d
+            if count % 2 == 1:
+                quads += 2 - count
+            elif count == 2 and a == d:
+                quads -= 2
+    return quads < 4 * pieces
 
 
 @njit(cache=True)
@@ -317,7 +337,7 @@ def _sum_areas(region, kind, colour, backdrop, sums):
     """
     x0, x1, y0, y1 = region
     paint, around = sums
-    inside, outside, one = np.zeros(6), np.zeros(10), np.ones(4)
+    inside, outside = np.zeros(6), np.zeros(10)
     paint[0, :x1 - x0 + 2] = 0.0
     around[0, :x1 - x0 + 2] = 0.0
     for row in range(y0, y1 + 1):
@@ -335,13 +355,10 @@ def _sum_areas(region, kind, colour, backdrop, sums):
                 for i in range(3):
                     inside[2 + 1 + i] += colour[row, column, i]
             elif code == OUTSIDE:
-                for i in range(3):
-                    one[1 + i] = colour[row, column, i] - backdrop[i]
-                k = 0
-                for i in range(4):
-                    for j in range(i + 1):
-                        outside[k] += one[i] * one[j]
-                        k += 1
+                a, b, c = (colour[row, column, 0] - backdrop[0], colour[row, column, 1] - backdrop[1],
+                           colour[row, column, 2] - backdrop[2])
+                for k, product in enumerate((1.0, a, a * a, b, b * a, b * b, c, c * a, c * b, c * c)):
+                    outside[k] += product
             right = column - x0 + 1
             for k in range(6):
                 paint[below, right, k] = paint[below - 1, right, k] + inside[k]

@@ -30,8 +30,7 @@ from rhot_node.wire.messages import MarkerObservation
 NOISE_MOST = 0.12  # of the contrast
 SOFT = 0.25  # projected chroma that counts not at all; so much below that of paint, it counts as paint
 OTHER_HUE = 0.4  # of the contrast: what lies further beside the line from surroundings to paint is another paint
-SOFT_RATIO = 1.35  # of the expected area: what the soft area may be off, both ways
-AREA_RATIO = 1.10  # and the outline's
+AREA_RATIO = 1.10  # of the expected area: what the outline's may be off, both ways
 MISFIT_NOISE, MISFIT_MOST = 2.0, 0.10  # standard deviations of the noise, and of the contrast
 TURN_MOST = 0.17  # rad: an elongated marker that has turned further gets new axes
 ELONGATED = 1.3
@@ -164,7 +163,7 @@ def _learn_noise_inside(image, fitted, noises):
 def _soft(image, track, outline, fitted):
     """Set place and area of `fitted` to those of the soft coverage over the predicted window.
 
-    False when the frame's border may cut the outline, or the area is not as expected.
+    False when the frame's border may cut the outline, or nothing is covered.
     """
     u, v = image.u, image.v
     speed = math.hypot(track.vx, track.vy)
@@ -194,7 +193,7 @@ def _soft(image, track, outline, fitted):
         area += line
         sum_x += line_x
         sum_y += line * (row - y0)
-    if not track.area < SOFT_RATIO * area or not area < SOFT_RATIO * track.area:
+    if not area > 0.0:
         return False
     # A band is placed on its axis: by the sag of the last frame.
     fitted.x, fitted.y, fitted.area = x0 + sum_x / area - track.sag_x, y0 + sum_y / area - track.sag_y, area
@@ -258,7 +257,6 @@ def _state(track, fitted, outline, noise, report):
 
 # -- start of fast tracking --------------------------------------------------------------------------------------------
 
-START_AWAY, START_RATIO = 0.35, 1.15  # px, area: how well outline and careful measurement agree
 ARC_VARIANCE = 2.0 / 3.0 - ARC * ARC  # of sqrt(1 - u^2) over -1..1
 
 
@@ -292,8 +290,7 @@ def start(image, tracks, outlines, slot, measured, noises, work):
         x, y = fitted.x, fitted.y
     outline.sag_frames = outline.sag_zero = 0.0
     found = (_misfit_is_noise(outline, fitted, noise)
-             and fitted.area < START_RATIO * place.area and place.area < START_RATIO * fitted.area
-             and math.hypot(x - place.x, y - place.y) < START_AWAY)
+             and fitted.area < AREA_RATIO * place.area and place.area < AREA_RATIO * fitted.area)
     outline.ready = 1.0 if found else 0.0
     return found
 
