@@ -53,10 +53,8 @@ def band_center(region, coverage, gain, result):
     half_width = 0.5 * length_of(max(result.var_major - c.BLUR_VARIANCE, 0.0))
     if half_width < BAND_HALF_WIDTH_MIN:
         return False
-    length = result.area / (2.0 * half_width)
     normal = np.zeros((3, 3))
     right = np.zeros(3)
-    moments = np.zeros(4)
     x0, x1, y0, y1 = region
     for row in range(y0, y1 + 1):
         for column in range(x0, x1 + 1):
@@ -70,10 +68,6 @@ def band_center(region, coverage, gain, result):
                 right[i] += a * basis[i] * along
                 for j in range(3):
                     normal[i, j] += a * basis[i] * basis[j]
-            moments[0] += a
-            moments[1] += a * u**3
-            moments[2] += a * u**4
-            moments[3] += a * along * along
     inverse, determinant = _inverse(normal)
     if not determinant > 0.0:
         return False
@@ -81,9 +75,7 @@ def band_center(region, coverage, gain, result):
     for i in range(3):
         for j in range(3):
             solution[i] += inverse[i, j] * right[j]
-    explained = solution[0] * right[0] + solution[1] * right[1] + solution[2] * right[2]
-    residual = (moments[3] - explained) / moments[0]
-    if not _is_a_band(moments, residual, length, half_width, solution[2]):
+    if abs(solution[2]) > half_width:
         return False
     _band_result(region, coverage, gain, half_width, inverse, solution, result)
     return True
@@ -143,16 +135,6 @@ def _arc(u, half_width):
 @njit(cache=True)
 def _arc_integral(u):
     return 0.5 * (u * np.sqrt(1.0 - u * u) + np.arcsin(u))
-
-
-@njit(cache=True)
-def _is_a_band(moments, residual, length, half_width, sag):
-    """Does the coverage look like a whole band: even across its width, and as thick as its area says?"""
-    skew = moments[1] / moments[0]
-    fourth = moments[2] / moments[0]  # 1/5 for an even box
-    thickness = residual / (EVEN * length * length + c.BLUR_VARIANCE)
-    return (abs(skew) < 0.04 and abs(fourth - 0.2) < 0.05 and 0.7 < thickness < 1.35
-            and abs(sag) < 1.15 * half_width)
 
 
 @njit(cache=True)

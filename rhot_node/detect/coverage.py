@@ -23,12 +23,11 @@ RING = 2  # chroma pixels around the half level that an edge may reach (lens, 2x
 HOLES_MAX = 0.3  # holes (glints, noise) are filled up to this fraction of the component
 REACH = 5  # half-width of the neighbourhood that paint and surroundings are averaged over
 PAD = RING + REACH  # region around the component that coverage needs
-CLIP = 0.3  # coverage is clipped to -CLIP..1 + CLIP: noise must stay unbiased, glints must not count
+CLIP = 0.5  # coverage is clipped to -CLIP..1 + CLIP: noise must stay unbiased, glints must not count
 CONTRAST_MIN = 0.3  # of the marker's level; with less between paint and surroundings an edge cannot be unmixed
 FLATNESS = 4.0  # grey levels^2 that surroundings are taken to vary by at least, in every channel
 PIXELS_LEAST = 4  # pixels that are all paint: fewer show no colour and no shading to rely on
 COLLINEAR = 0.05  # of the product of both variances: with less determinant, pixels on one line show no slope
-SATURATED = 0.85  # of the strongest chroma: the edge pixels that are taken for paint when there is no interior
 
 # Kinds of pixels in the plane `kind`.
 OUTSIDE, INTERIOR, HOLE, EDGE, RIM, _REACHED = range(6)
@@ -112,7 +111,7 @@ class Scratch(NamedTuple):
 def classify(region, own, mask, kind, stack):
     """Sort the pixels of `region` (x0, x1, y0, y1) into interior, filled hole, edge (in), rim (out) and outside.
 
-    `own[n]` says whether component n belongs to the marker. Returns its area and how much of that is interior.
+    `own[n]` says whether component n belongs to the marker. Returns how much of its area is interior.
     """
     x0, x1, y0, y1 = region
     area = np.int64(0)
@@ -142,7 +141,7 @@ def classify(region, own, mask, kind, stack):
                     for near_x in range(max(column - RING, x0), min(column + RING, x1) + 1):
                         if kind[near_y, near_x] == OUTSIDE:
                             kind[near_y, near_x] = RIM
-    return area, interior
+    return interior
 
 
 @njit(cache=True)
@@ -252,28 +251,17 @@ def _gather_colour(image, region, colour):
 
 @njit(cache=True)
 def _paint_plane(region, kind, colour, paint):
-    """Fit mean and slopes of the paint's colour over its interior (its most saturated edge pixels when it has none).
+    """Fit mean and slopes of the paint's colour over its interior, or its edge when it has none.
 
     Returns the interior's centre, which the mean belongs to. Slopes stay 0 for fewer than PIXELS_LEAST pixels.
     """
     x0, x1, y0, y1 = region
-    wanted, threshold = INTERIOR, 0.0
-    count = 0
-    for row in range(y0, y1 + 1):
-        for column in range(x0, x1 + 1):
-            if kind[row, column] == INTERIOR:
-                count += 1
-            elif kind[row, column] == EDGE:
-                threshold = max(threshold, SATURATED * _magnitude(colour, row, column))
-    if count == 0:
-        wanted = EDGE
-    else:
-        threshold = 0.0
+    wanted = INTERIOR if np.any(kind[y0:y1 + 1, x0:x1 + 1] == INTERIOR) else EDGE
     count = 0
     center_x = center_y = 0.0
     for row in range(y0, y1 + 1):
         for column in range(x0, x1 + 1):
-            if kind[row, column] == wanted and _magnitude(colour, row, column) >= threshold:
+            if kind[row, column] == wanted:
                 count += 1
                 center_x += column
                 center_y += row
@@ -307,11 +295,6 @@ def _paint_slopes(region, kind, colour, paint, center_x, center_y):
         for channel in range(3):
             paint[channel, 1] = (s_yy * c_x[channel] - s_xy * c_y[channel]) / determinant
             paint[channel, 2] = (s_xx * c_y[channel] - s_xy * c_x[channel]) / determinant
-
-
-@njit(cache=True)
-def _magnitude(colour, row, column):
-    return np.hypot(colour[row, column, 1] - GREY, colour[row, column, 2] - GREY)
 
 
 @njit(cache=True)

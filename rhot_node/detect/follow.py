@@ -30,7 +30,8 @@ from rhot_node.wire.messages import MarkerObservation
 NOISE_MOST = 0.12  # of the contrast
 SOFT = 0.25  # projected chroma that counts not at all; so much below that of paint, it counts as paint
 OTHER_HUE = 0.4  # of the contrast: what lies further beside the line from surroundings to paint is another paint
-AREA_RATIO = 1.10  # of the expected area: what the outline's may be off, both ways
+SOFT_RATIO = 1.35  # of the expected area: what the soft area may be off, both ways; a switched lamp changes it
+AREA_RATIO = 1.10  # and the outline's
 MISFIT_NOISE, MISFIT_MOST = 2.0, 0.10  # standard deviations of the noise, and of the contrast
 TURN_MOST = 0.17  # rad: an elongated marker that has turned further gets new axes
 ELONGATED = 1.3
@@ -163,7 +164,7 @@ def _learn_noise_inside(image, fitted, noises):
 def _soft(image, track, outline, fitted):
     """Set place and area of `fitted` to those of the soft coverage over the predicted window.
 
-    False when the frame's border may cut the outline, or nothing is covered.
+    False when the frame's border may cut the outline, or the area is not as expected.
     """
     u, v = image.u, image.v
     speed = math.hypot(track.vx, track.vy)
@@ -193,7 +194,7 @@ def _soft(image, track, outline, fitted):
         area += line
         sum_x += line_x
         sum_y += line * (row - y0)
-    if not area > 0.0:
+    if not track.area < SOFT_RATIO * area or not area < SOFT_RATIO * track.area:
         return False
     # A band is placed on its axis: by the sag of the last frame.
     fitted.x, fitted.y, fitted.area = x0 + sum_x / area - track.sag_x, y0 + sum_y / area - track.sag_y, area

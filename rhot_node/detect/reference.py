@@ -121,7 +121,7 @@ def threshold_hsv(hsv: Plane, model: RangeModel) -> Plane:
 def clean_mask(mask: Plane) -> Plane:
     """Blur the mask (0, 255), take its half level, close, then open (RHOT 6.3.3)."""
     blurred = cv2.GaussianBlur(mask, BLUR, 0)
-    closed = cv2.morphologyEx(cv2.compare(blurred, GREY, cv2.CMP_GE), cv2.MORPH_CLOSE, KERNEL)
+    closed = cv2.morphologyEx(_in_range(np.asarray(blurred, np.uint8), (GREY,), (WHITE,)), cv2.MORPH_CLOSE, KERNEL)
     return np.asarray(cv2.morphologyEx(closed, cv2.MORPH_OPEN, KERNEL), dtype=np.uint8)
 
 

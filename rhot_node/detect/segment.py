@@ -27,9 +27,7 @@ from rhot_node.detect.image import GREY, table_of
 
 ATTEMPTS = 5  # windows and levels tried before the marker counts as lost
 LEVEL_TOLERANCE = 0.08  # a local level further off than this from the assumed one is used for another attempt
-SHRINK_SIGMA = 0.6  # of the log area, towards smaller: hidden markers are common
-GROW_SIGMA = 0.35  # and towards larger: markers do not grow in one frame
-SEAM = 16  # chroma pixels; a component this large without any interior is a seam where two other colours mix
+SIZE_SIGMA = 0.35  # of the log area from one frame to the next
 FRAGMENT_REACH = 1.0  # diameters from the prediction within which pieces of a marker are put together
 FRAGMENT_AREA = 1.2  # of the expected area: more is another object
 
@@ -92,7 +90,7 @@ def measure(image, paint, request, scratch, careful, noises, measured):
         if count == 0:
             if attempt > 0:
                 return False
-            level *= 0.6  # a lamp went out?
+            level *= 0.5  # a lamp went out?
             continue
         best = _choose(components, count, expected, own, result)
         found = True
@@ -111,8 +109,6 @@ def measure(image, paint, request, scratch, careful, noises, measured):
     result.level, result.careful = level, careful
     if careful:
         return _place(image, window, count, expected, scratch, noises, result)
-    if here == 0.0 and components[best].area >= SEAM:
-        return False
     result.v_xx = result.v_xy = result.v_yy = result.sag = result.sag_variance = result.fit = result.round = 0.0
     result.soft = result.paint_pixels = result.slope_x = result.slope_y = 0.0
     result.at_border = mask_centroid(scratch.mask, components, own, count, result)
@@ -132,9 +128,7 @@ def _place(image, window, count, request, scratch, noises, result):
             y0, y1 = min(y0, part.y_min), max(y1, part.y_max)
     region = _clamp(x0 - PAD, x1 + PAD, y0 - PAD, y1 + PAD, u)
     _clear_beyond(region, window, scratch.mask)
-    area, interior = classify(region, own, scratch.mask, kind, scratch.stack)
-    if interior == 0 and area >= SEAM:
-        return False
+    interior = classify(region, own, scratch.mask, kind, scratch.stack)
     paint = np.empty((3, 3))
     unmix(image, region, result.level, scratch, paint)
     _note_paint(paint, interior, result)
@@ -189,8 +183,7 @@ def _cost(component, request):
     """How far a component is from the hypothesis, in squared standard deviations of motion and size."""
     dx = component.sum_x / component.area - request.x
     dy = component.sum_y / component.area - request.y
-    size = np.log(component.area / request.area)
-    size /= GROW_SIGMA if size > 0.0 else SHRINK_SIGMA
+    size = np.log(component.area / request.area) / SIZE_SIGMA
     return (dx * dx + dy * dy) / request.sigma ** 2 + size * size
 
 
