@@ -42,6 +42,15 @@ _FORBIDDEN = 1e9
 _COLUMNS = "pixels", "covariances", "diameters", "qualities", "flags"
 
 
+def squared_distances(offsets: Array, covariances: Array) -> tuple[Array, Array]:
+    """Squared Mahalanobis distances (...,) of offsets (..., 2), and the determinants of their covariances
+    (..., 2, 2)."""
+    a, b, c = covariances[..., 0, 0], covariances[..., 0, 1], covariances[..., 1, 1]
+    x, y = offsets[..., 0], offsets[..., 1]
+    determinants = a * c - b * b
+    return (c * x * x - 2.0 * b * x * y + a * y * y) / determinants, determinants
+
+
 def assign(predicted: Array, predicted_covariances: Array, pixels: Array, covariances: Array,
            label_costs: Array) -> tuple[Indices, Array]:
     """The joint assignment of N candidates to M markers with the greatest likelihood.
@@ -49,15 +58,14 @@ def assign(predicted: Array, predicted_covariances: Array, pixels: Array, covari
     A pair costs its squared Mahalanobis distance and the logarithm of its covariance's determinant. A pair beyond the
     gate is excluded.
 
-    `predicted` (M, 2) px with `predicted_covariances` (M, 2, 2) px^2. `pixels` (N, 2) px with `covariances` (N, 2, 2)
-    px^2. `label_costs` (M, N) are added: -2 log of the probability that the marker is reported under the candidate's
-    label, infinite where that is excluded. A marker may stay without a candidate at the cost GATE.
+    `predicted` (M, 2) px, NaN for none, with `predicted_covariances` (M, 2, 2) px^2. `pixels` (N, 2) px with
+    `covariances` (N, 2, 2) px^2. `label_costs` (M, N) are added: -2 log of the probability that the marker is reported
+    under the candidate's label, infinite where that is excluded. A marker may stay without a candidate at the cost
+    GATE.
     Returns the candidate of each marker (M,), -1 for none, and all costs (M, N).
     """
-    offset = pixels[None] - predicted[:, None]
-    total = predicted_covariances[:, None] + covariances[None]
-    distances = np.einsum("mni,mni->mn", offset, np.linalg.solve(total, offset[..., None])[..., 0])
-    volumes = np.log(np.linalg.det(total))  # of two candidates as near, the more certain one is likelier
+    distances, volumes = squared_distances(pixels - predicted[:, None], predicted_covariances[:, None] + covariances)
+    volumes = np.log(volumes)  # of two candidates as near, the more certain one is likelier
     costs = distances + volumes - volumes.min(axis=1, keepdims=True, initial=np.inf) + label_costs
     costs = np.where(np.isfinite(costs) & (distances < GATE), costs, _FORBIDDEN)
     markers = len(predicted)
@@ -103,7 +111,7 @@ class MarkerAssociation:
             found = np.isfinite(frame.pixels[:, 0])
             self._chosen[frame.camera][found] = frame.pixels[found]
             return frame
-        listed = _list_candidates(frame)
+        listed = list_candidates(frame)
         predicted, covariances = self._predict(frame.camera, points, variances)
         chosen, rivals = self._choose(listed, predicted, covariances)
         undetermined = np.isnan(predicted[:, 0]) | (rivals >= 0)  # the prediction does not tell
@@ -135,12 +143,9 @@ class MarkerAssociation:
 
         `predicted` (M, 2) px, NaN for none, with `covariances` (M, 2, 2) px^2.
         """
-        markers = len(predicted)
-        known = np.isfinite(predicted[:, 0])
-        own = np.arange(markers)[:, None] == listed.markers[None]
-        chosen, costs = assign(np.nan_to_num(predicted), np.where(known[:, None, None], covariances, np.eye(2)),
-                               listed.pixels, listed.covariances, np.where(own & known[:, None], 0.0, np.inf))
-        every = np.arange(markers)
+        every = np.arange(len(predicted))
+        own = every[:, None] == listed.markers
+        chosen, costs = assign(predicted, covariances, listed.pixels, listed.covariances, np.where(own, 0.0, np.inf))
         paid = costs[every, chosen]
         others = costs.copy()
         others[every, chosen] = _FORBIDDEN
@@ -180,7 +185,7 @@ class MarkerAssociation:
                        ) -> tuple[Indices, Array]:
         """Points (H, 3) m, world frame, where the rays of candidates of the same marker meet in two cameras, and (H,)
         the rows of the candidates in `listed`."""
-        rig, others, pair = self._rig, _list_candidates(other), [frame.camera, other.camera]
+        rig, others, pair = self._rig, list_candidates(other), [frame.camera, other.camera]
         rows, columns = np.nonzero(listed.markers[:, None] == others.markers[None])
         points, errors_px = np.empty((len(rows), 3)), np.empty(len(rows))
         _intersect(np.stack([listed.pixels[rows], others.pixels[columns]], axis=1),
@@ -231,7 +236,7 @@ class MarkerAssociation:
                        qualities=np.where(found, listed.qualities[rows], 0.0))
 
 
-def _list_candidates(frame: CameraObservations) -> Candidates:
+def list_candidates(frame: CameraObservations) -> Candidates:
     """Every candidate of a frame but the lost ones."""
     found = np.flatnonzero(np.isfinite(frame.pixels[:, 0]) & ((frame.flags & _LOST) == 0))
     columns = [getattr(frame, name)[found] for name in _COLUMNS]

@@ -25,9 +25,8 @@ from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.tracking.association import MarkerAssociation
 from rhot_app.tracking.markers.acquisition import Starter
-from rhot_app.tracking.markers.estimator import associate, distances_of
-from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
-from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
+from rhot_app.tracking.markers.marker_model import MarkerModel, compile_markers
+from rhot_app.tracking.markers.marker_residual import MarkerFrame, lasting_covariances
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.tracker import CameraObservations
 
@@ -93,10 +92,7 @@ class MarkersOfHand:
 
     def _set_lasting_errors(self, state: Array) -> None:
         """Set the process's covariance of the lasting errors to that of the markers of a hand in `state`."""
-        m = sized(self._markers, self._hand.surface.bone, state)
-        bias = np.empty((len(m.finger), 3, 3))
-        triangulation_covariance(without_shape(state), m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX,
-                                 m.paint_variance, bias)
+        bias = lasting_covariances(without_shape(state), sized(self._markers, self._hand.surface.bone, state).arrays)
         self._process.set_bias(np.concatenate([self._shape, bias]))
 
 
@@ -110,11 +106,11 @@ class SizedMarkerResidual:
         self._markers, self._bone = markers, bone
         frame.markers = sized(markers, bone, prediction[0])
         frame.add_landmark_noise(without_shape(prediction[0]))
-        frame.late_s, frame.t_ns = np.where(frame.seen, frame.late_s + 1e-9 * (frame.t_ns - t_ns), 0.0), t_ns
+        frame.set_time(t_ns)
         lengths = lengths_jacobian(markers.dh, bone, prediction[0])
         pixels, covariances = frame.predict_pixels(without_shape(prediction[0]),
                                                    without_shape_covariance(prediction[1], lengths))
-        self.frame = associate(frame, pixels, covariances, distances_of(frame, pixels, covariances))
+        self.frame = frame.associated(pixels, covariances, frame.distances(pixels, covariances))
 
     def linearise(self, state: Array) -> Rows:
         """See `Residual`."""

@@ -28,12 +28,12 @@ from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState
-from rhot_app.tracking.association import GATE, MarkerAssociation, assign
+from rhot_app.tracking.association import GATE, MarkerAssociation
 from rhot_app.tracking.markers.acquisition import Located, Starter, pose_before_camera, pose_on_plane
 from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObservations
 from rhot_app.tracking.markers.hand_size import HandSize
-from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, compile_markers
-from rhot_app.tracking.markers.marker_residual import MarkerFrame, triangulation_covariance
+from rhot_app.tracking.markers.marker_model import MarkerModel, compile_markers
+from rhot_app.tracking.markers.marker_residual import MarkerFrame, lasting_covariances
 from rhot_app.tracking.rig_arrays import RigArrays, compile_rig
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, HandFrame, Tracker
 from rhot_app.tracking.trust import JUMP_FLOOR_M
@@ -45,9 +45,6 @@ Indices = NDArray[np.int64]
 
 START_SD = 0.03, 0.5
 """m and rad: standard deviation of the palm's pose as it is first found."""
-
-CONFUSION = 0.01
-"""Probability that a node reports a marker under another one's colour."""
 
 REJECTIONS = 2
 """Observations rejected in a row that are no outliers: of one in ten mistaken, two in a row have a chance of 1 %."""
@@ -212,7 +209,8 @@ class Estimator(Tracker):
             if located is not None:
                 self._size.look(located, pose.world_from_palm, pose.angles)
             self._resize(*self._size.known)
-        self._note_bias(self._process.start(pose.world_from_palm, pose.angles, START_SD)[0])
+        state, _ = self._process.start(pose.world_from_palm, pose.angles, START_SD)
+        self._process.set_bias(lasting_covariances(state, self._markers.arrays))
         self._filter.begin(t_ns, *self._process.start(pose.world_from_palm, pose.angles, START_SD))
         self._life.begin(t_ns)
         for frame in self._observations.recent(t_ns):
@@ -239,9 +237,9 @@ class Estimator(Tracker):
         self._observations.note_sizes(frame, prediction[0])
         frame.add_landmark_noise(prediction[0])
         pixels, covariances = frame.predict_pixels(*prediction)
-        distances = distances_of(frame, pixels, covariances)
-        frame = associate(frame, pixels, covariances, distances)
-        self._note_bias(prediction[0])
+        distances = frame.distances(pixels, covariances)
+        frame = frame.associated(pixels, covariances, distances)
+        self._process.set_bias(lasting_covariances(prediction[0], self._markers.arrays))
         try:
             knot = self._filter.add(t_s, [frame] if self._plane is None else [frame, self._plane], prediction)
         except np.linalg.LinAlgError:  # the estimate contradicts itself
@@ -260,12 +258,6 @@ class Estimator(Tracker):
             self._filter.restart(inflated)
         accepted = int(np.count_nonzero(inliers))
         self._life.observe(frame.t_ns, accepted=accepted > 0, plausible=bool(2 * accepted >= candidates))
-
-    def _note_bias(self, state: Array) -> None:
-        m, bias = self._markers, np.empty((len(self._markers.finger), 3, 3))
-        triangulation_covariance(state, m.dh, m.half_axes, m.poses, m.intrinsics, LASTING_PX, m.paint_variance,
-                                 bias)
-        self._process.set_bias(bias)
 
 
 class Rejections:
@@ -335,27 +327,3 @@ class Rejections:
         x, y = undistort_points(pixel[None], self._rig.intrinsics[camera])[0]
         direction = np.array([x, y, 1.0]) @ pose[:, :3]
         return -pose[:, 3] @ pose[:, :3], direction / np.linalg.norm(direction)
-
-
-def associate(frame: MarkerFrame, pixels: Array, covariances: Array, distances: Array) -> MarkerFrame:
-    """The frame with the blob of each marker, predicted at `pixels` (M, 2) with `covariances` (M, 2, 2) px^2. A
-    landmark is always its own: a detector that errs does not mean another joint, and its kernel weighs it."""
-    landmark = frame.markers.landmark
-    if frame.observations.further is None and not np.any(distances[~landmark] > GATE):
-        return frame
-
-    def chosen(listed: Array, listed_covariances: Array, own: Mask) -> Indices:
-        taken = own[landmark].any(axis=0)
-        known = np.where(np.isfinite(pixels[:, :1, None]), covariances, np.eye(2))
-        confused = np.where(landmark[:, None] | taken, np.inf, -2.0 * np.log(CONFUSION))
-        blobs = assign(np.nan_to_num(pixels), known, listed, listed_covariances, np.where(own, 0.0, confused))[0]
-        return np.where(landmark, np.where(own.any(axis=1), own.argmax(axis=1), -1), blobs)
-    return frame.associated(chosen)
-
-
-def distances_of(frame: MarkerFrame, pixels: Array, covariances: Array) -> Array:
-    """(M,) squared Mahalanobis distances of a frame's markers from their predictions."""
-    offset, total = frame.pixels - pixels, covariances + frame.covariances
-    a, b, c = total[:, 0, 0], total[:, 0, 1], total[:, 1, 1]
-    x, y = offset[:, 0], offset[:, 1]
-    return np.where(frame.seen, (c * x * x - 2.0 * b * x * y + a * y * y) / (a * c - b * b), np.nan)

@@ -11,8 +11,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.layout import pose_matrix
+from rhot_app.estimation.track import NEVER
 from rhot_app.geometry.camera import project_with_slope
-from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, point_covariances
+from rhot_app.hand.kinematics import point_covariances
 from rhot_app.hand.landmarks import DISAGREEMENT_M
 from rhot_app.hand.motion.hand_state import POSE, STATE, TANGENT
 from rhot_app.hand.skeleton import FINGER_OF_ANGLE, FINGER_OF_JOINT, TIP_ROLES, WRIST_ROLE
@@ -29,7 +30,7 @@ from rhot_app.state import (
 from rhot_app.tracking.association import GATE
 from rhot_app.tracking.locate import Views, empty_places, locate_all, rig_table, turn_band
 from rhot_app.tracking.markers.marker_model import MarkerModel, project_marker, scaled_table
-from rhot_app.tracking.markers.marker_residual import SIZE_S, SIZE_SD, MarkerFrame
+from rhot_app.tracking.markers.marker_residual import SIZE_S, SIZE_SD, MarkerFrame, fill_centre, place_points
 from rhot_app.tracking.pairing import DOUBTFUL, SAME_FRAME_NS
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.tracker import CameraObservations
@@ -52,7 +53,6 @@ _FRESH_NS = 60_000_000  # before a camera's second frame
 _SLOWEST_NS = 400_000_000
 _SLOWEST_CLEAR_NS = 150_000_000
 _LOST = int(MarkerFlag.LOST)
-_NEVER = -(1 << 62)
 
 _INLIER_WEIGHT = 6.0 / (4.0 + GATE)  # of the centroids' kernel, at the gate
 
@@ -60,12 +60,18 @@ _MEASURED, _INFERRED, _GUESSED = int(Knowledge.MEASURED), int(Knowledge.INFERRED
 _FIRST_TIP, _FIRST_MARKER = 21, 26
 
 
-class RecentObservations:
-    """The last accepted observation of each of M markers by each of C cameras, and the cameras' frames.
+ACCEPTED = np.dtype([("t_ns", "i8"), ("late_s", "f8"), ("pixel", "f8", 2), ("covariance", "f8", (2, 2)),
+                     ("doubtful", "?")])
+"""An inlier: master time of its frame, how much later its row was, px and px^2."""
 
-    `newest`: each camera's newest frame. `times` (C, M) ns, of their frames; `late_s` (C, M): of their rows after
-    these; `observed` (C, M, 2) px; `covariances` (C, M, 2, 2) px^2; `doubtful` (C, M).
-    """
+
+LEARNT = np.dtype([("log_width", "f8"), ("variance", "f8"), ("frames", "f8")])
+"""How wide a fingertip is: the mean of the logarithm, its variance, and of how many frames."""
+
+
+class RecentObservations:
+    """The last accepted observation of each of M markers by each of C cameras, `accepted` (C, M), and the cameras'
+    frames. `newest`: each camera's newest frame."""
 
     def __init__(self, rig: RigArrays, markers: MarkerModel) -> None:
         self._shape = len(rig.camera_names), len(rig.marker_ids)
@@ -75,16 +81,15 @@ class RecentObservations:
     def reset(self) -> None:
         """Forget all."""
         cameras, markers = shape = self._shape
-        self.times, self.observed = np.full(shape, _NEVER, np.int64), np.zeros((*shape, 2))
-        self.late_s = np.zeros(shape)
-        self.covariances, self.doubtful = np.tile(np.eye(2), (*shape, 1, 1)), np.zeros(shape, np.bool_)
+        self.accepted = np.zeros(shape, ACCEPTED)
+        self.accepted["t_ns"], self.accepted["covariance"] = NEVER, np.eye(2)
         self.fresh_ns, self.periods_s = np.full(cameras, _FRESH_NS), [1e-9 * _FRESH_NS / _PERIODS] * cameras
         self._paced = [False] * cameras
         self.newest: list[CameraObservations | None] = [None] * cameras
         self.pixels, self.flags = np.full((*shape, 2), np.nan), np.full(shape, _LOST, np.uint16)
         self._frames: list[MarkerFrame] = []
-        self._log_width, self._width_variance = np.zeros(markers), np.full(markers, SIZE_SD**2)
-        self._sized = np.zeros(markers)
+        self._learnt = np.zeros(markers, LEARNT)
+        self._learnt["variance"] = SIZE_SD**2
 
     @property
     def shortest_period_s(self) -> float:
@@ -119,21 +124,16 @@ class RecentObservations:
     def note_sizes(self, frame: MarkerFrame, state: Array) -> None:
         """Learn how wide each fingertip is, and how much that varies, while another camera sees it too. The frame uses
         it for the others. A fingertip that looks smaller is partly hidden, and its centroid is less certain."""
-        widths = frame.widths(state)
+        widths, since_ns = frame.widths(state), frame.t_ns - 2 * int(self.fresh_ns.max())
         frame.covariances = frame.covariances.copy()
         frame.log_width, frame.size_sd = np.full(len(widths), np.nan), np.empty(len(widths))
-        _note_sizes(frame.camera, frame.t_ns, self.times, 2 * self.fresh_ns.max(), widths, frame.diameters,
-                    max(SIZE_S / self.periods_s[frame.camera], 1.0), self._sized, self._log_width,
-                    self._width_variance, frame.log_width, frame.size_sd, frame.covariances)
+        correlated = max(SIZE_S / self.periods_s[frame.camera], 1.0)  # frames that count as one observation
+        _learn(widths, self.accepted, frame.camera, since_ns, correlated, frame.observed, self._learnt)
 
     def accept(self, frame: MarkerFrame, state: Array, weights: Array) -> Mask:
         """Note the observations of a frame, after which the hand is in `state`; returns which are inliers (M,)."""
-        inlier = np.zeros(len(frame.seen), np.bool_)
-        camera = frame.camera
-        _accept(frame.t_ns, frame.late_s, frame.expected(state), frame.pixels, frame.covariances, frame.flags,
-                frame.seen, weights, self.times[camera], self.late_s[camera], self.observed[camera],
-                self.covariances[camera], self.doubtful[camera], inlier)
-        return inlier
+        return np.asarray(_accept(frame.observed, frame.t_ns, frame.expected(state), weights,
+                                  self.accepted[frame.camera]))
 
 
 class EstimatorStates:
@@ -161,26 +161,23 @@ class EstimatorStates:
         state = state.copy()
         state[STATE.angles] = np.minimum(np.maximum(state[STATE.angles], m.limits[:, 0]), m.limits[:, 1])
         count = len(rig.marker_ids)
-        points, covariances = np.empty((_FIRST_MARKER + count, 3)), np.empty((_FIRST_MARKER + count, 3, 3))
-        age = np.abs(t_ns - observations.times)
+        last, age = observations.accepted, np.abs(t_ns - observations.accepted["t_ns"])
         fresh = age <= observations.fresh_ns[:, None]
-        clear = fresh & ~observations.doubtful & (observations.fresh_ns[:, None] <= _SLOWEST_CLEAR_NS)
+        clear = fresh & ~last["doubtful"] & (observations.fresh_ns[:, None] <= _SLOWEST_CLEAR_NS)
         shown = np.count_nonzero(clear, axis=0) >= 2
         raw = empty_places(count)
         markers, joints, angles = np.empty(count, np.uint8), np.empty(21, np.uint8), np.empty(21, np.uint8)
         angle_sd = np.empty(21)
-        aligned, motion_sd = np.empty((*fresh.shape, 2)), np.empty((2, 21))
-        late_s = np.where(fresh, 1e-9 * (observations.times - t_ns) + observations.late_s, 0.0)
-        _place(state, covariance, self._dh, m.half_axes, m.poses, m.intrinsics, observations.observed, late_s, points,
-               covariances, motion_sd, aligned)
+        late_s = np.where(fresh, 1e-9 * (last["t_ns"] - t_ns) + last["late_s"], 0.0)
+        points, covariances, motion_sd, aligned = _place(state, covariance, self._dh, m.arrays, last["pixel"], late_s)
         if rig.band_half_axes is not None:
             world = pose_matrix(state)
             turn_band(world, rig.band_half_axes, self._shapes[rig.wrist])
         used = fresh & (np.count_nonzero(fresh, axis=0) > 1)
-        locate_all(Views(aligned, observations.covariances, used), rig_table(rig, self._shapes), raw)
+        locate_all(Views(aligned, last["covariance"], used), rig_table(rig, self._shapes), raw)
         if by_one:
             covariance = covariance.copy()
-            seeing = int(np.argmax(observations.times.max(axis=1)))
+            seeing = int(np.argmax(last["t_ns"].max(axis=1)))
             self._doubt_distance(seeing, points, covariances, state, covariance)
         palm = _conclude(covariance, covariances, shown, m.finger, markers, joints, angles, angle_sd)
         # two frames may be missing, but not of most markers: without any, a fast hand is centimetres off
@@ -247,83 +244,69 @@ def _latency(newest: CameraObservations, filter_s: float, solve_s: float = 0.0) 
 
 
 @njit(cache=True)
-def _note_sizes(camera, t_ns, times, fresh_ns, widths, diameters, correlated, sized, log_width, variance, out, out_sd,
-                pixel_covariances):
-    """`correlated`: frames that count as one observation."""
+def _learn(widths, accepted, camera, since_ns, correlated, observed, learnt):
+    """Learn from `widths` (M,), NaN for none, of markers that another camera has seen since `since_ns`, and widen the
+    covariances of those that are narrower than known; fill the `log_width` of the others, and all `size_sd`."""
     for m in range(widths.shape[0]):
-        out_sd[m] = math.sqrt((variance[m] + SIZE_FLOOR**2) * correlated)
+        one = learnt[m]
+        observed.size_sd[m] = math.sqrt((one.variance + SIZE_FLOOR**2) * correlated)
         if math.isnan(widths[m]):
             continue
-        both = False
-        for other in range(times.shape[0]):
-            both |= other != camera and t_ns - times[other, m] < fresh_ns
-        known = sized[m] >= SIZE_FRAMES
+        wider, known, both = widths[m] - one.log_width, one.frames >= SIZE_FRAMES, False
+        for other in range(accepted.shape[0]):
+            both |= other != camera and accepted[other, m].t_ns > since_ns
         if not both:
-            out[m] = log_width[m] if known else math.nan
+            observed.log_width[m] = one.log_width if known else math.nan
             continue
-        wider = widths[m] - log_width[m]
         if known and wider < -SIZE_SD:  # a cap of the disc is hidden; its centroid moves so far, in any direction
-            moved_px2 = 0.5 * (wider * diameters[m]) ** 2
-            pixel_covariances[m, 0, 0] += moved_px2
-            pixel_covariances[m, 1, 1] += moved_px2
-        sized[m] = min(sized[m] + 1.0, _SIZE_MEMORY)
-        log_width[m] += wider / sized[m]
-        if sized[m] > 1.0:
-            variance[m] += (wider * wider - variance[m]) / sized[m]
+            for i in range(2):
+                observed.covariances[m, i, i] += 0.5 * (wider * observed.diameters[m]) ** 2
+        one.frames = min(one.frames + 1.0, _SIZE_MEMORY)
+        one.log_width += wider / one.frames
+        if one.frames > 1.0:
+            one.variance += (wider * wider - one.variance) / one.frames
 
 
 @njit(cache=True)
-def _accept(t_ns, frame_late_s, expected, pixels, pixel_covariances, flags, seen, weights, times, late_s, observed,
-            covariances, doubtful, inlier):
-    """Take one camera's inliers over into its row of the observations; `weights` are those of the seen markers."""
-    count = 0
-    for m in range(seen.shape[0]):
-        if not seen[m] or math.isnan(expected[m, 0]):
-            continue
-        inlier[m] = weights[count] > _INLIER_WEIGHT
-        count += 1
-        if inlier[m] and t_ns >= times[m]:
-            times[m] = t_ns
-            late_s[m] = frame_late_s[m]
-            observed[m] = pixels[m]
-            covariances[m] = pixel_covariances[m]
-            doubtful[m] = (flags[m] & DOUBTFUL) != 0
+def _accept(observed, t_ns, expected, weights, accepted):
+    """Take one camera's inliers over into its row (M,) of what is `accepted`; returns which they are. `weights` begin
+    with those of the markers that are seen."""
+    inlier = np.zeros(len(observed.seen), np.bool_)
+    for k, m in enumerate(np.flatnonzero(observed.seen)):
+        inlier[m] = weights[k] > _INLIER_WEIGHT and not math.isnan(expected[m, 0])
+        one = accepted[m]
+        if inlier[m] and t_ns >= one.t_ns:
+            one.t_ns, one.late_s, one.doubtful = t_ns, observed.late_s[m], (observed.flags[m] & DOUBTFUL) != 0
+            one.pixel[:], one.covariance[:] = observed.pixels[m], observed.covariances[m]
+    return inlier
 
 
 @njit(cache=True)
-def _place(state, covariance, dh, half_axes, poses, intrinsics, observed, late_s, points, covariances, motion_sd,
-           aligned):
-    """Fill points (26 + M, 3) m with covariances, `motion_sd` (2, 21) m/s and m/s^2 of the joints' velocities and
-    accelerations, and `aligned` (C, M, 2) px: each camera's last `observed` (C, M, 2) pixel of a marker, `late_s`
-    (C, M) after the state's instant, carried there by the hand's motion alone."""
-    count = points.shape[0]
-    frames, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3, POSE))
-    world = pose_matrix(state)
-    forward_arrays(dh, world, state[STATE.angles], frames, points)
-    jacobian_arrays(dh, world, frames, points, jacobian)
-    own, scratch = np.arange(POSE), np.empty((_FIRST_TIP, 3, 3))
+def _place(state, covariance, dh, markers, observed, late_s):
+    """Points (26 + M, 3) m with their covariances, (2, 21) m/s and m/s^2: standard deviations of the joints' velocities
+    and accelerations, and (C, M, 2) px: each camera's last `observed` (C, M, 2) pixel of a marker, `late_s` (C, M)
+    after the state's instant, carried there by the hand's motion alone."""
+    world, _, points, jacobian = place_points(state, dh)
+    own, scratch, motion_sd = np.arange(POSE), np.empty((_FIRST_TIP, 3, 3)), np.empty((2, _FIRST_TIP))
+    covariances, aligned = np.empty((points.shape[0], 3, 3)), np.empty(observed.shape)
     point_covariances(jacobian, own, covariance, covariances)
     for order in range(2):
         point_covariances(jacobian[:_FIRST_TIP], own + POSE * (order + 1), covariance, scratch)
         for p in range(_FIRST_TIP):
             motion_sd[order, p] = _sd(scratch[p])
-    place, then, seen, slope = np.empty(3), np.empty(3), np.empty(2), np.empty((2, 3))
-    velocity, acceleration, biases = state[STATE.velocity], state[STATE.acceleration], state[STATE.lasting]
-    for camera in range(poses.shape[0]):
-        for m in range(half_axes.shape[0]):
-            late = late_s[camera, m]
-            for i in range(3):
-                place[i] = then[i] = points[_FIRST_MARKER + m, i] + biases[3 * m + i]
-                for j in range(POSE):
-                    then[i] += (late * jacobian[_FIRST_MARKER + m, i, j]
-                                * (velocity[j] + 0.5 * late * acceleration[j]))
-            if (project_marker(then, world, half_axes[m], poses[camera], intrinsics[camera], seen, slope)
-                    and project_marker(place, world, half_axes[m], poses[camera], intrinsics[camera],
-                                       aligned[camera, m], slope)):
-                for i in range(2):
-                    aligned[camera, m, i] += observed[camera, m, i] - seen[i]
-            else:
-                aligned[camera, m] = math.nan
+    place, then, slope = np.empty(2), np.empty(2), np.empty((2, 3))
+    centre = np.empty(3)
+    for camera in range(observed.shape[0]):
+        pose, intrinsics = markers.poses[camera], markers.intrinsics[camera]
+        for m in range(observed.shape[1]):
+            point, by_pose, body = points[_FIRST_MARKER + m], jacobian[_FIRST_MARKER + m], markers.half_axes[m]
+            fill_centre(state, m, late_s[camera, m], point, by_pose, centre)
+            there = project_marker(centre, world, body, pose, intrinsics, then, slope)
+            fill_centre(state, m, 0.0, point, by_pose, centre)
+            there &= project_marker(centre, world, body, pose, intrinsics, place, slope)
+            for i in range(2):
+                aligned[camera, m, i] = observed[camera, m, i] + place[i] - then[i] if there else math.nan
+    return points, covariances, motion_sd, aligned
 
 
 @njit(cache=True)

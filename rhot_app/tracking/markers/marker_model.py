@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -46,6 +47,18 @@ LEAST_SIZE_SD = 0.015
 size is a mean over fifteen bones."""
 
 
+class MarkerArrays(NamedTuple):
+    """What compiled functions take of a `MarkerModel`."""
+
+    dh: DhArrays
+    half_axes: Array
+    slender: Array
+    paint_variance: Array
+    landmark: NDArray[np.bool_]
+    poses: Array
+    intrinsics: Array
+
+
 @dataclass(frozen=True, slots=True)
 class MarkerModel:
     """M markers on a hand before C cameras. Read-only.
@@ -72,6 +85,12 @@ class MarkerModel:
     roles: tuple[str, ...]
     places: tuple[Place, ...]
     size_sd: float
+
+    @property
+    def arrays(self) -> MarkerArrays:
+        """What compiled functions take of it."""
+        return MarkerArrays(self.dh, self.half_axes, self.slender, self.paint_variance, self.landmark, self.poses,
+                            self.intrinsics)
 
     def scaled(self, factor: float) -> MarkerModel:
         """The markers on a hand `factor` times as large."""

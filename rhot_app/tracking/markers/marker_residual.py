@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -15,19 +16,22 @@ from rhot_app.estimation.residual import UNIT, Rows, student
 from rhot_app.geometry.camera import is_wide, pixels_per_metre, project_with_slope
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, point_jacobian
 from rhot_app.hand.landmarks import NOISE_M
-from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE, tangent_size
-from rhot_app.tracking.markers.marker_model import MarkerModel, project_marker
+from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE
+from rhot_app.tracking.association import GATE, assign, list_candidates, squared_distances
+from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, project_marker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 FLOOR_PX = 0.02
 """px: no centroid is better, whatever a node states."""
 
 CENTROID_KERNEL = student(4.0)
 """Centroids have heavy tails: blobs are partly hidden. 4 degrees of freedom (Lange, Little and Taylor 1989)."""
+
+CONFUSION = 0.01
+"""Probability that a node reports a marker under another one's colour."""
 
 SIZE_SD = 0.02
 """Standard deviation of the logarithm of a fingertip's apparent width (`python benchmarks/marker_errors.py`)."""
@@ -41,6 +45,20 @@ _STRETCH_MAX = 0.5  # of a marker's height by its motion along the rows
 _COLUMNS = "pixels", "covariances", "diameters", "flags"
 
 
+class Observed(NamedTuple):
+    """What compiled functions take of a `MarkerFrame`: (M, ...) each, and the time between two rows."""
+
+    seen: NDArray[np.bool_]
+    pixels: Array
+    covariances: Array
+    diameters: Array
+    flags: NDArray[np.uint16]
+    late_s: Array
+    log_width: Array
+    size_sd: Array
+    row_s: float
+
+
 class MarkerFrame:
     """What one camera sees in one frame; implements `estimation.residual.Residual`.
 
@@ -50,181 +68,233 @@ class MarkerFrame:
 
     def __init__(self, markers: MarkerModel, observations: CameraObservations) -> None:
         self.markers, self.observations, self.camera = markers, observations, observations.camera
+        self.pixels, self.covariances = observations.pixels, observations.covariances
+        self.diameters, self.flags = observations.diameters, observations.flags
         rows = observations.pixels[:, 1]
         self.seen = ((observations.flags & int(MarkerFlag.LOST)) == 0) & np.isfinite(rows)
         mean_row = rows[self.seen].mean() if self.seen.any() else markers.intrinsics[self.camera, 3]
-        self.t_ns = observations.t_row0_master_ns + int(mean_row * observations.row_time_ns)
         self.row_s = 1e-9 * observations.row_time_ns
-        self.late_s = np.where(self.seen, (rows - mean_row) * self.row_s, 0.0)
-        self.pixels, self.covariances = observations.pixels, observations.covariances
-        self.diameters, self.flags = observations.diameters, observations.flags
+        self.set_time(observations.t_row0_master_ns + int(mean_row * observations.row_time_ns))
         self.log_width, self.size_sd = np.full(len(rows), np.nan), np.full(len(rows), SIZE_SD)
 
+    def set_time(self, t_ns: int) -> None:
+        """Count the markers' times, `late_s` (M,) s, from the master time `t_ns`, that of the states."""
+        row0_s = 1e-9 * (self.observations.t_row0_master_ns - t_ns)
+        self.t_ns, self.late_s = t_ns, np.where(self.seen, row0_s + self.pixels[:, 1] * self.row_s, 0.0)
+
     def linearise(self, state: Array) -> Rows:
-        """Two rows, px, for each marker that is seen, then one for each apparent size, by standard deviations."""
-        count = len(self.seen)
-        error, jacobian = np.empty(3 * count), np.zeros((3 * count, tangent_size(state)))
-        first = np.empty(2 * count, np.int64)
-        m = self.markers
-        rows, observations = _linearise(
-            state, m.dh, m.half_axes, m.poses[self.camera], m.intrinsics[self.camera], self.seen, self.pixels,
-            self.covariances, self.late_s, m.slender, self.log_width, self.size_sd, self.diameters, self.row_s,
-            m.landmark, error, jacobian, first)
-        return Rows(error[:rows], jacobian[:rows], UNIT, CENTROID_KERNEL, first[:observations])
+        """Two rows, px, for each marker that is seen, then one for each apparent size, by standard deviations. Rows of
+        a marker behind the camera are zero."""
+        error, jacobian, first = _linearise(state, self.markers.arrays, self.camera, self.observed)
+        return Rows(error, jacobian, UNIT, CENTROID_KERNEL, first)
+
+    @property
+    def observed(self) -> Observed:
+        """What compiled functions take of it."""
+        return Observed(self.seen, self.pixels, self.covariances, self.diameters, self.flags, self.late_s,
+                        self.log_width, self.size_sd, self.row_s)
+
+    def expected(self, state: Array) -> Array:
+        """(M, 2) px where each marker of a hand in `state` is seen at its own time; NaN behind the camera."""
+        return np.asarray(project_markers(state, self.markers.arrays, self.camera, self.late_s)[0])
 
     def predict_pixels(self, state: Array, covariance: Array) -> tuple[Array, Array]:
         """Pixels (M, 2) where the markers are expected, NaN behind the camera, and their covariances (M, 2, 2)."""
-        m, count = self.markers, len(self.seen)
-        pixels, covariances = np.empty((count, 2)), np.empty((count, 2, 2))
-        _predict_pixels(state, covariance, m.dh, m.half_axes, m.poses[self.camera], m.intrinsics[self.camera],
-                        self.late_s, pixels, covariances)
-        return pixels, covariances
+        pixels, jacobian, _ = project_markers(state, self.markers.arrays, self.camera, self.late_s)
+        jacobian[:, :, POSE:MOTION] = 0.0  # the motion until its row adds little, but before a velocity is known
+        return pixels, _spread(jacobian, covariance)
 
     def add_landmark_noise(self, state: Array) -> None:
         """Widen the landmarks' covariances by the noise of their detector at the distance that `state` has."""
-        m = self.markers
-        if m.landmark.any():
-            self.covariances = self.covariances.copy()
-            _add_noise(state, m.dh, m.half_axes, m.poses[self.camera], m.intrinsics[self.camera],
-                       np.where(m.landmark, NOISE_M, 0.0), self.covariances)
+        landmark = self.markers.landmark
+        if landmark.any():
+            pixels, _, scale = project_markers(state, self.markers.arrays, self.camera, self.late_s)
+            noise_px = np.where(landmark & np.isfinite(pixels[:, 0]), NOISE_M * scale, 0.0)
+            self.covariances = self.covariances + noise_px[:, None, None] ** 2 * np.eye(2)
 
     def widths(self, state: Array) -> Array:
         """(M,) ln of the width in metres that each plain fingertip would show from its side at its estimated distance;
         NaN where unknown."""
-        m, out = self.markers, np.full(len(self.seen), np.nan)
-        plain = self.seen & (self.flags == 0) & (m.slender >= 0.0) & (self.diameters > 0.0)
-        if plain.any():
-            _widths(state, m.dh, m.half_axes, m.poses[self.camera], m.intrinsics[self.camera], plain, m.slender,
-                    self.diameters, self.row_s, out)
-        return out
+        plain = self.seen & (self.flags == 0) & (self.markers.slender >= 0.0) & (self.diameters > 0.0)
+        return np.asarray(_measure_widths(state, self.markers.arrays, self.camera, plain, self.observed)[0])
 
-    def expected(self, state: Array) -> Array:
-        """(M, 2) px where each marker of a hand in `state` is seen at its own time; NaN behind the camera."""
-        m, out = self.markers, np.empty((len(self.seen), 2))
-        _expected(state, m.dh, m.half_axes, m.poses[self.camera], m.intrinsics[self.camera], self.late_s, out)
-        return out
+    def distances(self, pixels: Array, covariances: Array) -> Array:
+        """(M,) squared Mahalanobis distances from where the markers are predicted, NaN where not seen."""
+        distances, _ = squared_distances(self.pixels - pixels, covariances + self.covariances)
+        return np.where(self.seen, distances, np.nan)
 
-    def associated(self, assign: Callable[[Array, Array, NDArray[np.bool_]], Indices]) -> MarkerFrame:
-        """The frame with the blobs that `assign` chooses. It takes pixels (N, 2), covariances (N, 2, 2) and whether
-        each was reported as each marker (M, N), and returns the blob (M,) of each marker, -1 for none."""
-        further, own = self.observations.further, np.flatnonzero(self.seen)
-        columns = {name: getattr(self, name)[own] for name in _COLUMNS}
-        if further is not None:
-            columns = {name: np.concatenate([columns[name], getattr(further, name)]) for name in _COLUMNS}
-        reported = own if further is None else np.concatenate([own, further.markers])
-        chosen = assign(columns["pixels"], columns["covariances"], np.arange(len(self.seen))[:, None] == reported)
+    def associated(self, pixels: Array, covariances: Array, distances: Array) -> MarkerFrame:
+        """The frame with the blob of each marker, predicted at `pixels` (M, 2) with `covariances` (M, 2, 2) px^2, from
+        which its own one is at `distances` (M,). A landmark is always its own: a detector that errs does not mean
+        another joint, and its kernel weighs it."""
+        landmark = self.markers.landmark
+        if self.observations.further is None and not np.any(distances[~landmark] > GATE):
+            return self
+        listed = list_candidates(replace(self.observations, covariances=self.covariances))
+        own = np.arange(len(landmark))[:, None] == listed.markers
+        confused = np.where(landmark[:, None] | landmark[listed.markers], np.inf, -2.0 * np.log(CONFUSION))
+        blobs, _ = assign(pixels, covariances, listed.pixels, listed.covariances, np.where(own, 0.0, confused))
+        chosen = np.where(landmark, np.where(own.any(axis=1), own.argmax(axis=1), -1), blobs)
         out, found = copy.copy(self), chosen >= 0
+        for name in _COLUMNS:
+            column = getattr(self, name).copy()
+            column[found] = getattr(listed, name)[chosen[found]]
+            setattr(out, name, column)
         out.seen = found
-        for name, column in columns.items():
-            kept = getattr(self, name).copy()
-            kept[found] = column[chosen[found]]
-            setattr(out, name, kept)
-        row0_s = 1e-9 * (self.observations.t_row0_master_ns - self.t_ns)
-        out.late_s = np.where(found, row0_s + out.pixels[:, 1] * self.row_s, 0.0)
+        out.set_time(self.t_ns)
         return out
 
 
 @njit(cache=True)
-def _add_noise(state, dh, half_axes, pose, intrinsics, noise_m, covariances):
-    count = noise_m.shape[0]
+def place_points(state, dh):
+    """The hand's pose world (4, 4), frames (R, 3, 4) of a table `dh`, its points (P, 3) m, and their Jacobian (P, 3,
+    27) by the pose and the angles."""
+    count = dh.point_row.shape[0]
     frames, points, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3)), np.empty((count, 3, POSE))
-    world = _place(state, dh, frames, points, jacobian)
-    pixel, slope = np.empty(2), np.empty((2, 3))
-    for m in range(count):
-        if noise_m[m] > 0.0 and project_marker(points[m], world, half_axes[m], pose, intrinsics, pixel, slope):
-            for r in range(2):
-                covariances[m, r, r] += (noise_m[m] * pixels_per_metre(slope)) ** 2
-
-
-@njit(cache=True)
-def _place(state, dh, frames, points, jacobian):
-    """Fill frames (R, 3, 4), points (M, 3) and jacobian (M, 3, 27) of a state; returns world (4, 4)."""
     world = pose_matrix(state)
     forward_arrays(dh, world, state[STATE.angles], frames, points)
     jacobian_arrays(dh, world, frames, points, jacobian)
-    return world
+    return world, frames, points, jacobian
 
 
 @njit(cache=True)
-def _moved(state, m, late, points, jacobian, place):
-    """Fill `place` (3,): marker m's seen centre `late` s after the state's instant."""
+def fill_centre(state, m, late, point, jacobian, centre):
+    """x + b + J (v t + a t^2 / 2): fill `centre` (3,) m, where marker m's is seen `late` s t after the state's instant.
+    `point` (3,) x and `jacobian` (3, 27) J: of its place."""
     velocity, acceleration, biases = state[STATE.velocity], state[STATE.acceleration], state[STATE.lasting]
     for i in range(3):
-        place[i] = points[m, i] + biases[3 * m + i]
+        centre[i] = point[i] + biases[3 * m + i]
     for j in range(POSE):
         way = late * (velocity[j] + 0.5 * late * acceleration[j])
         for i in range(3):
-            place[i] += jacobian[m, i, j] * way
+            centre[i] += jacobian[i, j] * way
 
 
 @njit(cache=True)
-def _linearise(state, dh, half_axes, pose, intrinsics, seen, pixels, covariances, late_s, slender, log_width,
-               size_sd, diameters, row_s, landmark, error, out, first):
-    count = seen.shape[0]
-    joint_pixel, at_joint = np.empty(2), np.empty((2, 3))
-    frames, points, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3)), np.empty((count, 3, POSE))
-    world = _place(state, dh, frames, points, jacobian)
-    pixel, slope, place, row = np.empty(2), np.empty((2, 3)), np.empty(3), np.empty((2, POSE))
-    used = observations = 0
-    for m in range(count):
-        if not seen[m]:
-            continue
+def project_markers(state, markers, camera, late_s):
+    """Pixels (M, 2), NaN behind the camera, where the markers are seen `late_s` (M,) s after the state's instant, their
+    Jacobian (M, 2, n), and the scale (M,) px/m of the image at their places."""
+    count = late_s.shape[0]
+    pixels, jacobian, scale = np.empty((count, 2)), np.zeros((count, 2, MOTION + 3 * count)), np.empty(count)
+    world, _, points, by_pose = place_points(state, markers.dh)
+    pose, intrinsics, centre = markers.poses[camera], markers.intrinsics[camera], np.empty(3)
+    slope, at_joint, joint_pixel = np.empty((2, 3)), np.empty((2, 3)), np.empty(2)
+    for m in range(late_s.shape[0]):
         late = late_s[m]
-        _moved(state, m, late, points, jacobian, place)
-        if not project_marker(place, world, half_axes[m], pose, intrinsics, pixel, slope):
+        fill_centre(state, m, late, points[m], by_pose[m], centre)
+        if not (project_marker(centre, world, markers.half_axes[m], pose, intrinsics, pixels[m], slope)
+                and project_marker(points[m], world, markers.half_axes[m], pose, intrinsics, joint_pixel, at_joint)):
+            pixels[m] = scale[m] = math.nan
             continue
-        # whitened by the Cholesky factor of the 2x2 covariance
-        a = math.sqrt(covariances[m, 0, 0] + FLOOR_PX**2)
-        b = covariances[m, 0, 1] / a
-        c = math.sqrt(max(covariances[m, 1, 1] + FLOOR_PX**2 - b * b, FLOOR_PX**2))
-        at_joint[:] = slope
-        if landmark[m]:  # a large bias goes with the residual: through its lever it would draw the hand nearer
-            project_marker(points[m], world, half_axes[m], pose, intrinsics, joint_pixel, at_joint)
-        for j in range(POSE):
-            for r in range(2):
-                row[r, j] = (at_joint[r, 0] * jacobian[m, 0, j] + at_joint[r, 1] * jacobian[m, 1, j]
-                             + at_joint[r, 2] * jacobian[m, 2, j])
-            row[0, j] /= a
-            row[1, j] = (row[1, j] - b * row[0, j]) / c
-        error[used] = (pixels[m, 0] - pixel[0]) / a
-        error[used + 1] = (pixels[m, 1] - pixel[1] - b * error[used]) / c
-        for k in range(3):
-            out[used, MOTION + 3 * m + k] = slope[0, k] / a
-            out[used + 1, MOTION + 3 * m + k] = (slope[1, k] - b * slope[0, k] / a) / c
+        scale[m] = pixels_per_metre(at_joint)
+        if not markers.landmark[m]:  # with the lever of its large bias, a landmark would draw the hand nearer
+            at_joint[:] = slope
         for r in range(2):
             for j in range(POSE):
-                out[used + r, j] = row[r, j]
-                out[used + r, POSE + j] = late * row[r, j]
-                out[used + r, 2 * POSE + j] = 0.5 * late * late * row[r, j]
-        first[observations] = used
-        used, observations = used + 2, observations + 1
-    bone, line, change, turning = np.empty(3), np.empty(3), np.empty(3), np.empty((3, POSE))
-    for m in range(count):
-        if math.isnan(log_width[m]) or not seen[m]:
+                along = (at_joint[r, 0] * by_pose[m, 0, j] + at_joint[r, 1] * by_pose[m, 1, j]
+                         + at_joint[r, 2] * by_pose[m, 2, j])
+                jacobian[m, r, j] = along
+                jacobian[m, r, POSE + j] = late * along
+                jacobian[m, r, 2 * POSE + j] = 0.5 * late * late * along
+            for k in range(3):
+                jacobian[m, r, MOTION + 3 * m + k] = slope[r, k]
+    return pixels, jacobian, scale
+
+
+@njit(cache=True)
+def _linearise(state, markers, camera, observed):
+    """Whitened errors (K,), their Jacobian (K, n), and the first row of each observation."""
+    pixels, jacobian, _ = project_markers(state, markers, camera, observed.late_s)
+    sized = observed.seen & np.isfinite(observed.log_width)
+    count, size = np.count_nonzero(observed.seen), jacobian.shape[2]
+    most, used = 2 * count + np.count_nonzero(sized), 0
+    error, rows, first = np.zeros(most), np.zeros((most, size)), np.empty(most - count, np.int64)
+    for k, m in enumerate(np.flatnonzero(observed.seen)):
+        # by the Cholesky factor of the 2x2 covariance
+        covariance = observed.covariances[m]
+        a = math.sqrt(covariance[0, 0] + FLOOR_PX**2)
+        b = covariance[0, 1] / a
+        c = math.sqrt(max(covariance[1, 1] + FLOOR_PX**2 - b * b, FLOOR_PX**2))
+        if not math.isnan(pixels[m, 0]):
+            error[used] = (observed.pixels[m, 0] - pixels[m, 0]) / a
+            error[used + 1] = (observed.pixels[m, 1] - pixels[m, 1] - b * error[used]) / c
+        for j in range(size):
+            rows[used, j] = jacobian[m, 0, j] / a
+            rows[used + 1, j] = (jacobian[m, 1, j] - b * rows[used, j]) / c
+        first[k], used = used, used + 2
+    if sized.any():
+        widths, by_pose = _measure_widths(state, markers, camera, sized, observed)
+        for k, m in enumerate(np.flatnonzero(sized)):
+            if not math.isnan(widths[m]):
+                error[used] = (widths[m] - observed.log_width[m]) / observed.size_sd[m]
+                rows[used, :POSE] = -by_pose[m] / observed.size_sd[m]
+            first[count + k], used = used, used + 1
+    return error, rows, first
+
+
+@njit(cache=True)
+def _spread(jacobian, covariance):
+    """J P J^T: (M, 2, 2) px^2 of pixels whose `jacobian` J (M, 2, n) is mostly zero, by the `covariance` P (n, n)."""
+    size = covariance.shape[0]
+    out, product = np.empty((jacobian.shape[0], 2, 2)), np.empty(size)
+    for m in range(jacobian.shape[0]):
+        for r in range(2):
+            product[:] = 0.0
+            for j in range(size):
+                if jacobian[m, r, j] != 0.0:
+                    for i in range(size):
+                        product[i] += jacobian[m, r, j] * covariance[j, i]
+            for q in range(2):
+                out[m, r, q] = np.dot(product, jacobian[m, q])
+    return out
+
+
+@njit(cache=True)
+def _measure_widths(state, markers, camera, chosen, observed):
+    """(M,) ln of the width in metres that each of the `chosen` (M,) fingertips would show from its side at its place,
+    NaN of the others; and its Jacobian (M, 27) by the pose and the angles."""
+    count = chosen.shape[0]
+    widths, jacobian = np.full(count, np.nan), np.empty((count, POSE))
+    if not chosen.any():
+        return widths, jacobian
+    world, frames, points, by_pose = place_points(state, markers.dh)
+    dh, pose, intrinsics = markers.dh, markers.poses[camera], markers.intrinsics[camera]
+    velocity, pixel, slope, turning = state[STATE.velocity], np.empty(2), np.empty((2, 3)), np.empty((3, POSE))
+    bone, line, change = np.empty(3), np.empty(3), np.empty(3)
+    for m in np.flatnonzero(chosen):
+        if not project_marker(points[m], world, markers.half_axes[m], pose, intrinsics, pixel, slope):
             continue
-        side, along, distance = _view(dh, frames, points, pose, m, bone, line)
-        if not project_marker(points[m], world, half_axes[m], pose, intrinsics, pixel, slope):
-            continue
-        turning[:] = -jacobian[m]
+        distance = along = down = 0.0
+        for i in range(3):
+            line[i] = points[m, i]
+            for k in range(3):
+                line[i] += pose[k, i] * pose[k, 3]
+            distance += line[i] ** 2
+        distance = math.sqrt(distance)
+        for i in range(3):
+            line[i] /= distance
+            bone[i] = frames[dh.point_row[m], i, 0]
+            along += bone[i] * line[i]
+            for j in range(POSE):
+                down += slope[1, i] * by_pose[m, i, j] * velocity[j]
+        side = max(math.sqrt(max(1.0 - along * along, 0.0)), _END_ON)
+        shown = 1.0 + markers.slender[m] * side  # over that from the end: an area
+        still = 1.0 - min(max(down * observed.row_s, -_STRETCH_MAX), _STRETCH_MAX)  # over the stretched area
+        widths[m] = (math.log(observed.diameters[m] / pixels_per_metre(slope))
+                     + 0.5 * math.log(still * (1.0 + markers.slender[m]) / shown))
+        turning[:] = -by_pose[m]
         point_jacobian(dh, world, frames, dh.point_row[m], points[m, 0] + bone[0], points[m, 1] + bone[1],
                        points[m, 2] + bone[2], turning)
-        shown = -0.5 * slender[m] / (1.0 + slender[m] * side) * along / side
-        expected = log_width[m] + _log_shown(slender[m], side)
-        size = (math.log(diameters[m] / pixels_per_metre(slope))
-                + 0.5 * math.log(_still(state, slope, jacobian, m, row_s)))
-        error[used] = (size - expected) / size_sd[m]
         _size_change(points[m], pose, intrinsics, line, distance, change)
         for j in range(POSE):
             farther, turned, larger = 0.0, 0.0, 0.0
             for i in range(3):
-                farther += line[i] * jacobian[m, i, j]
-                larger += change[i] * jacobian[m, i, j]
+                farther += line[i] * by_pose[m, i, j]
+                larger += change[i] * by_pose[m, i, j]
             for i in range(3):
-                turned += line[i] * turning[i, j] + bone[i] * (jacobian[m, i, j] - farther * line[i]) / distance
-            out[used, j] = (shown * turned - larger) / size_sd[m]
-        first[observations] = used
-        used, observations = used + 1, observations + 1
-    return used, observations
+                turned += line[i] * turning[i, j] + bone[i] * (by_pose[m, i, j] - farther * line[i]) / distance
+            jacobian[m, j] = larger + 0.5 * markers.slender[m] / shown * along / side * turned
+    return widths, jacobian
 
 
 @njit(cache=True)
@@ -246,113 +316,21 @@ def _size_change(point, pose, intrinsics, line, distance, change):
 
 
 @njit(cache=True)
-def _view(dh, frames, points, pose, m, bone, line):
-    """Fill the directions of marker m's bone and of the line of sight; returns the sine and cosine between, and the
-    distance."""
-    distance = along = 0.0
-    for i in range(3):
-        line[i] = points[m, i]
-        for k in range(3):
-            line[i] += pose[k, i] * pose[k, 3]
-        distance += line[i] ** 2
-    distance = math.sqrt(distance)
-    for i in range(3):
-        line[i] /= distance
-        bone[i] = frames[dh.point_row[m], i, 0]
-        along += bone[i] * line[i]
-    return max(math.sqrt(max(1.0 - along * along, 0.0)), _END_ON), along, distance
-
-
-@njit(cache=True)
-def _log_shown(slender, side):
-    """ln of the width shown over the width shown from the side."""
-    return 0.5 * math.log((1.0 + slender * side) / (1.0 + slender))
-
-
-@njit(cache=True)
-def _still(state, slope, jacobian, m, row_s):
-    """Area of a marker at rest over that of the moving one, which the rolling shutter stretches."""
-    down, velocity = 0.0, state[STATE.velocity]
-    for j in range(POSE):
-        for i in range(3):
-            down += slope[1, i] * jacobian[m, i, j] * velocity[j]
-    return 1.0 - min(max(down * row_s, -_STRETCH_MAX), _STRETCH_MAX)
-
-
-@njit(cache=True)
-def _widths(state, dh, half_axes, pose, intrinsics, plain, slender, diameters, row_s, out):
-    count = plain.shape[0]
-    frames, points, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3)), np.empty((count, 3, POSE))
-    world = _place(state, dh, frames, points, jacobian)
-    pixel, slope, bone, line = np.empty(2), np.empty((2, 3)), np.empty(3), np.empty(3)
+def lasting_covariances(state, markers):
+    """(M, 3, 3) m^2 of the errors that last: of a marker's triangulated centre by the cameras' LASTING_PX and by its
+    paint."""
+    dh, world, count = markers.dh, pose_matrix(state), markers.half_axes.shape[0]
+    points, pixel, slope, out = np.empty((count, 3)), np.empty(2), np.empty((2, 3)), np.empty((count, 3, 3))
+    forward_arrays(dh, world, state[STATE.angles], np.empty((dh.parent.shape[0], 3, 4)), points)
     for m in range(count):
-        if plain[m] and project_marker(points[m], world, half_axes[m], pose, intrinsics, pixel, slope):
-            side, _, _ = _view(dh, frames, points, pose, m, bone, line)
-            out[m] = (math.log(diameters[m] / pixels_per_metre(slope)) - _log_shown(slender[m], side)
-                      + 0.5 * math.log(_still(state, slope, jacobian, m, row_s)))
-
-
-@njit(cache=True)
-def _expected(state, dh, half_axes, pose, intrinsics, late_s, pixels):
-    count = late_s.shape[0]
-    frames, points, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3)), np.empty((count, 3, POSE))
-    world = _place(state, dh, frames, points, jacobian)
-    slope, place = np.empty((2, 3)), np.empty(3)
-    for m in range(count):
-        _moved(state, m, late_s[m], points, jacobian, place)
-        if not project_marker(place, world, half_axes[m], pose, intrinsics, pixels[m], slope):
-            pixels[m] = math.nan
-
-
-@njit(cache=True)
-def _predict_pixels(state, covariance, dh, half_axes, pose, intrinsics, late_s, pixels, covariances):
-    count = late_s.shape[0]
-    frames, points, jacobian = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3)), np.empty((count, 3, POSE))
-    world = _place(state, dh, frames, points, jacobian)
-    slope, place, size = np.empty((2, 3)), np.empty(3), covariance.shape[0]
-    row, product = np.zeros((2, size)), np.empty(size)
-    for m in range(count):
-        _moved(state, m, late_s[m], points, jacobian, place)
-        if not project_marker(place, world, half_axes[m], pose, intrinsics, pixels[m], slope):
-            pixels[m] = math.nan
-            covariances[m] = math.nan
-            continue
-        row[:] = 0.0
-        for r in range(2):
-            for j in range(POSE):
-                row[r, j] = (slope[r, 0] * jacobian[m, 0, j] + slope[r, 1] * jacobian[m, 1, j]
-                             + slope[r, 2] * jacobian[m, 2, j])
-            for k in range(3):
-                row[r, MOTION + 3 * m + k] = slope[r, k]
-        for r in range(2):
-            for i in range(size):
-                product[i] = 0.0
-            for j in range(size):
-                if row[r, j] != 0.0:
-                    for i in range(size):
-                        product[i] += row[r, j] * covariance[j, i]
-            for s in range(2):
-                covariances[m, r, s] = np.dot(product, row[s])
-
-
-@njit(cache=True)
-def triangulation_covariance(state, dh, half_axes, poses, intrinsics, pixel_sd, paint_variance, out):
-    """Fill `out` (M, 3, 3) m^2: of a marker's triangulated centre by the cameras' `pixel_sd` px and by the paint."""
-    count = out.shape[0]
-    frames, points = np.empty((dh.parent.shape[0], 3, 4)), np.empty((count, 3))
-    world = pose_matrix(state)
-    forward_arrays(dh, world, state[STATE.angles], frames, points)
-    pixel, slope, information = np.empty(2), np.empty((2, 3)), np.empty((3, 3))
-    for m in range(count):
-        information[:] = 0.0
-        for i in range(3):
-            information[i, i] = 1e4  # of 10 mm, where the cameras do not tell the distance
-        for camera in range(poses.shape[0]):
-            if project_marker(points[m], world, half_axes[m], poses[camera], intrinsics[camera], pixel, slope):
+        information = 1e4 * np.eye(3)  # of 10 mm, where the cameras do not tell the distance
+        for camera in range(markers.poses.shape[0]):
+            if project_marker(points[m], world, markers.half_axes[m], markers.poses[camera], markers.intrinsics[camera],
+                              pixel, slope):
                 for i in range(3):
                     for j in range(3):
-                        for r in range(2):
-                            information[i, j] += slope[r, i] * slope[r, j] / pixel_sd**2
+                        information[i, j] += (slope[0, i] * slope[0, j] + slope[1, i] * slope[1, j]) / LASTING_PX**2
         out[m] = np.linalg.inv(information)
         for i in range(3):
-            out[m, i, i] += paint_variance[m]
+            out[m, i, i] += markers.paint_variance[m]
+    return out
