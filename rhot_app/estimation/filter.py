@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from rhot_app.estimation.linear import substitute
 from rhot_app.estimation.residual import Process, Residual, stack
 
 Array = NDArray[np.float64]
@@ -161,15 +162,8 @@ def gauss_newton_step(covariance: Array, jacobian: Array, error: Array, variance
     for k in range(count):
         total[k, k] += variances[k]
     root = np.linalg.cholesky(total)
-    solution = innovation.copy()
-    for i in range(count):
-        for j in range(i):
-            solution[i] -= root[i, j] * solution[j]
-        solution[i] /= root[i, i]
-    for i in range(count - 1, -1, -1):
-        for j in range(i + 1, count):
-            solution[i] -= root[j, i] * solution[j]
-        solution[i] /= root[i, i]
+    solution = np.empty(count)
+    substitute(root, innovation, solution)
     new = np.dot(cross, solution)
     distance = np.dot(solution, np.dot(reduced, solution))
     change = np.dot(jacobian, new - step)

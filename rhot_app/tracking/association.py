@@ -16,8 +16,8 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from rhot_app.estimation import track
 from rhot_app.estimation.quantiles import chi_squared
-from rhot_app.estimation.track import PREDICTED_NS
 from rhot_app.geometry.camera import pixels_per_metre, project_with_slope
 from rhot_app.geometry.triangulate import cast, empty_rays, triangulate
 from rhot_app.tracking.locate import GATE_FLOOR_PX
@@ -28,7 +28,7 @@ from rhot_node.wire.messages import MarkerFlag
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-GATE = float(chi_squared(0.999, 2))
+GATE = float(chi_squared(track.GATE, 2))
 """Squared Mahalanobis distance of a pixel that one observation in a thousand exceeds."""
 
 AMBIGUITY_MARGIN = 4.0
@@ -167,7 +167,7 @@ class MarkerAssociation:
         best, undecided, best_count = first, second, 1
         for other in self._frames:
             if other is None or other.camera == frame.camera or \
-                    abs(other.t_row0_master_ns - frame.t_row0_master_ns) > PREDICTED_NS:
+                    abs(other.t_row0_master_ns - frame.t_row0_master_ns) > track.PREDICTED_NS:
                 continue
             rows, points = self._intersections(frame, listed, other)
             cluster = self._largest_cluster(listed.markers[rows], points)

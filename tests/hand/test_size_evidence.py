@@ -10,7 +10,7 @@ from rhot_app.hand.limits import PERSON_LIMIT_SD_RAD
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
 from rhot_app.hand.solvers.pose_descent import linearise_pose, pose_state
-from rhot_app.tracking.markers.size_evidence import Posture, implausibility, pose_problem
+from rhot_app.tracking.markers.hand_size import Posture, implausibility, pose_problem
 
 SIZE = TWIST + len(ANGLES)
 ROWS = [0, *range(len(JOINTS), len(JOINTS) + 5)]  # wrist and fingertips of the model's own points

@@ -25,9 +25,9 @@ from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
 from rhot_app.hand.solvers.finger_ik import solve_fingers
 from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, fit_palm, palms_before_camera
 from rhot_app.tracking.locate import locate_paired, rig_table
+from rhot_app.tracking.markers.hand_size import Posture, implausibility
 from rhot_app.tracking.markers.marker_model import MarkerModel
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
-from rhot_app.tracking.markers.size_evidence import Posture, implausibility
 from rhot_app.tracking.pairing import Pairing
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.tracker import CameraObservations
@@ -48,10 +48,10 @@ UNFIT_M = 0.06
 """Markers so far from where the hand has them are something else. A first fit of a moving hand may be 3 cm off."""
 
 TURNS = 24
-"""Of a palm on a plane, all around: 15 degrees apart, half of TRIED_SD's."""
+"""Of a palm on a plane, all around: 15 degrees apart, half of START_SD's."""
 
-TRIED_SD = 0.03, 0.5
-"""m and rad about each of them: as of a palm that was found by two cameras (`estimator.START_SD`)."""
+START_SD = 0.03, 0.5
+"""m and rad: standard deviation of the palm's pose as it is first found."""
 
 _TARGET_SD_M = 1e-3
 
@@ -203,7 +203,7 @@ def _best_of(places: Sequence[Array], frame: MarkerFrame, process: HandProcess,
     frame = copy.copy(frame)
     residuals: list[Residual] = [frame] if plane is None else [frame, plane]
     for number, place in enumerate(places):
-        prior = process.start(place, angles, TRIED_SD)
+        prior = process.start(place, angles, START_SD)
         if number == 0:
             frame.add_landmark_noise(prior[0])
         try:

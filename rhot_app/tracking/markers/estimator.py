@@ -29,7 +29,7 @@ from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.association import GATE, MarkerAssociation
-from rhot_app.tracking.markers.acquisition import Located, Starter, pose_before_camera, pose_on_plane
+from rhot_app.tracking.markers.acquisition import START_SD, Located, Starter, pose_before_camera, pose_on_plane
 from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObservations
 from rhot_app.tracking.markers.hand_size import HandSize
 from rhot_app.tracking.markers.marker_model import MarkerModel, compile_markers
@@ -42,9 +42,6 @@ from rhot_node.wire.messages import MarkerFlag
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]
-
-START_SD = 0.03, 0.5
-"""m and rad: standard deviation of the palm's pose as it is first found."""
 
 REJECTIONS = 2
 """Observations rejected in a row that are no outliers: of one in ten mistaken, two in a row have a chance of 1 %."""

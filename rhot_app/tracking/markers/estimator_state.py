@@ -16,7 +16,7 @@ from rhot_app.geometry.camera import project_with_slope
 from rhot_app.hand.kinematics import point_covariances
 from rhot_app.hand.landmarks import DISAGREEMENT_M
 from rhot_app.hand.motion.hand_state import POSE, STATE, TANGENT
-from rhot_app.hand.skeleton import FINGER_OF_ANGLE, FINGER_OF_JOINT, TIP_ROLES, WRIST_ROLE
+from rhot_app.hand.skeleton import FINGER_OF_ANGLE, FINGER_OF_JOINT, JOINTS, TIP_ROLES, WRIST_ROLE
 from rhot_app.state import (
     INFERRED_M,
     INFERRED_RAD,
@@ -30,7 +30,14 @@ from rhot_app.state import (
 from rhot_app.tracking.association import GATE
 from rhot_app.tracking.locate import Views, empty_places, locate_all, rig_table, turn_band
 from rhot_app.tracking.markers.marker_model import MarkerModel, project_marker, scaled_table
-from rhot_app.tracking.markers.marker_residual import SIZE_S, SIZE_SD, MarkerFrame, fill_centre, place_points
+from rhot_app.tracking.markers.marker_residual import (
+    CENTROID_KERNEL,
+    SIZE_S,
+    SIZE_SD,
+    MarkerFrame,
+    fill_centre,
+    place_points,
+)
 from rhot_app.tracking.pairing import DOUBTFUL, SAME_FRAME_NS
 from rhot_app.tracking.rig_arrays import RigArrays
 from rhot_app.tracking.tracker import CameraObservations
@@ -54,10 +61,10 @@ _SLOWEST_NS = 400_000_000
 _SLOWEST_CLEAR_NS = 150_000_000
 _LOST = int(MarkerFlag.LOST)
 
-_INLIER_WEIGHT = 6.0 / (4.0 + GATE)  # of the centroids' kernel, at the gate
+_INLIER_WEIGHT = float(CENTROID_KERNEL.weights(np.array([GATE]), np.array([2]))[0])  # at the gate
 
 _MEASURED, _INFERRED, _GUESSED = int(Knowledge.MEASURED), int(Knowledge.INFERRED), int(Knowledge.GUESSED)
-_FIRST_TIP, _FIRST_MARKER = 21, 26
+_FIRST_TIP, _FIRST_MARKER = len(JOINTS), len(JOINTS) + len(TIP_ROLES)
 
 
 ACCEPTED = np.dtype([("t_ns", "i8"), ("late_s", "f8"), ("pixel", "f8", 2), ("covariance", "f8", (2, 2)),
