@@ -220,8 +220,8 @@ def test_memory_is_bounded_and_spread_over_the_volume() -> None:
     for k in range(200):
         store.add(30.0 + 0.01 * k, (0, 1), 1, np.zeros((2, 2)), np.zeros((2, 2, 2)), np.array([0.1, 0.0, 0.6]))
     rows = store.recent(32.0)
-    assert store.count == len(rows.t_s) == CAPACITY and np.count_nonzero(rows.marker == 1) == 200
-    assert np.all(np.diff(rows.t_s) >= 0.0) and rows.t_s.min() == pytest.approx(2.0)
+    assert store.count == len(rows["t_s"]) == CAPACITY and np.count_nonzero(rows["marker"] == 1) == 200
+    assert np.all(np.diff(rows["t_s"]) >= 0.0) and rows["t_s"].min() == pytest.approx(2.0)
 
 
 def test_rigs_that_cannot_be_refined_say_nothing() -> None:
@@ -247,7 +247,7 @@ def test_landmarks_do_not_turn_the_cameras() -> None:
                 camera, number * 25_000_000, 0, 1e-5, number * 25_000_000, 0.0, 0.0, pixels[camera],
                 np.tile(0.01 * np.eye(2), (count, 1, 1)), np.full(count, 10.0), np.ones(count),
                 np.zeros(count, np.uint16)))
-    assert set(refiner.gather().rows.marker.tolist()) <= set(range(len(RIG.markers.ids)))
+    assert set(refiner.gather().rows["marker"].tolist()) <= set(range(len(RIG.markers.ids)))
 
 
 def test_a_second_timeline_begins_anew(still: list[CameraObservations]) -> None:

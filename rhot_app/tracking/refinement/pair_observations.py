@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 TWIST = 6
 """Numbers of a camera's correction: turn rad, shift m."""
@@ -22,25 +21,13 @@ CAPACITY = 3000
 VOXEL_M = 0.05
 
 
-@dataclass(slots=True)
-class PairObservations:
-    """N epipolar observations. `t_s` (N,); `first`, `second` (N,) cameras; `marker` (N,); `voxel` (N,) a hash;
-    `rays` (N, 2, 2) normalised, of the first and second camera, the marker's body taken into account; `noise`
-    (N, 2, 2, 2) their covariances; `places` (N, 3) m."""
+PAIR = np.dtype([("t_s", "f8"), ("first", "i8"), ("second", "i8"), ("marker", "i8"), ("voxel", "i8"),
+                 ("rays", "f8", (2, 2)), ("noise", "f8", (2, 2, 2))])
+"""An epipolar observation of a `marker` by the cameras `first` and `second`, in a `voxel` (a hash). `rays`: normalised,
+of both cameras, the marker's body taken into account; `noise`: their covariances."""
 
-    t_s: Array
-    first: Indices
-    second: Indices
-    marker: Indices
-    voxel: NDArray[np.int64]
-    rays: Array
-    noise: Array
-    places: Array
-
-    def of(self, rows: NDArray[np.bool_] | Indices) -> PairObservations:
-        """Some of them."""
-        return PairObservations(self.t_s[rows], self.first[rows], self.second[rows], self.marker[rows],
-                                self.voxel[rows], self.rays[rows], self.noise[rows], self.places[rows])
+Pairs = NDArray[np.void]
+"""(N,) PAIR."""
 
 
 class PairStore:
@@ -48,33 +35,24 @@ class PairStore:
     place of the oldest in the fullest voxel."""
 
     def __init__(self) -> None:
-        n = CAPACITY
-        self._columns = PairObservations(
-            np.full(n, -np.inf), np.zeros(n, np.intp), np.zeros(n, np.intp), np.zeros(n, np.intp),
-            np.zeros(n, np.int64), np.zeros((n, 2, 2)), np.zeros((n, 2, 2, 2)), np.zeros((n, 3)))
-        self.count = 0
+        self._rows, self.count = np.zeros(CAPACITY, PAIR), 0
 
     def add(self, t_s: float, cameras: tuple[int, int], marker: int, rays: Array, noise: Array, place: Array) -> None:
-        """Keep one observation of `marker` at `t_s`."""
+        """Keep one observation of `marker` at `t_s` and `place` (3,) m."""
         x, y, z = (int(value) + 512 for value in np.clip(np.floor(place / VOXEL_M), -512, 511))
         voxel = (x << 20) | (y << 10) | z
-        row, columns = self.count, self._columns
-        if row == CAPACITY:
-            row = self._worst()
-        else:
-            self.count += 1
-        columns.t_s[row], columns.marker[row], columns.voxel[row] = t_s, marker, voxel
-        columns.first[row], columns.second[row] = cameras
-        columns.rays[row], columns.noise[row], columns.places[row] = rays, noise, place
+        row = self.count if self.count < CAPACITY else self._worst()
+        self.count = max(self.count, row + 1)
+        self._rows[row] = t_s, *cameras, marker, voxel, rays, noise
 
-    def recent(self, now_s: float) -> PairObservations:
+    def recent(self, now_s: float) -> Pairs:
         """Those that are not too old, in the order of time."""
-        t_s = self._columns.t_s[:self.count]
-        rows = np.flatnonzero(t_s > now_s - HISTORY_S)
-        return self._columns.of(rows[np.argsort(t_s[rows], kind="stable")])
+        rows = self._rows[:self.count]
+        rows = rows[rows["t_s"] > now_s - HISTORY_S]
+        return rows[np.argsort(rows["t_s"], kind="stable")]
 
     def _worst(self) -> int:
-        t_s, voxel = self._columns.t_s, self._columns.voxel
+        t_s, voxel = self._rows["t_s"], self._rows["voxel"]
         oldest = int(np.argmin(t_s))
         if t_s[oldest] < t_s.max() - HISTORY_S:
             return oldest
@@ -93,13 +71,13 @@ class Linearised:
     jacobian: Array
 
 
-def linearise(rows: PairObservations, world_from_camera: Array, focal: Array) -> Linearised:
+def linearise(rows: Pairs, world_from_camera: Array, focal: Array) -> Linearised:
     """The epipolar errors (Sampson's distance) of `rows` for cameras at `world_from_camera` (C, 4, 4), with `focal`
     (C, 2) px."""
-    i, j = rows.first, rows.second
+    i, j = rows["first"], rows["second"]
     turns, centres = world_from_camera[:, :3, :3], world_from_camera[:, :3, 3]
     ones = np.ones((len(i), 1))
-    x_i, x_j = np.hstack([rows.rays[:, 0], ones]), np.hstack([rows.rays[:, 1], ones])
+    x_i, x_j = np.hstack([rows["rays"][:, 0], ones]), np.hstack([rows["rays"][:, 1], ones])
     a, b = np.einsum("nij,nj->ni", turns[i], x_i), np.einsum("nij,nj->ni", turns[j], x_j)
     base = centres[j] - centres[i]
     n_j = np.einsum("nji,nj->ni", turns[j], np.cross(base, a))  # of the error by the second ray, its own axes
@@ -108,8 +86,8 @@ def linearise(rows: PairObservations, world_from_camera: Array, focal: Array) ->
     # A longer baseline makes `error` larger, and `per_px` as well: their ratio does not depend on it.
     across -= base * (np.sum(across * base, axis=1) / np.sum(base * base, axis=1))[:, None]
     per_px = np.sqrt(np.square(n_j[:, :2] / focal[j]).sum(axis=1) + np.square(m_i[:, :2] / focal[i]).sum(axis=1))
-    variance = (np.einsum("ni,nij,nj->n", m_i[:, :2], rows.noise[:, 0], m_i[:, :2])
-                + np.einsum("ni,nij,nj->n", n_j[:, :2], rows.noise[:, 1], n_j[:, :2]))
+    variance = (np.einsum("ni,nij,nj->n", m_i[:, :2], rows["noise"][:, 0], m_i[:, :2])
+                + np.einsum("ni,nij,nj->n", n_j[:, :2], rows["noise"][:, 1], n_j[:, :2]))
     jacobian = np.zeros((len(i), len(turns), TWIST))
     every = np.arange(len(i))
     jacobian[every, j, :3] = np.cross(x_j, n_j)
@@ -120,14 +98,14 @@ def linearise(rows: PairObservations, world_from_camera: Array, focal: Array) ->
                       jacobian[:, 1:].reshape(len(i), -1) / per_px[:, None])
 
 
-def midpoints(rows: PairObservations, poses: Array) -> Array:
+def midpoints(rows: Pairs, poses: Array) -> Array:
     """(N, 3) m: the places between both rays of each observation, with cameras at `poses` (C, 4, 4)."""
-    ones = np.ones((len(rows.t_s), 1))
-    a = np.einsum("nij,nj->ni", poses[rows.first, :3, :3], np.hstack([rows.rays[:, 0], ones]))
-    b = np.einsum("nij,nj->ni", poses[rows.second, :3, :3], np.hstack([rows.rays[:, 1], ones]))
-    base = poses[rows.second, :3, 3] - poses[rows.first, :3, 3]
+    ones = np.ones((len(rows), 1))
+    a = np.einsum("nij,nj->ni", poses[rows["first"], :3, :3], np.hstack([rows["rays"][:, 0], ones]))
+    b = np.einsum("nij,nj->ni", poses[rows["second"], :3, :3], np.hstack([rows["rays"][:, 1], ones]))
+    base = poses[rows["second"], :3, 3] - poses[rows["first"], :3, 3]
     aa, bb, ab = np.sum(a * a, 1), np.sum(b * b, 1), np.sum(a * b, 1)
     ac, bc = np.sum(a * base, 1), np.sum(b * base, 1)
     below = aa * bb - ab * ab
     s, u = (ac * bb - bc * ab) / below, (ac * ab - bc * aa) / below
-    return np.asarray(poses[rows.first, :3, 3] + 0.5 * (s[:, None] * a + base + u[:, None] * b))
+    return np.asarray(poses[rows["first"], :3, 3] + 0.5 * (s[:, None] * a + base + u[:, None] * b))

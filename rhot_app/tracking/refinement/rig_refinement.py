@@ -29,7 +29,7 @@ from rhot_app.geometry.transforms import inverse, rigid
 from rhot_app.geometry.triangulate import Outcome, cast, empty_rays, triangulate
 from rhot_app.project import Rig
 from rhot_app.tracking.pairing import DOUBTFUL, Paired, Pairing
-from rhot_app.tracking.refinement.pair_observations import TWIST, PairObservations, PairStore, linearise, midpoints
+from rhot_app.tracking.refinement.pair_observations import TWIST, Pairs, PairStore, linearise, midpoints
 from rhot_app.tracking.refinement.refined_rig import CameraCorrection, Refinement
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.tracker import CameraObservations
@@ -81,7 +81,7 @@ _RESTART_S = 1.0  # a frame older than the newest by this belongs to another rec
 class Gathered:
     """Observations, and s of the newest frame."""
 
-    rows: PairObservations
+    rows: Pairs
     now_s: float
 
 
@@ -220,7 +220,7 @@ class RigRefiner:
     def refine(self, gathered: Gathered) -> Refinement | None:
         """As `step`; may run in another thread than `take`. Some 60 ms."""
         rows = gathered.rows
-        if not self.active or len(rows.t_s) <= 2 * self._size:
+        if not self.active or len(rows) <= 2 * self._size:
             return None
         state = np.zeros(self._poses)
         for _ in range(_RELINEARISED):
@@ -244,9 +244,9 @@ class RigRefiner:
         """The most probable hypothesis, everything linearised at the correction `reference`."""
         rows = gathered.rows
         lin = linearise(rows, self._moved(reference), self._focal)
-        jacobian = np.zeros((len(rows.t_s), self._size))
+        jacobian = np.zeros((len(rows), self._size))
         jacobian[:, :self._poses] = lin.jacobian
-        lasting = self._pair_of[rows.first, rows.second] * len(self.rig.markers.ids) + rows.marker
+        lasting = self._pair_of[rows["first"], rows["second"]] * len(self.rig.markers.ids) + rows["marker"]
         jacobian[np.arange(len(lasting)), self._poses + lasting] = 1.0
         jacobian /= lin.sd_px[:, None]
         target = (lin.jacobian @ reference - lin.error_px) / lin.sd_px  # of jacobian @ state
@@ -263,9 +263,9 @@ class RigRefiner:
         ago_s = None if knock < 0 else math.inf if knock == 0 else gathered.now_s - float(sums.t_s[knock])
         return _Solution(change.state, change.covariance, dispersion, ago_s, sums.segment >= knock)
 
-    def _summarise(self, rows: PairObservations, jacobian: Array, target: Array) -> _Summaries:
+    def _summarise(self, rows: Pairs, jacobian: Array, target: Array) -> _Summaries:
         """The information of each segment, its outliers found about its own fit: no other segment decides."""
-        numbers, segment = np.unique(np.floor(rows.t_s / SEGMENT_S).astype(np.int64), return_inverse=True)
+        numbers, segment = np.unique(np.floor(rows["t_s"] / SEGMENT_S).astype(np.int64), return_inverse=True)
         weights, matrices = np.ones(len(target)), np.empty((len(numbers), self._size, self._size))
         vectors = np.empty((len(numbers), self._size))
         prior = np.diag(1.0 / (self._prior + self._knock))
@@ -313,15 +313,15 @@ class RigRefiner:
         """`held_out`, `before_px` and `after_px` of `Refinement`: every other segment is predicted from the rest, one
         and the other half in turn. The likelihood is Student's t, the dispersion says how many of them count."""
         rows = gathered.rows
-        half = np.floor(rows.t_s / SEGMENT_S).astype(np.int64)
+        half = np.floor(rows["t_s"] / SEGMENT_S).astype(np.int64)
         total, before, after = 0.0, list[Array](), list[Array]()
         for parity in (0, 1):
             chosen = half % 2 == parity
             held = np.flatnonzero(chosen & found.since)
             if not len(held) or chosen.all():
                 continue
-            trained = self._solve(Gathered(rows.of(~chosen), gathered.now_s), found.state[:self._poses])
-            stored, refined = (linearise(rows.of(held), poses, self._focal)
+            trained = self._solve(Gathered(rows[~chosen], gathered.now_s), found.state[:self._poses])
+            stored, refined = (linearise(rows[held], poses, self._focal)
                                for poses in (self._stored, self._moved(trained.state)))
             total += 0.5 * (STUDENT + 1.0) / found.dispersion * float(
                 np.sum(np.log1p(np.square(stored.error_px / stored.sd_px) / STUDENT)
@@ -343,7 +343,7 @@ class RigRefiner:
             cameras.append(CameraCorrection(self.rig.nodes[camera].name, log_so3(change[:3, :3]), change[:3, 3],
                                             covariance[part, part], along / np.linalg.norm(along)))
         chi_squared, freedom = self._test(found)
-        since = rows.of(found.since)
+        since = rows[found.since]
         held_out, before, after = self._held_out(gathered, found)
         if math.isnan(before):
             before, after = (_middle_px(linearise(since, where, self._focal).error_px)
@@ -352,9 +352,9 @@ class RigRefiner:
             tuple(cameras), poses, chi_squared, freedom, float(chi_squared_tail(chi_squared, max(freedom, 1))),
             found.knocked_s, held_out, before, after, _rms(midpoints(since, self._stored) - midpoints(since, poses)),
             self._places_sd_m(since, found), _rms(midpoints(since, poses) - poses[:, :3, 3].mean(axis=0)),
-            found.dispersion, len(since.t_s), len(np.unique(since.voxel)), float(np.ptp(since.t_s)))
+            found.dispersion, len(since), len(np.unique(since["voxel"])), float(np.ptp(since["t_s"])))
 
-    def _places_sd_m(self, rows: PairObservations, found: _Solution) -> float:
+    def _places_sd_m(self, rows: Pairs, found: _Solution) -> float:
         """By differences: how places move with the poses."""
         middle, moves = midpoints(rows, self._moved(found.state)), []
         for k in range(self._poses):
