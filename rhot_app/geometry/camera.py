@@ -195,12 +195,7 @@ def undistort_points(pixels: Array, intrinsics: Array) -> Array:
 
     `intrinsics` (13,), see `intrinsics_row`.
     """
-    result = np.empty((pixels.shape[0], 2))
-    for i in range(pixels.shape[0]):
-        x, y, _, _, _, _ = undistort_point(pixels[i, 0], pixels[i, 1], intrinsics)
-        result[i, 0] = x
-        result[i, 1] = y
-    return result
+    return undistort_with_slope(pixels, intrinsics)[0]
 
 
 @njit(cache=True)

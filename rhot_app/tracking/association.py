@@ -18,7 +18,7 @@ from scipy.optimize import linear_sum_assignment
 
 from rhot_app.estimation import track
 from rhot_app.estimation.quantiles import chi_squared
-from rhot_app.geometry.camera import pixels_per_metre, project_with_slope
+from rhot_app.geometry.camera import project_with_slope, scales_of
 from rhot_app.geometry.triangulate import cast, empty_rays, triangulate
 from rhot_app.tracking.locate import GATE_FLOOR_PX
 from rhot_app.tracking.rig_arrays import RigArrays
@@ -193,8 +193,7 @@ class MarkerAssociation:
                    rig.intrinsics[pair], rig.cameras[pair], points, errors_px)
         _, slopes = project_with_slope(points, rig.cameras[frame.camera], rig.intrinsics[frame.camera])
         moved_m = HAND_SPEED * 1e-9 * abs(other.t_row0_master_ns - frame.t_row0_master_ns)
-        moved_px = moved_m * np.array([pixels_per_metre(slope) for slope in slopes])
-        meet = errors_px < GATE_FLOOR_PX + moved_px  # NaN, so false, behind a camera
+        meet = errors_px < GATE_FLOOR_PX + moved_m * scales_of(slopes)  # NaN, so false, behind a camera
         return rows[meet], points[meet]
 
     def _largest_cluster(self, markers: Indices, points: Array) -> Indices:

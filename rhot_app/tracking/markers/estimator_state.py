@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.track import NEVER
-from rhot_app.geometry.camera import project_with_slope
+from rhot_app.geometry.camera import project_with_slope, scales_of
 from rhot_app.hand.kinematics import point_covariances
 from rhot_app.hand.landmarks import DISAGREEMENT_M
 from rhot_app.hand.motion.hand_state import POSE, STATE, TANGENT
@@ -230,8 +230,7 @@ class EstimatorStates:
             if seen.any():
                 expected, slopes = project_with_slope(points[seen], self._rig.cameras[camera],
                                                       self._rig.intrinsics[camera])
-                pixels_per_metre = np.linalg.norm(slopes, axis=(1, 2)) / math.sqrt(2.0)
-                errors_m.append(np.linalg.norm(aligned[camera, seen] - expected, axis=1) / pixels_per_metre)
+                errors_m.append(np.linalg.norm(aligned[camera, seen] - expected, axis=1) / scales_of(slopes))
         known = np.concatenate(errors_m)
         known = known[np.isfinite(known)]
         return bool(len(known)) and float(np.median(known)) > DISAGREEMENT_M
