@@ -138,8 +138,7 @@ def stack(rows: Sequence[Rows], size: int, weigh: bool) -> tuple[Array, Array, A
             error, jacobian = np.linalg.solve(lower, one.error), np.linalg.solve(lower, one.jacobian)
         first = np.arange(len(error)) if one.first is None else one.first
         variance, weight = np.empty(len(error)), np.empty(len(first))
-        cost += _weigh(one.kernel.kind if weigh else -1 - one.kernel.kind, one.kernel.parameter, error, first, variance,
-                       weight)
+        cost += _weigh(one.kernel.kind, one.kernel.parameter, weigh, error, first, variance, weight)
         errors.append(error)
         jacobians.append(jacobian)
         variances.append(variance)
@@ -167,17 +166,17 @@ def _cost(kind: int, parameter: float, squared: float, rows: float) -> float:
 
 
 @njit(cache=True)
-def _weigh(kind: int, parameter: float, error: Array, first: Indices, variances: Array, weights: Array) -> float:
-    """Fill the variances (K,) and weights (G,) of whitened rows; returns their cost. A kind of -1 - k leaves the
-    weights of kernel k at 1."""
+def _weigh(kind: int, parameter: float, weigh: bool, error: Array, first: Indices, variances: Array, weights: Array
+           ) -> float:
+    """Fill the variances (K,) and weights (G,) of whitened rows, 1 without `weigh`; returns their cost."""
     cost, count = 0.0, first.shape[0]
     for g in range(count):
         end = first[g + 1] if g + 1 < count else error.shape[0]
         squared, rows = 0.0, float(end - first[g])
         for k in range(first[g], end):
             squared += error[k] * error[k]
-        cost += _cost(kind if kind >= 0 else -1 - kind, parameter, squared, rows)
-        weights[g] = _weight(kind, parameter, squared, rows)
+        cost += _cost(kind, parameter, squared, rows)
+        weights[g] = _weight(kind, parameter, squared, rows) if weigh else 1.0
         for k in range(first[g], end):
             variances[k] = 1.0 / weights[g]
     return cost
