@@ -28,7 +28,7 @@ def _alpha(cutoff_hz: float, dt_s: float) -> float:
 
 
 @njit(cache=True)
-def step(t_s: float, values: Array, parameters: Array, state: Array, gap_s: float, out: Array) -> None:
+def step(t_s: float, values: Array, parameters: Array, state: Array, out: Array) -> None:
     """Filter one sample of every channel.
 
     `values`, `out` (N,). `parameters` (N, 3): min cutoff Hz, beta, derivative cutoff Hz. `state` (N, 3): time of the
@@ -42,7 +42,7 @@ def step(t_s: float, values: Array, parameters: Array, state: Array, gap_s: floa
             out[i] = math.nan
             continue
         dt = t_s - state[i, 0]
-        if math.isnan(dt) or dt > gap_s:
+        if math.isnan(dt) or dt > RESET_GAP_S:
             state[i, 1] = value
             state[i, 2] = 0.0
         elif dt <= 0.0:
@@ -65,30 +65,24 @@ class OneEuroFilter:
     filters among other things passes `parameters` and `state` to `step` itself.
     """
 
-    def __init__(self, channels: int, min_cutoff_hz: ArrayLike, beta: ArrayLike, derivative_cutoff_hz: ArrayLike = 1.0,
-                 *, gap_s: float = RESET_GAP_S) -> None:
+    def __init__(self, channels: int, min_cutoff_hz: ArrayLike, beta: ArrayLike, derivative_cutoff_hz: ArrayLike = 1.0
+                 ) -> None:
         self.parameters = np.empty((channels, 3))
         for column, value in enumerate((min_cutoff_hz, beta, derivative_cutoff_hz)):
             self.parameters[:, column] = value
         self.state = np.full((channels, 3), np.nan)
-        self.gap_s = gap_s
 
     @classmethod
-    def from_settings(cls, settings: Sequence[OneEuroSettings], *, gap_s: float = RESET_GAP_S) -> OneEuroFilter:
+    def from_settings(cls, settings: Sequence[OneEuroSettings]) -> OneEuroFilter:
         """One channel per entry of `settings`."""
         return cls(len(settings), [s.min_cutoff_hz for s in settings], [s.beta for s in settings],
-                   [s.derivative_cutoff_hz for s in settings], gap_s=gap_s)
+                   [s.derivative_cutoff_hz for s in settings])
 
     def __call__(self, t_s: float, values: Array) -> Array:
         """Filtered values (N,) of the samples `values` (N,) taken at `t_s`; NaN where there is no sample."""
         out = np.empty_like(values)
-        step(t_s, values, self.parameters, self.state, self.gap_s, out)
+        step(t_s, values, self.parameters, self.state, out)
         return out
-
-    @property
-    def derivatives(self) -> Array:
-        """(N,) filtered derivatives, unit/s; NaN before the first sample."""
-        return self.state[:, 2].copy()
 
     def reset(self, channels: NDArray[np.bool_] | None = None) -> None:
         """Forget the given channels (mask (N,)), or all."""

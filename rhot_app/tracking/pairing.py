@@ -184,11 +184,6 @@ class Pairing:
         self._latest: CameraObservations | None = None
         self.newest_frames: list[CameraObservations | None] = [None] * self._shape[0]
 
-    @property
-    def heard(self) -> bool:
-        """Whether any frame came since the last reset."""
-        return self._latest is not None
-
     def ingest(self, observations: CameraObservations) -> None:
         """Keep one frame. Duplicates are ignored, late frames are put in their place."""
         camera, receive_ns = observations.camera, observations.t_receive_ns

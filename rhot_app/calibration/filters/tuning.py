@@ -79,8 +79,7 @@ def simulate(footage: Footage, pixel: Array, position: Array) -> tuple[Array, Ar
     cameras, markers = footage.pixels.shape[1:3]
     pixels, positions = np.empty_like(footage.pixels), np.empty((len(footage.times_s), markers, 3))
     _run(footage.times_s, footage.pixels, footage.intrinsics, footage.cameras,
-         np.tile(np.repeat(pixel, 2, axis=0), (cameras, 1)), np.repeat(position, 3, axis=0), one_euro.RESET_GAP_S,
-         pixels, positions)
+         np.tile(np.repeat(pixel, 2, axis=0), (cameras, 1)), np.repeat(position, 3, axis=0), pixels, positions)
     return pixels, positions
 
 
@@ -98,7 +97,7 @@ def _lenses(rig: Rig) -> list[tuple[Intrinsics, CameraPose]]:
 
 @njit(cache=True)
 def _run(times: Array, seen: Array, intrinsics: Array, cameras: Array, pixel_parameters: Array,
-         position_parameters: Array, gap_s: float, pixels: Array, positions: Array) -> None:
+         position_parameters: Array, pixels: Array, positions: Array) -> None:
     count, markers = seen.shape[1], seen.shape[2]
     pixel_state = np.full((2 * count * markers, 3), math.nan)
     position_state = np.full((3 * markers, 3), math.nan)
@@ -106,13 +105,13 @@ def _run(times: Array, seen: Array, intrinsics: Array, cameras: Array, pixel_par
     unit = np.zeros((count, 2, 2))
     unit[:, 0, 0] = unit[:, 1, 1] = 1.0
     for t in range(len(times)):
-        one_euro.step(times[t], seen[t].reshape(-1), pixel_parameters, pixel_state, gap_s, pixels[t].reshape(-1))
+        one_euro.step(times[t], seen[t].reshape(-1), pixel_parameters, pixel_state, pixels[t].reshape(-1))
         for m in range(markers):
             used[:] = True
             cast(pixels[t, :, m], unit, intrinsics, used, rays)
             triangulate(rays, cameras, used, positions[t, m], covariance)
         flat = positions[t].reshape(-1)
-        one_euro.step(times[t], flat, position_parameters, position_state, gap_s, flat)
+        one_euro.step(times[t], flat, position_parameters, position_state, flat)
 
 
 # -- choice of the settings (RHOT 7.3) ---------------------------------------------------------------------------------
