@@ -61,11 +61,12 @@ class Knot:
 
 
 class IteratedFilter:
-    """The newest knots of an estimate."""
+    """The newest knots of an estimate, `most` at most."""
 
-    def __init__(self, process: Process, knots: int = KNOTS) -> None:
-        self.process, self._most = process, knots
-        self.partial = ALL
+    most = KNOTS
+
+    def __init__(self, process: Process) -> None:
+        self.process, self.partial = process, ALL
         self.knots: list[Knot] = []
 
     @property
@@ -105,7 +106,7 @@ class IteratedFilter:
             prior = self.process.predict(before.state, before.covariance, knot.t_s - before.t_s)
             self.knots[later] = update(self.process, knot.t_s, prior, knot.residuals, None, self.partial)
             self.knots[later].label = knot.label
-        while len(self.knots) > self._most:
+        while len(self.knots) > self.most:
             self.release(self.knots.pop(0))
         return added
 
@@ -353,17 +354,18 @@ class ChunkedSmoother:
     Each chunk is smoothed from `ahead_s` after its end; what lies there is smoothed again with the next chunk.
     """
 
-    def __init__(self, chunk_s: float = CHUNK_S, ahead_s: float = AHEAD_S) -> None:
-        self._chunk_s, self._ahead_s = chunk_s, ahead_s
+    chunk_s, ahead_s = CHUNK_S, AHEAD_S
+
+    def __init__(self) -> None:
         self._waiting: list[FilteredState] = []
 
     def add(self, estimate: FilteredState) -> list[FilteredState]:
         """Take the next estimate; returns those that are smoothed with it, mostly none."""
         self._waiting.append(estimate)
         begin_s = self._waiting[0].t_s
-        if estimate.t_s - begin_s <= self._chunk_s + self._ahead_s:
+        if estimate.t_s - begin_s <= self.chunk_s + self.ahead_s:
             return []
-        count = sum(one.t_s - begin_s < self._chunk_s for one in self._waiting)
+        count = sum(one.t_s - begin_s < self.chunk_s for one in self._waiting)
         found = smooth(self._waiting, count)
         del self._waiting[:count]
         return found

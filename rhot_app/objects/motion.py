@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.layout import SE3, Layout, pose_matrix
-from rhot_app.estimation.residual import UNIT, Kernel, Rows, student
+from rhot_app.estimation.residual import UNIT, Rows, student
 from rhot_app.estimation.se3 import PoseState, difference, exponential, pose_difference, retract
 from rhot_app.geometry.camera import CameraModel, project_point
 
@@ -111,10 +111,10 @@ class PointResidual:
     time less the state's. `pose` (3, 4) camera_from_world, `intrinsics` (13,).
     """
 
-    def __init__(self, points: Array, pixels: Array, covariances: Array, late_s: Array, pose: Array, intrinsics: Array,
-                 kernel: Kernel = CORNER_KERNEL) -> None:
+    def __init__(self, points: Array, pixels: Array, covariances: Array, late_s: Array, pose: Array, intrinsics: Array
+                 ) -> None:
         self.points, self.pixels, self.covariances, self.late_s = points, pixels, covariances, late_s
-        self.pose, self.intrinsics, self._kernel = pose, intrinsics, kernel
+        self.pose, self.intrinsics = pose, intrinsics
         self.whitening = np.linalg.inv(np.linalg.cholesky(covariances))
 
     def predict(self, state: Array) -> tuple[Array, Array]:
@@ -129,13 +129,13 @@ class PointResidual:
         ahead = np.isfinite(pixels[:, 0])
         whitening = self.whitening[ahead]
         error = (whitening @ (self.pixels - pixels)[ahead, :, None]).ravel()
-        return Rows(error, (whitening @ jacobian[ahead]).reshape(-1, SIZE), UNIT, self._kernel,
+        return Rows(error, (whitening @ jacobian[ahead]).reshape(-1, SIZE), UNIT, CORNER_KERNEL,
                     np.arange(0, len(error), 2))
 
     def only(self, chosen: NDArray[np.bool_]) -> PointResidual:
         """With the chosen points only."""
         return PointResidual(self.points[chosen], self.pixels[chosen], self.covariances[chosen], self.late_s[chosen],
-                             self.pose, self.intrinsics, self._kernel)
+                             self.pose, self.intrinsics)
 
 
 class VelocityPrior:

@@ -57,7 +57,8 @@ FAILED = "failed"
 Verified = Collected | CameraObservations
 """What is verified and waits for `DatagramValidator.convert`; text needs no second half."""
 
-_CLOCK_SLACK_NS = 1_000_000  # scheduling between the stamps at both ends
+SLACK_NS = 1_000_000
+"""Scheduling between the stamps at both ends."""
 
 
 class DatagramValidator:
@@ -226,15 +227,12 @@ class DatagramValidator:
 
     def _plausible(self, t_row0_ns: int, t_send_ns: int, t_receive_ns: int, bound_s: float) -> bool:
         """Whether a frame can have been taken and sent at these times: not in the future, not long ago."""
-        latest_ns = t_receive_ns + _CLOCK_SLACK_NS + round(1e9 * bound_s)
+        latest_ns = t_receive_ns + SLACK_NS + round(1e9 * bound_s)
         return (t_receive_ns - OLDEST_FRAME_NS <= t_row0_ns <= latest_ns + abs(self._time_offset_ns)
                 and t_send_ns <= latest_ns)
 
 
 # -- how long a node's datagrams take to arrive ------------------------------------------------------------------------
-
-SLACK_NS = 1_000_000
-"""Scheduling at both ends: so much more, or less, than the longest and the shortest way so far is no jump."""
 
 FORGETTING = 1e-4
 """Per datagram: the range narrows to what the network does now, in a minute or two; a busy machine is not doubted anew

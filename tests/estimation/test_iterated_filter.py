@@ -13,7 +13,8 @@ TIMES = np.array([0.1, 0.25, 0.3, 0.62, 0.7, 0.9])
 
 
 def started(knots=12):
-    estimate = IteratedFilter(ConstantVelocity(), knots)
+    estimate = IteratedFilter(ConstantVelocity())
+    estimate.most = knots
     estimate.start(0.0, STATE, COVARIANCE)
     return estimate
 

@@ -28,7 +28,8 @@ def filtered(count, gap_s=0.0, noise=0.2, seed=0):
     """The knots of a filter; every second measurement is much worse. `gap_s`: a pause in the middle."""
     rng = np.random.default_rng(seed)
     times = 0.0125 * (1 + np.arange(count)) + gap_s * (np.arange(count) >= count // 2)
-    estimate, knots = IteratedFilter(PROCESS, 2), []
+    estimate, knots = IteratedFilter(PROCESS), []
+    estimate.most = 2
     estimate.start(0.0, np.array([0.3, -0.2]), np.diag([1.0, 0.5]))
     for k, t in enumerate(times):
         knots.append(estimate.add(t, [place(np.sin(t) + rng.normal(0.0, noise), noise**2 * (1.0 if k % 2 else 25.0))]))
@@ -79,7 +80,8 @@ def test_a_smoothed_estimate_is_that_of_all_measurements_at_once():
 
 def test_chunks_give_what_one_pass_gives():
     knots = filtered(800, noise=0.01)
-    smoother, found, longest = ChunkedSmoother(2.0, 1.0), [], 0
+    smoother, found, longest = ChunkedSmoother(), [], 0
+    smoother.chunk_s, smoother.ahead_s = 2.0, 1.0
     for knot in knots:
         found += smoother.add(knot)
         longest = max(longest, len(smoother._waiting))
@@ -239,7 +241,8 @@ def test_a_sudden_motion_is_smoothed_with_the_noise_of_a_motion():
     """At its first instant the filter still takes the process to rest, and so would one pass back."""
     rng, process, times = np.random.default_rng(1), Restless(), 0.0125 * np.arange(1, 1000)
     truth = 0.8 * np.clip(np.sin(3.0 * times), 0.0, 0.7) ** 2
-    estimate, found = IteratedFilter(process, 2), []
+    estimate, found = IteratedFilter(process), []
+    estimate.most = 2
     estimate.start(0.0, np.zeros(2), np.diag([1.0, 0.01]))
     for t, value in zip(times, truth, strict=True):
         residuals = [place(value + rng.normal(0.0, 0.003), 9e-6)]
