@@ -70,15 +70,9 @@ def locate_paired(paired: Paired, rig: RigTable) -> tuple[Places, Mask]:
     """The places of all markers of one instant, and (M,) whether a doubtful observation counted."""
     places, doubtful = empty_places(len(rig.shapes)), np.empty(len(rig.shapes), np.bool_)
     views = Views(paired.pixels, paired.covariances, np.empty(paired.flags.shape, np.bool_))
-    _locate_paired(paired.flags, paired.live, views, rig, places, doubtful)
-    return places, doubtful
-
-
-@njit(cache=True)
-def _locate_paired(flags: NDArray[np.int64], live: Mask, views: Views, rig: RigTable, places: Places, doubtful: Mask
-                   ) -> None:
-    choose_views(flags, live, views.used, doubtful)
+    choose_views(paired.flags, paired.live, views.used, doubtful)
     locate_all(views, rig, places)
+    return places, doubtful
 
 
 @njit(cache=True)

@@ -101,7 +101,7 @@ _ROUND = ("sphere", "capsule", "band")
 class RigArrays:
     """C cameras, M markers. Read-only.
 
-    `cameras` (C, 3, 4) camera_from_world m; `intrinsics` (C, 13) as `CameraModel`; `focal` (C, 2) px.
+    `cameras` (C, 3, 4) camera_from_world m; `intrinsics` (C, 13) as `CameraModel`.
     `shapes` (M, 3, 3) m^2: the markers' bodies as far as known without the hand's pose, zero for flat ones. `tips`
     (5,): marker index of each finger's tip, -1 without one; `wrist`: the same for the wrist. `band_half_axes`
     (3,) m along the palm's x, y, z; None when the wrist wears no band. `law` (7,): how distance follows from
@@ -113,7 +113,6 @@ class RigArrays:
     marker_ids: tuple[str, ...]
     cameras: Array
     intrinsics: Array
-    focal: Array
     shapes: Array
     tips: NDArray[np.int64]
     wrist: int
@@ -162,7 +161,6 @@ def compile_rig(rig: Rig) -> RigArrays:
         marker_ids=rig.markers.ids,
         cameras=np.array([model.camera_from_world[:3] for model in models]),
         intrinsics=np.array([model.intrinsics for model in models]),
-        focal=np.array([model.intrinsics[:2] for model in models]),
         shapes=np.array([_shape(marker) for marker in markers]),
         tips=np.array([roles.index(role) if role in roles else -1 for role in TIP_ROLES], dtype=np.int64),
         wrist=wrist,

@@ -124,7 +124,7 @@ class RigRefiner:
         models = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
         self._stored = np.array([model.world_from_camera for model in models])
         self._compiled = compile_rig(rig)
-        self._focal = self._compiled.focal
+        self._focal = self._compiled.intrinsics[:, :2]
         centres = self._stored[:, :3, 3]
         self._base_m = float(np.linalg.norm(centres - centres[0], axis=1).sum())
         self._own = np.array([marker.shape != "landmark" for marker in rig.markers.markers])
