@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_node.detect.image import GREY, block_noise, luma_at
+from rhot_node.detect.image import GREY
 
 RING = 2  # chroma pixels around the half level that an edge may reach (lens, 2x2 chroma mean, some motion)
 HOLES_MAX = 0.3  # holes (glints, noise) are filled up to this fraction of the component
@@ -103,6 +103,25 @@ class Scratch(NamedTuple):
     stack: NDArray[np.int32]
     components: NDArray[np.void]
     own: NDArray[np.bool_]
+
+
+# -- chroma pixels -----------------------------------------------------------------------------------------------------
+
+@njit(cache=True)
+def luma_at(y, row, column):
+    """Mean luma of a chroma pixel."""
+    top, bottom = y[2 * row], y[2 * row + 1]
+    left, right = 2 * column, 2 * column + 1
+    return 0.5 * 0.5 * (np.float64(top[left]) + top[right] + bottom[left] + bottom[right])
+
+
+@njit(cache=True)
+def block_noise(u, v, row, column):
+    """Variance of the noise of one chroma plane by a 2x2 block, grey levels^2: the mean square of both planes' mixed
+    differences, which cancel any linear shading, is four times as much."""
+    du = np.float64(u[row, column]) - u[row, column + 1] - u[row + 1, column] + u[row + 1, column + 1]
+    dv = np.float64(v[row, column]) - v[row, column + 1] - v[row + 1, column] + v[row + 1, column + 1]
+    return 0.5 * 0.5 * 0.5 * (du * du + dv * dv)
 
 
 # -- kinds of pixels ---------------------------------------------------------------------------------------------------

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from rhot_node.detect import outline_pixels as c
 from rhot_node.detect import track as t
 from rhot_node.detect.band import ARC, length_of, mend_band
-from rhot_node.detect.coverage import PIXELS_LEAST
-from rhot_node.detect.image import GREY, YuvImage, block_noise, rows_of, table_of
+from rhot_node.detect.coverage import PIXELS_LEAST, block_noise
+from rhot_node.detect.image import GREY, YuvImage, rows_of, table_of
 from rhot_node.detect.outline import fit
 from rhot_node.detect.outline_pixels import project, workspace
 from rhot_node.wire.messages import MarkerObservation

@@ -17,7 +17,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_node.detect.colour import MAGNITUDE_MIN
-from rhot_node.detect.image import GREY, WHITE, YuvImage, luma_at
+from rhot_node.detect.coverage import luma_at
+from rhot_node.detect.image import GREY, WHITE, YuvImage
 from rhot_node.detect.search import AREA_MIN, ColourGate
 from rhot_node.markers import Marker, MarkerSet
 

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple, Protocol
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rhot_node.wire.messages import MarkerObservation
@@ -56,23 +55,6 @@ class YuvImage(NamedTuple):
     def copy(self) -> YuvImage:
         """The same with planes of its own."""
         return YuvImage(self.y.copy(), self.u.copy(), self.v.copy())
-
-
-@njit(cache=True)
-def luma_at(y, row, column):
-    """Mean luma of a chroma pixel."""
-    top, bottom = y[2 * row], y[2 * row + 1]
-    left, right = 2 * column, 2 * column + 1
-    return 0.5 * 0.5 * (np.float64(top[left]) + top[right] + bottom[left] + bottom[right])
-
-
-@njit(cache=True)
-def block_noise(u, v, row, column):
-    """Variance of the noise of one chroma plane by a 2x2 block, grey levels^2: the mean square of both planes' mixed
-    differences, which cancel any linear shading, is four times as much."""
-    du = np.float64(u[row, column]) - u[row, column + 1] - u[row + 1, column] + u[row + 1, column + 1]
-    dv = np.float64(v[row, column]) - v[row, column + 1] - v[row + 1, column] + v[row + 1, column + 1]
-    return 0.5 * 0.5 * 0.5 * (du * du + dv * dv)
 
 
 def from_i420(buffer: Plane, width: int, height: int, stride: int | None = None) -> YuvImage:
