@@ -10,7 +10,7 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.limits import clamp_angle
 from rhot_app.hand.model import neutral_pose
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
-from rhot_app.hand.solvers.fabrik import fabrik_finger, fabrik_thumb
+from rhot_app.hand.solvers.fabrik import fabrik_within
 from rhot_app.hand.solvers.finger_chain import Status, chain_points, to_finger
 from rhot_app.hand.solvers.finger_ik import solve_fingers
 
@@ -44,8 +44,7 @@ def test_fabrik_alone_comes_near_and_keeps_the_limits(right_hand):
             local, joints = np.empty(3), np.empty((4, 3))
             to_finger(np.eye(4), 1.0, right_hand.base[finger], right_hand.base_rotation[finger], targets[finger], local)
             angles, limits = neutral_pose().angles[rows].copy(), right_hand.limits[rows]
-            solve = fabrik_thumb if finger == 0 else fabrik_finger
-            solve(angles, right_hand.chain[finger], limits, local, 1e-4, 20)
+            fabrik_within(angles, right_hand.chain[finger], limits, local, 1e-4, 20)
             assert (angles >= limits[:, 0]).all() and (angles <= limits[:, 1]).all()
             chain_points(angles, right_hand.chain[finger], joints, np.empty((3, len(angles))))
             misses.append(np.linalg.norm(joints[3] - local))
