@@ -125,7 +125,7 @@ def follow(method: Method | Fabrik, model: HandModel, path: Iterator[Array]) -> 
     """Largest change of a joint of the index finger in one step, and largest distance from what can be reached."""
     rows, reach = ANGLE_SLICES[INDEX], model.chain[INDEX].sum()
     angles, jumps, misses, first = neutral_pose().angles.copy(), [], [], True
-    blank = Problem(model.chain, model.limits, angles, np.full((5, 3), np.nan))
+    blank = Problem(model.chain, model.chain_bend, model.limits, angles, np.full((5, 3), np.nan))
     for target in path:
         targets = blank.targets.copy()
         targets[INDEX] = target

@@ -13,6 +13,7 @@ from rhot_app.hand.model import HandModel, neutral_pose
 from rhot_app.hand.places import patch_of, place_of, segment_axis, with_markers
 from rhot_app.hand.skeleton import FINGERS, HandPose
 from rhot_app.hand.solvers.finger_ik import solve_fingers
+from rhot_app.hand.solvers.methods import Method, make_problem, solve
 from rhot_app.hand.solvers.palm_fit import fit_palm
 from rhot_node.markers import Marker, MarkerSet
 
@@ -83,6 +84,16 @@ def test_fingers_are_solved_for_markers_beside_the_bone(model, patch):
         met.append(np.linalg.norm(reached.marker_centres - targets, axis=1))
         np.testing.assert_allclose(met[-1], solution.residuals, atol=1e-9)
     assert (np.array(met) <= 1e-4).mean() > 0.97
+
+
+@pytest.mark.parametrize("method", [Method.LEVENBERG, Method.CLOSED_FORM])
+def test_other_methods_meet_markers_beside_the_bone(model, method):
+    model = with_markers(model, worn("nail", length_mm=10.0))
+    pose = HandPose(np.eye(4), np.clip(neutral_pose().angles + 0.2, *model.limits.T))
+    targets = forward(model, pose).marker_centres
+    angles = solve(method, make_problem(model, pose, targets)).angles
+    met = forward(model, HandPose(np.eye(4), angles)).marker_centres
+    np.testing.assert_allclose(met[1:], targets[1:], atol=1e-6)
 
 
 def test_a_palm_is_found_under_painted_nails(right_hand):

@@ -26,11 +26,13 @@ Array = NDArray[np.float64]
 class Problem:
     """Five fingers in their base frames (x along the first bone at zero angles, flexion about y, abduction about z).
 
-    `lengths` (5, 3) m, the last bone only as far as the point to be placed; `limits` (21, 2) rad, low and high;
-    `start` (21,) rad; `targets` (5, 3) m, NaN rows for fingers without one.
+    `lengths` (5, 3) m, the last bone only as far as the point to be placed, which lies `bends` (5,) rad beside the bone
+    (`HandModel.chain_bend`); `limits` (21, 2) rad, low and high; `start` (21,) rad; `targets` (5, 3) m, NaN rows for
+    fingers without one.
     """
 
     lengths: Array
+    bends: Array
     limits: Array
     start: Array
     targets: Array
@@ -42,7 +44,7 @@ def make_problem(model: HandModel, start: HandPose, targets: Array) -> Problem:
     for finger in range(5):
         to_finger(start.world_from_palm, model.mirror, model.base[finger], model.base_rotation[finger],
                   np.asarray(targets[finger], dtype=np.float64), local[finger])
-    return Problem(model.chain, model.limits, np.array(start.angles, dtype=np.float64), local)
+    return Problem(model.chain, model.chain_bend, model.limits, np.array(start.angles, dtype=np.float64), local)
 
 
 class Method(IntEnum):
@@ -65,6 +67,7 @@ class Method(IntEnum):
 
 
 _SVD, _CLOSED_FORM = int(Method.SVD), int(Method.CLOSED_FORM)
+_LAST = FINGER_ANGLES[:, 1] - 1  # of each finger's angles
 
 
 class Effort(NamedTuple):
@@ -86,10 +89,13 @@ def solve(method: Method, problem: Problem, effort: Effort | None = None) -> Sol
     Angles keep the problem's limits. A target out of reach leaves the finger stretched towards it as far as limits
     allow; the statuses tell.
     """
-    angles, residuals = problem.start.copy(), np.empty(5)
+    angles, limits, residuals = problem.start.copy(), problem.limits.copy(), np.empty(5)
+    angles[_LAST] += problem.bends
+    limits[_LAST] += problem.bends[:, None]
     iterations, statuses = np.empty(5, dtype=np.int64), np.empty(5, dtype=np.uint8)
-    solve_arrays(int(method), angles, problem.lengths, problem.limits, problem.targets, effort or EFFORT[method],
+    solve_arrays(int(method), angles, problem.lengths, limits, problem.targets, effort or EFFORT[method],
                  residuals, iterations, statuses)
+    angles[_LAST] -= problem.bends
     return Solution(angles, residuals, iterations, statuses)
 
 
