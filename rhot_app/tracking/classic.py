@@ -18,7 +18,7 @@ from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.places import with_markers
 from rhot_app.hand.skeleton import ANGLE_SLICES, ANGLES, FINGER_OF_ANGLE, JOINT_SLICES, JOINTS, HandPose
-from rhot_app.hand.solvers.finger_ik import FABRIK_ITERATIONS, TOLERANCE, solve_fingers_arrays
+from rhot_app.hand.solvers.finger_ik import solve_fingers_arrays
 from rhot_app.hand.solvers.methods import Method, make_problem, solve
 from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, any_marker, fit_palm, track_arrays
 from rhot_app.project import IkMethod, Rig
@@ -324,8 +324,8 @@ def follow(hand: _HandArrays, targets: Targets, dt_s: float, warm: bool, placed:
     if solved:
         world[:], angles[:] = poses.palm_world, poses.palm_angles
         solve_fingers_arrays(angles, world, hand.mirror, hand.base, hand.base_rotation, hand.chain, hand.chain_bend,
-                             hand.limits, tips, hand.mean, hand.information, TOLERANCE, int(FABRIK_ITERATIONS),
-                             TARGET_SD_M, np.empty(5), np.empty(5, np.int64), np.empty(5, np.uint8))
+                             hand.limits, tips, hand.mean, hand.information, TARGET_SD_M, np.empty(5),
+                             np.empty(5, np.int64), np.empty(5, np.uint8))
     forward_arrays(hand.dh, world, angles, np.empty((hand.dh.parent.shape[0], 3, 4)), points)
     _know(targets.knowledge, solved and placed, known)
     return solved

@@ -37,8 +37,7 @@ the pose is looked for, near the target."""
 STOP = Stop(12, 1e-4, 1e-6, 0.0)
 
 
-def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: float = TOLERANCE,
-                  max_iterations: int = FABRIK_ITERATIONS, target_sd: float = 0.0) -> Solution:
+def solve_fingers(model: HandModel, pose: HandPose, targets: Array, target_sd: float = 0.0) -> Solution:
     """Bring the marker of every finger with a target there: `targets` (5, 3) m world; NaN rows keep the pose's angles.
 
     Nearby targets give nearby angles. A target out of reach stretches the finger towards it as far as the limits allow.
@@ -51,18 +50,18 @@ def solve_fingers(model: HandModel, pose: HandPose, targets: Array, tolerance: f
     iterations, statuses = np.empty(5, dtype=np.int64), np.empty(5, dtype=np.uint8)
     solve_fingers_arrays(angles, pose.world_from_palm, model.mirror, model.base, model.base_rotation,
                          model.chain, model.chain_bend, model.limits, targets, model.pose_prior.mean,
-                         model.pose_prior.information, tolerance, max_iterations, target_sd, residuals, iterations,
-                         statuses)
+                         model.pose_prior.information, target_sd, residuals, iterations, statuses)
     return Solution(angles, residuals, iterations, statuses)
 
 
 @njit(cache=True)
 def solve_fingers_arrays(angles: Array, world_from_palm: Array, mirror: float, base: Array, base_rotation: Array,
                          lengths: Array, bends: Array, limits: Array, targets: Array, mean: Array,
-                         information: Array, tolerance: float, max_iterations: int, target_sd: float,
-                         residuals: Array, iterations: NDArray[np.int64], statuses: NDArray[np.uint8]) -> None:
+                         information: Array, target_sd: float, residuals: Array, iterations: NDArray[np.int64],
+                         statuses: NDArray[np.uint8]) -> None:
     """`solve_fingers` on arrays, in place on `angles`, `residuals`, `iterations` and `statuses`; `lengths` (5, 3) and
-    `bends` (5,) are the model's `chain` and `chain_bend`."""
+    `bends` (5,) are the model's `chain` and `chain_bend`: the way to a marker beside the bone is that much more bent
+    than the bone, and so are its limits and its natural angle."""
     local = np.empty(3)
     for finger in range(5):
         residuals[finger], iterations[finger], statuses[finger] = np.nan, 0, MISSING
@@ -70,9 +69,15 @@ def solve_fingers_arrays(angles: Array, world_from_palm: Array, mirror: float, b
             continue
         to_finger(world_from_palm, mirror, base[finger], base_rotation[finger], targets[finger], local)
         low, high = FINGER_ANGLES[finger]
-        residuals[finger], iterations[finger], statuses[finger] = solve_bent(
-            angles[low:high], lengths[finger], bends[finger], limits[low:high], local, mean[low:high],
-            np.ascontiguousarray(information[low:high, low:high]), tolerance, max_iterations, target_sd)
+        box, usual = limits[low:high].copy(), mean[low:high].copy()
+        angles[high - 1] += bends[finger]
+        usual[-1] += bends[finger]
+        for side in range(2):
+            box[-1, side] += bends[finger]
+        residuals[finger], iterations[finger], statuses[finger] = solve_arrays(
+            angles[low:high], lengths[finger], box, local, usual,
+            np.ascontiguousarray(information[low:high, low:high]), target_sd)
+        angles[high - 1] -= bends[finger]
 
 
 class FingerProblem(NamedTuple):
@@ -114,43 +119,27 @@ implements(FingerProblem, linearise_finger)
 
 
 @njit(cache=True)
-def solve_bent(angles: Array, lengths: Array, bend: float, limits: Array, target: Array, mean: Array,
-               information: Array, tolerance: float, max_iterations: int, target_sd: float) -> tuple[float, int, int]:
-    """`solve_arrays` for a marker beside the bone, in the finger's plane: the last link is `bend` rad more bent than
-    the bone that carries it, and so are its limits and its natural angle."""
-    last = angles.shape[0] - 1
-    shifted, usual = limits.copy(), mean.copy()
-    shifted[last, 0] += bend
-    shifted[last, 1] += bend
-    usual[last] += bend
-    angles[last] += bend
-    result = solve_arrays(angles, lengths, shifted, target, usual, information, tolerance, max_iterations, target_sd)
-    angles[last] -= bend
-    return result
-
-
-@njit(cache=True)
 def solve_arrays(angles: Array, lengths: Array, limits: Array, target: Array, mean: Array, information: Array,
-                 tolerance: float, max_iterations: int, target_sd: float) -> tuple[float, int, int]:
+                 target_sd: float) -> tuple[float, int, int]:
     """One finger in its base frame, in place on `angles`; returns the residual, m, FABRIK's iterations and the status.
 
     `mean` and `information`: the natural pose of these angles. FABRIK that limits stop leaves off at once.
     """
     clamp(angles, limits)
-    start, iterations, near = angles.copy(), 0, max(tolerance, target_sd)
+    start, iterations, near = angles.copy(), 0, max(TOLERANCE, target_sd)
     if miss(angles, lengths, target) > near:
-        iterations, _ = fabrik_within(angles, lengths, limits, target, near, max_iterations)
+        iterations, _ = fabrik_within(angles, lengths, limits, target, near, FABRIK_ITERATIONS)
     if target_sd == 0.0 or miss(angles, lengths, target) > FAR * near:
-        _meet(angles, start, FingerProblem(lengths, limits, target, COMPLIANCE, mean, information), tolerance)
+        _meet(angles, start, FingerProblem(lengths, limits, target, COMPLIANCE, mean, information))
     if target_sd > 0.0:  # joints that go together move together
         problem = FingerProblem(lengths, limits, target, target_sd ** 2, start, information)
         descend(problem, angles, angles.shape[0], STOP)
     residual = miss(angles, lengths, target)
-    return residual, iterations, status_of(angles, lengths, limits, norm(target), residual, tolerance, False)
+    return residual, iterations, status_of(angles, lengths, limits, norm(target), residual, TOLERANCE, False)
 
 
 @njit(cache=True)
-def _meet(angles: Array, start: Array, problem: FingerProblem, tolerance: float) -> None:
+def _meet(angles: Array, start: Array, problem: FingerProblem) -> None:
     """Descend from `angles`, in place, until the target is met in the most natural pose.
 
     Stopped by a limit or a local minimum it tries again: from the middle of the range, from `start`, stretched. The
@@ -170,7 +159,7 @@ def _meet(angles: Array, start: Array, problem: FingerProblem, tolerance: float)
         descend(near, trial, trial.shape[0], STOP)
         descend(problem, trial, trial.shape[0], STOP)
         residual = miss(trial, problem.lengths, problem.target)
-        if residual <= tolerance or residual < least:
+        if residual <= TOLERANCE or residual < least:
             angles[:], least = trial, residual
-        if residual <= tolerance:
+        if residual <= TOLERANCE:
             break
