@@ -162,8 +162,8 @@ def _positive(matrix: Array, least: float) -> bool:
 NEWTON, LEVENBERG = 4, 5
 """With inverse.DAMPED the descents to choose from."""
 
-RESTARTS = (0.5, 0.5, 0.25, 0.05, 0.95)
-"""Parts of the joints' ranges from which to begin again; the first gives way to the closed form."""
+RESTARTS = (0.5, 0.0, 1.0)
+"""Parts of the joints' ranges from which to begin again, after the closed form."""
 
 
 @njit(cache=True)
@@ -172,19 +172,19 @@ def solve_exactly(rule: int, angles: Array, lengths: Array, limits: Array, targe
     """One finger, in place on `angles` (4,) or (5,); returns residual, m, iterations in all, and status.
 
     `rule`: DAMPED, NEWTON or LEVENBERG. What stops short of a target within the finger's length begins again: from
-    the closed form of the coupled finger, the middle of the range, and near both its ends. The nearest end of
+    the closed form of the coupled finger, the middle of the range, and both its ends. The nearest end of
     all is the result.
     """
     trial = np.empty(angles.shape[0])
     assign(angles, trial)
     iterations, residual, status = 0, np.inf, REACHED
-    for attempt in range(1 + len(RESTARTS)):
-        if attempt > 0:
-            for k in range(angles.shape[0]):
-                trial[k] = limits[k, 0] + RESTARTS[attempt - 1] * (limits[k, 1] - limits[k, 0])
+    for attempt in range(2 + len(RESTARTS)):
         if attempt == 1:
             assign(angles, trial)
             solve_coupled(trial, lengths, limits, target, tolerance)
+        elif attempt > 1:
+            for k in range(angles.shape[0]):
+                trial[k] = limits[k, 0] + RESTARTS[attempt - 2] * (limits[k, 1] - limits[k, 0])
         if rule == DAMPED:
             missed, taken, ended = follow_jacobian(DAMPED, trial, lengths, limits, target, tolerance, max_iterations)
         else:
