@@ -11,6 +11,7 @@ import numpy as np
 
 from rhot_app.calibration.hand.bones import BONE_NAMES, enter_bones
 from rhot_app.calibration.hand.marker_places import tracks_of
+from rhot_app.calibration.registry import BONES as HAND_BONES
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import BONES, FINGERS
@@ -226,8 +227,8 @@ def propose(report: Any, rig: Rig, path: Path | None) -> Proposal | None:
         return None
     after = msgspec.structs.replace(rig, hand=msgspec.structs.replace(report.hand, name=_NAMES[report.method]))
     size = Row("size", "100 %", f"{100 * report.size:.1f} ± {100 * report.size_std:.1f} %")
-    return Proposal(BONES.reason, report.verdict, (size, *rig_rows(rig, after)),
-                    (RigChange(rig, after, path, BONES.reason),))
+    return Proposal(HAND_BONES.reason, report.verdict, (size, *rig_rows(rig, after)),
+                    (RigChange(rig, after, path, HAND_BONES.reason),))
 
 
 def _roles(rig: Rig) -> tuple[dict[str, str], frozenset[str]]:
