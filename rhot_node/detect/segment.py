@@ -27,6 +27,7 @@ from rhot_node.detect.image import GREY, table_of
 
 ATTEMPTS = 5  # windows and levels tried before the marker counts as lost
 LEVEL_TOLERANCE = 0.08  # a local level further off than this from the assumed one is used for another attempt
+SEAM = 16  # chroma pixels; a component this large without any interior is a seam where two other colours mix
 SIZE_SIGMA = 0.35  # of the log area from one frame to the next
 FRAGMENT_REACH = 1.0  # diameters from the prediction within which pieces of a marker are put together
 FRAGMENT_AREA = 1.2  # of the expected area: more is another object
@@ -104,7 +105,7 @@ def measure(image, paint, request, scratch, careful, noises, measured):
             break
         if attempt + 1 < ATTEMPTS:
             found = False
-    if not found:
+    if not found or (here == 0.0 and components[best].area >= SEAM):
         return False
     result.level, result.careful = level, careful
     if careful:

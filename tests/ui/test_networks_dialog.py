@@ -21,7 +21,7 @@ def opened(qtbot, themed, tmp_path, monkeypatch):
     """A function that opens the dialog on a computer without networks, which are empty files here."""
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     for name in FILES:
-        monkeypatch.setitem(install.FILES, name, WheelFile(name, 0, EMPTY_SHA256))
+        monkeypatch.setitem(install.FILES, name, WheelFile(name, EMPTY_SHA256))
 
     def open_with(work):
         dialog = NetworksDialog(install=work)
