@@ -6,7 +6,6 @@ does not give: with the next record whose checksum is right.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import enum
 import io
@@ -25,9 +24,8 @@ import msgspec
 import numpy as np
 
 from rhot_app.errors import RecordingError, note_loss
-from rhot_app.project import Rig, load_rig, parse_rig
-from rhot_node.files import JSON_BYTES_MAX, KIB, MIB, decode_json, open_input, replacing
-from rhot_node.terminal import add_examples
+from rhot_app.project import Rig, parse_rig
+from rhot_node.files import JSON_BYTES_MAX, KIB, MIB, decode_json, open_input
 from rhot_node.wire.fields import TIME_MAX_NS, UDP_MAX
 
 MAGIC: Final = b"RHOTLOG\0"
@@ -468,38 +466,3 @@ def _why_no_header(file: BinaryIO, path: Path, unreadable_bytes: int) -> str:
                 f"{VERSION}.")
     return (f"{path}: the log's header is damaged or incomplete. `rhot recover LOG --rig FILE --out CLEAN` reads it "
             "with the rig that it was recorded with.")
-
-
-# -- the command ``rhot recover`` --------------------------------------------------------------------------------------
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``rhot recover``."""
-    parser.add_argument("path", type=Path, metavar="LOG", help="the damaged log")
-    parser.add_argument("--out", type=Path, required=True, metavar="CLEAN", help="the log to write; a new file")
-    parser.add_argument("--rig", type=Path, metavar="FILE",
-                        help="the rig that it was recorded with, where the header cannot be read")
-    add_examples(parser, "rhot recover damaged.rhotlog --out clean.rhotlog",
-                 "rhot recover damaged.rhotlog --rig desk.json --out clean.rhotlog")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Write every sound record, also those of kinds that this version does not know. Raises RecordingError."""
-    if args.out.exists():
-        raise RecordingError(f"{args.out}: exists already; a log is never written over. Choose another name.")
-    rig = None if args.rig is None else load_rig(args.rig)
-    with contextlib.closing(LogReader(args.path, rig)) as reader:
-        try:
-            with replacing(args.out) as file:
-                file.write(encode_header(reader.rig, reader.about, marks_end=True))
-                count = 0
-                for data in reader.sound_records():
-                    file.write(data)
-                    count += 1
-                file.write(END)
-        except OSError as exc:
-            raise RecordingError(f"{args.out}: cannot be written ({exc.strerror}). Nothing was left of it; choose "
-                                 "another --out.") from exc
-    losses = reader.losses
-    end = f" Of {args.path} {losses.end}." if losses.end else ""
-    print(f"{args.out}: {count} record{'' if count == 1 else 's'}.{end}")
-    return 0

@@ -141,7 +141,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate and report; a rig is written when it may be used and passes its own checks."""
-    from rhot_app.calibration.commands.stereo import fields_of, lines_of
     from rhot_app.calibration.stereo.calibrate import calibrated_rig, require_nodes, rig_verdict
     from rhot_app.progress import ProgressLine
     from rhot_app.rig_history import accept
