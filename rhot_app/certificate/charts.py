@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.board.target import Box, Drawing, Ink, Stroke, Text
 from rhot_app.calibration.depth.fit import depth_from_disparity
 from rhot_app.certificate import thesis
 from rhot_app.certificate.document import Line
+from rhot_app.vector_graphics import Box, Drawing, Ink, Stroke, Text
 
 Array = NDArray[np.float64]
 

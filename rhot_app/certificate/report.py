@@ -10,12 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rhot_app.calibration.board.target import BLACK, Box, Drawing, Ink, Stroke, Text, pdf_of
 from rhot_app.certificate.charts import chart_of
 from rhot_app.certificate.document import Certificate, Figure, Line, Word, number
 from rhot_app.certificate.recordings import ProtocolFile, copy_protocol
 from rhot_app.errors import CertificateError
 from rhot_app.simulator.film.film import new_folder
+from rhot_app.vector_graphics import BLACK, Box, Drawing, Ink, Stroke, Text, pdf_of
 from rhot_node.files import write_document
 
 INKS: dict[Word, Ink] = {"agrees": (0.10, 0.45, 0.20), "differs": (0.75, 0.12, 0.10),

@@ -12,8 +12,9 @@ import pytest
 from rhot_app.__main__ import main
 from rhot_app.calibration.board.boards import STANDARD_BOARD, AprilGrid, CharucoBoard, Chessboard, CircleGrid
 from rhot_app.calibration.board.corners import detect
-from rhot_app.calibration.board.target import PAPERS_MM, RULER_MM, Drawing, draw_target
+from rhot_app.calibration.board.target import PAPERS_MM, RULER_MM, draw_target
 from rhot_app.errors import CalibrationError
+from rhot_app.vector_graphics import Drawing
 
 PX_PER_MM = 4.0
 

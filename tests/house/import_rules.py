@@ -11,7 +11,7 @@ from pathlib import Path
 # name decides, so a row for one file (rhot_node.markers) overrides the row of its package.
 NODE_BASE = ("rhot_node.errors", "rhot_node.files", "rhot_node.clock", "rhot_node.markers", "resources")
 APP_BASE = ("rhot_node", "resources", "rhot_app.diagnostics", "rhot_app.errors", "rhot_app.progress",
-            "rhot_app.project", "rhot_app.rig_history", "rhot_app.keys")
+            "rhot_app.project", "rhot_app.rig_history", "rhot_app.keys", "rhot_app.vector_graphics")
 MODELS = ("rhot_app.geometry", "rhot_app.filters", "rhot_app.estimation")
 SOLVERS = ("rhot_app.calibration", "rhot_app.hand", "rhot_app.objects")
 ENGINE_SIDE = ("rhot_app.recording", "rhot_app.sources", "rhot_app.outputs", "rhot_app.simulator")
@@ -31,6 +31,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.errors": ("rhot_node.files",),
     "rhot_app.diagnostics": (),
     "rhot_app.progress": ("rhot_node.errors",),
+    "rhot_app.vector_graphics": (),
     "rhot_app.keys": ("rhot_node",),
     "rhot_app.rig_history": ("rhot_node", "rhot_app.errors", "rhot_app.project", "rhot_app.hand.anatomy"),
     "rhot_app.project": ("rhot_node", "resources", "rhot_app.errors", "rhot_app.hand.anatomy", "rhot_app.hand.skeleton",
@@ -68,6 +69,14 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.warm": (*BELOW_ENGINE, "rhot_app.engine"),
     "rhot_app": ("rhot_app",),  # __init__
     "rhot_app.__main__": ("rhot_node", "rhot_app", "resources"),
+}
+
+# What a room needs must not drag in, through however many others.
+NEVER_NEEDS: dict[str, tuple[str, ...]] = {
+    "rhot_app.calibration.colour": ("rhot_app.calibration.stereo", "rhot_app.calibration.bundle",
+                                    "rhot_app.calibration.lens", "rhot_app.calibration.board"),
+    "rhot_app.ui.wizards.colours": ("rhot_app.calibration.stereo", "rhot_app.calibration.bundle"),
+    "rhot_app.calibration.board": ("rhot_app.calibration.check", "rhot_app.certificate"),
 }
 
 # Foreign packages that only the named rooms may import.
