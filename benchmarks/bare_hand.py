@@ -48,7 +48,7 @@ from rhot_app.hand.anatomy import HandAnatomy  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.model import build_model  # noqa: E402
 from rhot_app.hand.motion.hand_state import STATE  # noqa: E402
-from rhot_app.simulator.scene.motion import load_motion  # noqa: E402
+from rhot_app.simulator.scene.motion_file import load_motion  # noqa: E402
 from rhot_node.detect.edges import find_edges, noise_of  # noqa: E402
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground  # noqa: E402
 

@@ -39,7 +39,7 @@ from rhot_app.hand.model import build_model  # noqa: E402
 from rhot_app.hand.motion.hand_state import pose_of  # noqa: E402
 from rhot_app.hand.skeleton import HandPose  # noqa: E402
 from rhot_app.handfit.adaptation import adapt  # noqa: E402
-from rhot_app.simulator.scene.motion import load_motion  # noqa: E402
+from rhot_app.simulator.scene.motion_file import load_motion  # noqa: E402
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground  # noqa: E402
 
 FPS, BLUR_PX, PLACE = 20.0, 1.5, np.array([0.0, 0.0, 0.55])

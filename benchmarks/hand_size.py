@@ -23,7 +23,7 @@ from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.project import Rig
 from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
-from rhot_app.tracking.markers.acquisition import Located
+from rhot_app.tracking.locate import Located
 from rhot_app.tracking.markers.hand_size import GRID, HandSize
 from rhot_app.tracking.markers.marker_model import USUAL_SIZE_SD, MarkerModel, compile_markers
 

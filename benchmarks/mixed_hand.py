@@ -49,7 +49,7 @@ from rhot_app.hand.model import HandModel, build_model  # noqa: E402
 from rhot_app.hand.skeleton import TIP_ROLES, HandPose  # noqa: E402
 from rhot_app.project import Rig, TrackerSettings  # noqa: E402
 from rhot_app.simulator.nodes.landmark_detector import Hand, detected_landmarks  # noqa: E402
-from rhot_app.simulator.scene.motion import load_motion  # noqa: E402
+from rhot_app.simulator.scene.motion_file import load_motion  # noqa: E402
 from rhot_app.state import HandState  # noqa: E402
 from rhot_app.tracking.contours.tracker import ContourEstimator  # noqa: E402
 from rhot_app.tracking.markers.estimator import Estimator  # noqa: E402

@@ -43,7 +43,7 @@ from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNode
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.skeleton import HandPose  # noqa: E402
 from rhot_app.project import Rig  # noqa: E402
-from rhot_app.simulator.scene.motion import load_motion  # noqa: E402
+from rhot_app.simulator.scene.motion_file import load_motion  # noqa: E402
 from rhot_app.state import HandState  # noqa: E402
 from rhot_app.tracking.scene import make_tracker  # noqa: E402
 from rhot_node.detect.foreground import learn_background, skin_foreground  # noqa: E402

@@ -16,7 +16,8 @@ from rhot_app.calibration.stereo.report import StereoReport
 from rhot_app.engine.client import EngineClient
 from rhot_app.errors import CalibrationError, EngineError, ExportError, RecordingError, RhotError, RigError
 from rhot_app.export.export import Exported, export_log
-from rhot_app.export.plan import ExportOptions, Frame, Hand, Tracker, Units
+from rhot_app.export.frames import Frame
+from rhot_app.export.plan import ExportOptions, Hand, Tracker, Units
 from rhot_app.export.recording import TrackedLog, read_log
 from rhot_app.export.resample import Resampler, checked_rate
 from rhot_app.export.states import HandStates, ObjectStates, joined

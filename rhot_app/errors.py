@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import math
 from pathlib import Path
+from typing import Any
 
 
 class RhotError(Exception):
@@ -45,6 +47,15 @@ class EngineError(RhotError):
 
 class CalibrationError(RhotError):
     """A calibration cannot begin or end: its input is missing, unreadable, or does not determine the answer."""
+
+
+def require(package: str, what: str, extra: str = "export") -> Any:
+    """The module of an optional package. Raises ExportError that names `what` needs it, and the extra that has it."""
+    try:
+        return importlib.import_module(package)
+    except ImportError as exc:
+        raise ExportError(f"{what} needs the package {package.split('.')[0]!r}, which cannot be imported ({exc}). "
+                          f"Install it with: pip install 'rhot[{extra}]'") from exc
 
 
 def input_file(text: str) -> Path:

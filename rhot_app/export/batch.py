@@ -24,9 +24,9 @@ from typing import Any, Final, Literal
 import msgspec
 import numpy as np
 
-from rhot_app.errors import ExportError, RhotError
+from rhot_app.errors import ExportError, RhotError, require
 from rhot_app.export.export import FORMATS, export_log
-from rhot_app.export.plan import ExportOptions, require
+from rhot_app.export.plan import ExportOptions
 from rhot_app.export.recording import TrackedLog
 from rhot_app.state import Knowledge
 from rhot_node.errors import NodeError

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rhot_app.errors import ExportError, refuse_existing
+from rhot_app.export.frames import in_frame
 from rhot_app.export.gaps import FilledGap, GapFiller, checked_fill
-from rhot_app.export.plan import ExportOptions, Plan, Units, Writer, in_frame
+from rhot_app.export.plan import ExportOptions, Plan, Units, Writer
 from rhot_app.export.recording import RATE_AFTER_S, TrackedLog
 from rhot_app.export.resample import Resampler, checked_rate
 from rhot_app.export.states import HandStates

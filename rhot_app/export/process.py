@@ -12,8 +12,9 @@ from pathlib import Path
 
 from rhot_app.errors import ExportError, RhotError
 from rhot_app.export.export import Exported, check_options, export_log
+from rhot_app.export.frames import in_frame
 from rhot_app.export.gaps import GapFiller
-from rhot_app.export.plan import ExportOptions, in_frame
+from rhot_app.export.plan import ExportOptions
 from rhot_app.export.recording import TrackedLog
 from rhot_app.export.resample import Resampler
 from rhot_app.export.states import HandStates, joined

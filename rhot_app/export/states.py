@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.errors import require
+from rhot_app.estimation.se3 import quaternion_from_rotation
+from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.objects.state import Validity
+from rhot_app.project import OTHER_HAND
 from rhot_app.state import Condition, HandState, Knowledge
 
 if TYPE_CHECKING:
@@ -128,9 +133,6 @@ class HandStates:
 
         Raises ExportError when pandas is not installed.
         """
-        from rhot_app.export.plan import require
-        from rhot_app.export.tables import columns
-
         frame = require("pandas", "a data frame")
         return frame.DataFrame(dict(columns(self, 1000.0 if units == "mm" else 1.0, first_ns=None)))
 
@@ -198,3 +200,100 @@ def hidden_where_lost(positions: Array, states: HandStates) -> Array:
     """Positions (N, P, 3) with NaN where there is no hand: for formats that cannot say how a point is known."""
     return np.where(states.present[:, None, None], positions, np.nan)
 
+
+# -- columns of a table: docs/export.md --------------------------------------------------------------------------------
+
+Column = NDArray[Any]
+
+_AXES = "x", "y", "z"
+_TWIST = "x", "y", "z", "rx", "ry", "rz"
+
+
+def columns(states: HandStates, scale: float, first_ns: int | None,
+            wall_clock_offset_ns: int | None = None) -> Iterator[tuple[str, Column]]:
+    """The columns of a table, each (N,), by name; `scale` is the unit of length per metre, 1000 or 1.
+
+    `first_ns`: where `time_s` is 0; None: at the first of these states. `wall_clock_offset_ns`: ns since 1970 less the
+    master's clock; without it there is no column of wall clock time.
+    """
+    unit = "mm" if scale == 1000.0 else "m"
+    begin = states.t_master_ns[:1] if first_ns is None else first_ns
+    yield "time_s", 1e-9 * (states.t_master_ns - begin)
+    yield "t_master_ns", states.t_master_ns
+    if wall_clock_offset_ns is not None:
+        yield "t_unix_ns", states.t_master_ns + wall_clock_offset_ns
+    yield "sequence", states.sequence
+    yield "condition", np.array(states.conditions, dtype=object)
+    for index, marker in enumerate(states.marker_ids):
+        name = f"marker_{marker}"
+        yield from _point(name, states.marker_positions[:, index], scale, unit)
+        yield from _point(f"{name}_raw", states.marker_raw_positions[:, index], scale, unit)
+        yield from _covariance(name, states.marker_covariances[:, index], scale, unit)
+        yield f"{name}_epipolar_error_px", states.epipolar_error_px[:, index]
+        yield f"{name}_knowledge", states.marker_knowledge[:, index]
+    yield from _hand("", states, scale, unit)
+    if states.other is not None:
+        yield f"{OTHER_HAND}condition", np.array(states.other.conditions, dtype=object)
+        yield from _hand(OTHER_HAND, states.other, scale, unit)
+    for one in states.objects:
+        yield from _object(one, scale, unit)
+        yield from _fingertips("", one, scale, unit)
+    for one in states.other.objects if states.other is not None else ():
+        yield from _fingertips(OTHER_HAND, one, scale, unit)
+
+
+def _object(one: ObjectStates, scale: float, unit: str) -> Iterator[tuple[str, Column]]:
+    name = f"object_{one.name}"
+    yield f"{name}_validity", np.array(one.validities, dtype=object)
+    yield from _point(name, one.world_from_object[:, :3, 3], scale, unit)
+    for index, part in enumerate(quaternion_from_rotation(one.world_from_object[:, :3, :3]).T):
+        yield f"{name}_q{'wxyz'[index]}", part
+    yield from _pose_covariance(name, one.covariance, scale, unit)
+
+
+def _fingertips(prefix: str, one: ObjectStates, scale: float, unit: str) -> Iterator[tuple[str, Column]]:
+    """How far a hand's fingertips are from an object."""
+    for index, finger in enumerate(FINGERS):
+        name = f"object_{one.name}_{prefix}{finger}"
+        yield f"{name}_distance_{unit}", scale * one.distances[:, index]
+        yield f"{name}_distance_sd_{unit}", scale * one.distance_sd[:, index]
+        yield f"{name}_contact", one.contacts[:, index]
+
+
+def _pose_covariance(name: str, covariances: Column, scale: float, unit: str) -> Iterator[tuple[str, Column]]:
+    for i, j in combinations_with_replacement(range(6), 2):
+        factor, of = ((scale * scale, f"{unit}2"), (scale, f"{unit}_rad"), (1.0, "rad2"))[(i > 2) + (j > 2)]
+        yield f"{name}_cov_{_TWIST[i]}_{_TWIST[j]}_{of}", factor * covariances[:, i, j]
+
+
+def _hand(prefix: str, states: HandStates, scale: float, unit: str) -> Iterator[tuple[str, Column]]:
+    for index, joint in enumerate(JOINTS):
+        name = f"{prefix}joint_{joint}"
+        yield from _point(name, states.joint_positions[:, index], scale, unit)
+        yield from _covariance(name, states.joint_covariances[:, index], scale, unit)
+        yield f"{name}_knowledge", states.joint_knowledge[:, index]
+    for index, finger in enumerate(FINGERS):
+        name = f"{prefix}fingertip_{finger}"
+        yield from _point(name, states.fingertip_positions[:, index], scale, unit)
+        yield from _covariance(name, states.fingertip_covariances[:, index], scale, unit)
+    for index, angle in enumerate(ANGLES):
+        yield f"{prefix}angle_{angle}_deg", np.degrees(states.angles[:, index])
+        yield f"{prefix}angle_{angle}_sd_deg", np.degrees(states.angle_sd[:, index])
+        yield f"{prefix}angle_{angle}_knowledge", states.angle_knowledge[:, index]
+    yield from _point(f"{prefix}palm", states.world_from_palm[:, :3, 3], scale, unit)
+    for index, part in enumerate(quaternion_from_rotation(states.world_from_palm[:, :3, :3]).T):
+        yield f"{prefix}palm_q{'wxyz'[index]}", part
+    yield from _pose_covariance(f"{prefix}palm", states.palm_covariance, scale, unit)
+    yield f"{prefix}palm_knowledge", states.palm_knowledge
+    yield f"{prefix}hand_scale", states.hand_scale
+    yield f"{prefix}hand_scale_sd", states.hand_scale_sd
+
+
+def _point(name: str, positions: Column, scale: float, unit: str) -> Iterator[tuple[str, Column]]:
+    for index, axis in enumerate(_AXES):
+        yield f"{name}_{axis}_{unit}", scale * positions[:, index]
+
+
+def _covariance(name: str, covariances: Column, scale: float, unit: str) -> Iterator[tuple[str, Column]]:
+    for i, j in combinations_with_replacement(range(3), 2):
+        yield f"{name}_cov_{_AXES[i]}{_AXES[j]}_{unit}2", scale * scale * covariances[:, i, j]

@@ -33,7 +33,8 @@ from rhot_app.project import PalmPlane, Rig, TrackerSettings
 from rhot_app.recording.raw_log import RecordKind
 from rhot_app.simulator.bare_hand.sequence import ENTRY_S, BareHandOptions, BareHandSequence, MovedSource
 from rhot_app.simulator.film.node_log import T0_MASTER_NS
-from rhot_app.simulator.scene.motion import WRIST_BELOW_CENTRE_M, Sway, load_motion
+from rhot_app.simulator.scene.motion import WRIST_BELOW_CENTRE_M, Sway
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_defaults
 from rhot_app.sources.local_nodes import NodePorts
 from rhot_app.sources.replay import LogValidator

@@ -21,7 +21,8 @@ from rhot_app.hand.skeleton import ANGLES, HandPose
 from rhot_app.mouse.model import FLAT_DEG
 from rhot_app.mouse.pick_scene import START, Ball
 from rhot_app.mouse.pointer import BUTTONS, HOME_S, MouseSettings
-from rhot_app.simulator.scene.motion import BACK_FACING, FACING, Key, MotionFile, Sway
+from rhot_app.simulator.scene.motion import BACK_FACING, FACING, Sway
+from rhot_app.simulator.scene.motion_file import Key, MotionFile
 
 Array = NDArray[np.float64]
 

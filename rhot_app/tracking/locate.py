@@ -55,6 +55,16 @@ class Places(NamedTuple):
     errors: Array
 
 
+class Located(NamedTuple):
+    """Where M markers were at `t_ns`, master ns: `positions` (M, 3) m, world, with `covariances` (M, 3, 3) m^2, NaN
+    where not located; `clear` (M,) bool: by two cameras that saw it beyond doubt."""
+
+    t_ns: int
+    positions: Array
+    covariances: Array
+    clear: NDArray[np.bool_]
+
+
 def rig_table(rig: RigArrays, shapes: Array | None = None) -> RigTable:
     """The rig's; `shapes` replaces its own where a pose turns them."""
     return RigTable(rig.intrinsics, rig.cameras, rig.shapes if shapes is None else shapes, rig.law,

@@ -21,7 +21,7 @@ from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import CameraPose, Rig, RigNode, TrackerSettings
-from rhot_app.simulator.scene.motion import load_motion
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.tracking.scene import make_tracker
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 

@@ -28,7 +28,7 @@ from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.handfit.adaptation import Adapted, adapt
 from rhot_app.rig_history import accept_hand, require_hand_place, versions
-from rhot_app.simulator.scene.motion import load_motion
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_node.detect.foreground import learn_background, learn_skin, skin_foreground
 
 POSES = 10

@@ -20,7 +20,7 @@ from rhot_app.handfit.hand_shape import ROOTS, SHAPE_LIMIT, SHAPE_SD, SIZE, Shap
 from rhot_app.handfit.session import HandFit, warm_up
 from rhot_app.handfit.state import OWN, Anchor, FitState
 from rhot_app.project import CameraCalibration
-from rhot_app.simulator.scene.motion import load_motion
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_node.errors import KeypointError
 from rhot_node.landmarks.networks import DetectedHand

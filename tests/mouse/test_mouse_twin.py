@@ -9,7 +9,8 @@ from rhot_app.mouse.measure import buttons, coupling, latency, one_camera, place
 from rhot_app.mouse.play import SetUp, play
 from rhot_app.mouse.pointer import MouseSettings
 from rhot_app.mouse.script import LEAD_S, Script, carrying, motion_file
-from rhot_app.simulator.scene.motion import Sway, read_motion_file
+from rhot_app.simulator.scene.motion import Sway
+from rhot_app.simulator.scene.motion_file import read_motion_file
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_node.files import resource_path
 

@@ -14,7 +14,8 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import build_model
 from rhot_app.objects.object_file import ObjectModel, cube, plate
 from rhot_app.objects.observations import FiducialFrame
-from rhot_app.simulator.scene.motion import Motion, load_motion
+from rhot_app.simulator.scene.motion import Motion
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_node.files import resource_path
 

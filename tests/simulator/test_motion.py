@@ -13,7 +13,8 @@ from shipped_rig import RIGHT_MODEL as MODEL
 from rhot_app.errors import RigError
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import ANGLES, HandPose
-from rhot_app.simulator.scene.motion import FACING, load_motion, motion_names
+from rhot_app.simulator.scene.motion import FACING
+from rhot_app.simulator.scene.motion_file import load_motion, motion_names
 from rhot_node.files import resource_path
 
 CENTRE = np.array([0.0375, 0.0, 0.6])

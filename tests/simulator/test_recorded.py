@@ -11,7 +11,8 @@ from shipped_rig import RIGHT_MODEL as MODEL
 from rhot_app.errors import SimulatorError
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
-from rhot_app.simulator.scene.motion import FACING, load_motion
+from rhot_app.simulator.scene.motion import FACING
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.simulator.scene.recorded import Landmarks, fit_poses, read_landmarks
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "hand_motion"

@@ -10,13 +10,13 @@ import pytest
 from rhot_app.simulator.film import pictures, shot
 from rhot_app.simulator.render import camera_controls
 from rhot_app.simulator.render import camera_controls as controls
-from rhot_app.simulator.scene import motion, scene
+from rhot_app.simulator.scene import motion_file, scene
 from rhot_app.simulator.scene import scene_description as shows
 
 PAGE = (Path(__file__).parents[2] / "docs" / "twin.md").read_text()
 FORMATS: list[tuple[str, int, tuple[type[msgspec.Struct], ...]]] = [
     (scene.FORMAT, scene.VERSION, (scene.TwinSettings, scene.Preset, camera_controls.Lamp, controls.Controls)),
-    (motion.FORMAT, motion.VERSION, (motion.MotionFile, motion.Key, motion.Sway)),
+    (motion_file.FORMAT, motion_file.VERSION, (motion_file.MotionFile, motion_file.Key, motion_file.Sway)),
     (shot.FORMAT, shot.VERSION, (shot.ShotFile, shows.HandShow, shows.BareHandShow, shows.BoardShow, shows.RulerShow,
                                  shows.MarkerShow)),
     (pictures.FORMAT, pictures.VERSION, (pictures.PicturesFile, pictures.Picture)),

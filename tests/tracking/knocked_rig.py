@@ -14,7 +14,8 @@ from rhot_app.geometry.transforms import rigid
 from rhot_app.project import CameraPose, Rig
 from rhot_app.simulator.film.ideal_observations import ORDINARY, ObservationNoise, ideal_observations
 from rhot_app.simulator.film.shot import make_shot
-from rhot_app.simulator.scene.motion import Key, MotionFile, Sway
+from rhot_app.simulator.scene.motion import Sway
+from rhot_app.simulator.scene.motion_file import Key, MotionFile
 from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_defaults
 from rhot_app.sources.local_nodes import NodePorts
 from rhot_app.tracking.tracker import CameraObservations

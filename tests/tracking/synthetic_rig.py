@@ -17,7 +17,7 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import build_model
 from rhot_app.project import CameraPose, FilterSettings, Intrinsics, Rig, RigNode
 from rhot_app.simulator.render.body import build_body
-from rhot_app.simulator.scene.motion import load_motion
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.state import HandState, Knowledge
 from rhot_app.tracking.tracker import CameraObservations, Tracker
 from rhot_node.markers import MarkerSet

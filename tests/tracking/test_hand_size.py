@@ -6,7 +6,7 @@ from modelled_hand import model_rig
 
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.simulator.scene.motion import FACING
-from rhot_app.tracking.markers.acquisition import Located
+from rhot_app.tracking.locate import Located
 from rhot_app.tracking.markers.hand_size import FOLLOW_S, GRID, HandSize
 from rhot_app.tracking.markers.marker_model import LEAST_SIZE_SD, USUAL_SIZE_SD, compile_markers
 

@@ -11,7 +11,7 @@ from synthetic_rig import EPOCH_NS, WIDE, Viewing, compare, hand_trajectory, mak
 
 from rhot_app.hand.model import build_model
 from rhot_app.project import FilterSettings, Rig, TrackerSettings
-from rhot_app.simulator.scene.motion import load_motion
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.tracking.rig_arrays import compile_rig
 from rhot_app.tracking.scene import make_tracker
 

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from rhot_app.errors import ExportError
 from rhot_app.export.formats.bones import PARENTS, TURNING, Skeleton, skeleton_of
-from rhot_app.export.plan import Plan, file_from_frame, frame_up
+from rhot_app.export.frames import file_from_frame, frame_up
+from rhot_app.export.plan import Plan
 from rhot_app.export.states import HandStates
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import JOINTS

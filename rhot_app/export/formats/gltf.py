@@ -8,10 +8,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.errors import ExportError
+from rhot_app.errors import ExportError, require
 from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.export.formats.bones import PARENTS, TIPS, TURNING, Skeleton, skeleton_of
-from rhot_app.export.plan import Plan, file_from_frame, frame_up, require
+from rhot_app.export.frames import file_from_frame, frame_up
+from rhot_app.export.plan import Plan
 from rhot_app.export.states import HandStates
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.kinematics import forward

@@ -11,8 +11,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.errors import require
 from rhot_app.estimation.se3 import quaternion_from_rotation
-from rhot_app.export.plan import Plan, require
+from rhot_app.export.plan import Plan
 from rhot_app.export.states import CONDITIONS, OBJECT_ARRAYS, VALIDITIES, HandStates
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import OTHER_HAND

@@ -8,8 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.errors import ExportError
-from rhot_app.export.plan import Axes, Plan, file_from_frame, frame_up, require
+from rhot_app.errors import ExportError, require
+from rhot_app.export.frames import Axes, file_from_frame, frame_up
+from rhot_app.export.plan import Plan
 from rhot_app.export.states import HandStates, hidden_where_lost
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND

@@ -7,8 +7,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from rhot_app.errors import require
 from rhot_app.estimation.se3 import quaternion_from_rotation
-from rhot_app.export.plan import Plan, require
+from rhot_app.export.plan import Plan
 from rhot_app.export.states import HandStates
 from rhot_app.hand.skeleton import ANGLES
 from rhot_app.project import OTHER_HAND

@@ -37,7 +37,8 @@ from rhot_app.simulator.render.exposure_samples import Shutter
 from rhot_app.simulator.render.painter import KeptPainter, PoseSource
 from rhot_app.simulator.render.render import Exposure, FrameRenderer, Optics
 from rhot_app.simulator.scene.background import background_image
-from rhot_app.simulator.scene.motion import BACK_FACING, FACING, load_motion
+from rhot_app.simulator.scene.motion import BACK_FACING, FACING
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.simulator.scene.scene import Background, make_scene, twin_defaults
 from rhot_node.detect.image import from_i420, to_bgr
 

@@ -27,7 +27,8 @@ from rhot_app.simulator.render.painter import Image, Painter, PoseSource
 from rhot_app.simulator.render.sheet import Sheet, board_sheet, ruler_sheet
 from rhot_app.simulator.render.sheet_painter import SheetPainter
 from rhot_app.simulator.render.solids_painter import SolidsPainter
-from rhot_app.simulator.scene.motion import BACK_FACING, Motion, load_motion
+from rhot_app.simulator.scene.motion import BACK_FACING, Motion
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.simulator.scene.rigid_target import BALL_RADIUS_M, BoardPoses, RigidTarget, ball_on_stick
 from rhot_app.simulator.scene.scene import Scene
 from rhot_app.simulator.scene.scene_description import (

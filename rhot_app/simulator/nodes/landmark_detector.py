@@ -22,7 +22,7 @@ from rhot_app.hand.landmarks import LASTING_S
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettings
-from rhot_app.simulator.scene.motion import load_motion
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.files import resource_path
 from rhot_node.markers import MarkerSet, load_markers

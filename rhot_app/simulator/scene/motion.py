@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import pairwise
-from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated
 
 import msgspec
 import numpy as np
@@ -14,68 +12,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from rhot_app.errors import RigError, SimulatorError
-from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, HandPose
-from rhot_node.files import read_document, resource_path
-
-# -- the file ``rhot-motion`` ------------------------------------------------------------------------------------------
-
-FORMAT: Final = "rhot-motion"
-VERSION: Final = 1
-
-NotNegative = Annotated[float, Meta(ge=0)]
-
-
-class Key(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A pose at a time: offsets from an open hand that shows its palm to the cameras, fingers up.
-
-    Position and rotation vector in the cameras' axes: x right, y down, z away.
-    """
-
-    t_s: NotNegative
-    position_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    rotation_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    angles_deg: dict[str, float] = {}
-
-
-class Sway(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What no hand can help, rms per axis: slow sway, and physiological tremor at 8 to 12 Hz. Seeds differ in it."""
-
-    position_mm: NotNegative = 0.0
-    rotation_deg: NotNegative = 0.0
-    angle_deg: NotNegative = 0.0
-    tremor_mm: NotNegative = 0.0
-
-
-class MotionFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A motion of one period that repeats. `base_deg` are joint angles that hold where a key names no other."""
-
-    name: str
-    description: str
-    period_s: Annotated[float, Meta(gt=0)]
-    keys: Annotated[tuple[Key, ...], Meta(min_length=1)]
-    base_deg: dict[str, float] = {}
-    sway: Sway = Sway()
-    format: Literal["rhot-motion"] = FORMAT
-    version: Literal[1] = VERSION
-
-    def __post_init__(self) -> None:
-        times = [key.t_s for key in self.keys]
-        if any(b <= a for a, b in pairwise(times)) or times[-1] >= self.period_s:
-            raise ValueError("keys must increase in t_s and end before period_s")
-        for angles in (self.base_deg, *(key.angles_deg for key in self.keys)):
-            unknown = sorted(set(angles) - set(ANGLES))
-            if unknown:
-                raise ValueError(f"there is no joint angle {unknown[0]!r}; they are {', '.join(ANGLES)}")
-
-
-def read_motion_file(path: Path) -> MotionFile:
-    """Read and validate a motion file; raises RigError naming file and field."""
-    return read_document(path, MotionFile, format_name=FORMAT, version=VERSION, error=RigError)
-
-
-# -- interpolation -----------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -93,6 +30,18 @@ VALUES = 6 + len(ANGLES)
 
 _SWAY_HZ = np.array([0.11, 0.19, 0.31, 0.47, 0.71])
 _TREMOR_HZ = np.array([8.3, 9.7, 11.6])
+
+
+NotNegative = Annotated[float, Meta(ge=0)]
+
+
+class Sway(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What no hand can help, rms per axis: slow sway, and physiological tremor at 8 to 12 Hz. Seeds differ in it."""
+
+    position_mm: NotNegative = 0.0
+    rotation_deg: NotNegative = 0.0
+    angle_deg: NotNegative = 0.0
+    tremor_mm: NotNegative = 0.0
 
 
 class SwayCurve:
@@ -149,41 +98,3 @@ class Motion:
         """The pose at one scene time, s."""
         transforms, angles = self.sample(np.array([t_s]))
         return HandPose(transforms[0], angles[0])
-
-
-def motion_names() -> list[str]:
-    """Names of the motions that ship with the project."""
-    return sorted(path.stem for path in resource_path("motions").glob("*.json"))
-
-
-def keyed_motion(file: MotionFile, model: HandModel, centre: Array, seed: int) -> Motion:
-    """The repeating motion of a keyframe file about `centre` (3,) m, the middle of the hand."""
-    base = np.array([np.radians(file.base_deg.get(name, 0.0)) for name in ANGLES])
-    rows = []
-    for key in file.keys:
-        angles = base.copy()
-        for name, degrees in key.angles_deg.items():
-            angles[ANGLES.index(name)] = np.radians(degrees)
-        rows.append(np.concatenate([1e-3 * np.array(key.position_mm), np.radians(key.rotation_deg), angles]))
-    times = np.array([*(key.t_s for key in file.keys), file.keys[0].t_s + file.period_s])
-    curve = CubicSpline(times, np.array([*rows, rows[0]]), bc_type="periodic", extrapolate="periodic")
-    return Motion(file.name, file.period_s, True, curve, centre + np.array([0.0, WRIST_BELOW_CENTRE_M, 0.0]),
-                  model.limits, SwayCurve(file.sway, seed))
-
-
-def load_motion(source: str, model: HandModel, centre: Array, seed: int) -> Motion:
-    """The motion named `source`, or of the keyframe file (.json) or recording (.tsv, .csv) at that path.
-
-    `centre` (3,) m in the rig frame is where the middle of the hand stands. Raises SimulatorError when there is no
-    such motion, RigError when the file is not one.
-    """
-    path = Path(source)
-    if source in motion_names():
-        path = resource_path("motions", f"{source}.json")
-    elif not path.exists():
-        raise SimulatorError(f"there is no motion {source!r}: neither a file nor one of {', '.join(motion_names())}.")
-    if path.suffix.lower() in (".tsv", ".csv"):
-        from rhot_app.simulator.scene.recorded import recorded_motion  # fitting is slow to import and rarely wanted
-
-        return recorded_motion(path, model, centre)
-    return keyed_motion(read_motion_file(path), model, centre, seed)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import TIP_ROLES, WRIST_ROLE, HandPose
 from rhot_app.hand.solvers.finger_ik import solve_fingers
 from rhot_app.hand.solvers.palm_fit import TIPS_WITHOUT_WRIST, fit_palm, palms_before_camera
-from rhot_app.tracking.locate import locate_paired, rig_table
+from rhot_app.tracking.locate import Located, locate_paired, rig_table
 from rhot_app.tracking.markers.hand_size import Posture, implausibility
 from rhot_app.tracking.markers.marker_model import MarkerModel
 from rhot_app.tracking.markers.marker_residual import MarkerFrame
@@ -54,16 +53,6 @@ START_SD = 0.03, 0.5
 """m and rad: standard deviation of the palm's pose as it is first found."""
 
 _TARGET_SD_M = 1e-3
-
-
-class Located(NamedTuple):
-    """Where M markers were at `t_ns`, master ns: `positions` (M, 3) m, world, with `covariances` (M, 3, 3) m^2, NaN
-    where not located; `clear` (M,) bool: by two cameras that saw it beyond doubt."""
-
-    t_ns: int
-    positions: Array
-    covariances: Array
-    clear: NDArray[np.bool_]
 
 
 class Starter:

@@ -29,7 +29,8 @@ from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.association import GATE, MarkerAssociation
-from rhot_app.tracking.markers.acquisition import START_SD, Located, Starter, pose_before_camera, pose_on_plane
+from rhot_app.tracking.locate import Located
+from rhot_app.tracking.markers.acquisition import START_SD, Starter, pose_before_camera, pose_on_plane
 from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObservations
 from rhot_app.tracking.markers.hand_size import HandSize
 from rhot_app.tracking.markers.marker_model import MarkerModel, compile_markers

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from itertools import chain, combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -29,10 +29,8 @@ from rhot_app.estimation.track import comes_late
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.limits import PERSON_LIMIT_SD_RAD, PosePrior
 from rhot_app.hand.solvers.pose_descent import SIZE, WORLD, PoseProblem, linearise_pose, pose_state
+from rhot_app.tracking.locate import Located
 from rhot_app.tracking.markers.marker_model import LEAST_SIZE_SD, USUAL_SIZE_SD
-
-if TYPE_CHECKING:
-    from rhot_app.tracking.markers.acquisition import Located
 
 Array = NDArray[np.float64]
 

@@ -29,8 +29,7 @@ from rhot_app.export.gaps import LONGEST_S
 from rhot_app.export.plan import ExportOptions, Units
 from rhot_app.export.process import export_apart, first_states
 from rhot_app.export.resample import MOST_HZ
-from rhot_app.export.states import HandStates
-from rhot_app.export.tables import columns
+from rhot_app.export.states import HandStates, columns
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig
 from rhot_app.ui.common.job import Job

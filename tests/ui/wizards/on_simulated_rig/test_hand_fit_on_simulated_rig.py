@@ -15,7 +15,7 @@ from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.rig_history import versions
-from rhot_app.simulator.scene.motion import load_motion
+from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.simulator.scene.scene import twin_defaults
 from rhot_app.simulator.scene.scene_description import HandShow
 
