@@ -221,7 +221,7 @@ def _make_folder(folder: Path) -> None:
 def _link_unchanged(old: Path, old_hashes: dict[str, str], new: Path, hashes: dict[str, str]) -> None:
     """Link the code in `old` of modules whose hash is the same.
 
-    numba keeps ``f`` of ``package/module.py`` in files named ``module.f-LINE...``. Their folder's name is ``package``
+    numba keeps ``f`` of ``PACKAGE/MODULE.py`` in files named ``MODULE.f-LINE...``. Their folder's name is ``PACKAGE``
     and the hash of its path.
     """
     root = Path(__file__).parent.parent

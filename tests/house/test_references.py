@@ -10,9 +10,12 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PROSE = re.compile(r'("""|\'\'\')(.*?)\1|#[^\n]*', re.DOTALL)
 REFERENCE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
+LITERAL = re.compile(r"``([^`\n]+)``")
 PATH = re.compile(r"(\./)?([\w.-]+/)+[\w.-]+\.(py|md|json|toml)")
 NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 WORD = re.compile(r"[A-Za-z_]\w*")
+PLACEHOLDER = re.compile(r"(?<![A-Za-z])[A-Z]{2,}(?![A-Za-z])")
+PACKAGES = "rhot_app", "rhot_node"
 OTHERS = sys.stdlib_module_names | {"cv2", "msgspec", "numba", "numpy", "scipy", "zmq"}
 
 
@@ -54,14 +57,33 @@ class Repository:
             return False
         if any(len(word) > 2 and word not in self.words for word in reference.split(".")):
             return True
-        return bool(prefix) and prefix.islower() and last[0].isupper() and last not in self.modules.get(prefix, ())
+        if prefix and prefix.islower() and last[0].isupper() and last not in self.modules.get(prefix, ()):
+            return True
+        return self.lacks_path(reference)
+
+    def lacks_path(self, reference: str) -> bool:
+        """Whether it begins as a path of modules does, and ends in what is none and stands in none: of
+        ``folder.module.name`` the module has the name. A module alone may be a variable's name as well."""
+        if PATH.fullmatch(reference) and not PLACEHOLDER.search(reference):
+            return reference.removeprefix("./") not in self.paths
+        if not NAME.fullmatch(reference):
+            return False
+        parts = reference.removeprefix("tests.").split(".")
+        for cut in range(len(parts), 1 if parts[0] not in PACKAGES else 0, -1):
+            start = ".".join(parts[:cut])
+            if start in self.modules:
+                return cut < len(parts) and parts[cut] not in self.modules[start]
+            if start.replace(".", "/") in self.paths:
+                return cut < len(parts)
+        return parts[0] in PACKAGES
 
 
 def missing(repository: Repository, texts: dict[str, str]) -> list[str]:
     """Where each reference stands that leads nowhere."""
     return [f"{path}:{text.count(chr(10), 0, prose.start() + found.start()) + 1}: {found[1]}"
             for path, text in texts.items() for prose in PROSE.finditer(text)
-            for found in REFERENCE.finditer(prose[0]) if repository.lacks(found[1].removesuffix("()"))]
+            for pattern, lacks in ((REFERENCE, repository.lacks), (LITERAL, repository.lacks_path))
+            for found in pattern.finditer(prose[0]) if lacks(found[1].removesuffix("()"))]
 
 
 def test_what_is_referred_to_is_there() -> None:
@@ -70,9 +92,12 @@ def test_what_is_referred_to_is_there() -> None:
     elsewhere = "geometry.camera.Outcome"
     nowhere = "".join(("no", "thing_of", "_the_kind"))
     stale = {"a.py": f'"""See `{nowhere}`, `triangulate`, `geometry.triangulate.Outcome`, `tracking/locate.py`."""\n'
-                     f"x = 1  # as `{elsewhere}`, `{nowhere}.triangulate`, `tracking/{nowhere}.py`\n"}
-    assert missing(repository, stale) == [f"a.py:1: {nowhere}", f"a.py:2: {elsewhere}",
-                                          f"a.py:2: {nowhere}.triangulate", f"a.py:2: tracking/{nowhere}.py"]
+                     f"x = 1  # as `{elsewhere}`, `{nowhere}.triangulate`, `tracking/{nowhere}.py`\n"
+                     f"# `geometry.triangulate.{nowhere}`, ``a/{nowhere}.py``, ``rhot_app.{nowhere}``, ``a.b``\n"}
+    assert missing(repository, stale) == [
+        f"a.py:1: {nowhere}", f"a.py:2: {elsewhere}", f"a.py:2: {nowhere}.triangulate",
+        f"a.py:2: tracking/{nowhere}.py", f"a.py:3: geometry.triangulate.{nowhere}", f"a.py:3: a/{nowhere}.py",
+        f"a.py:3: rhot_app.{nowhere}"]
     assert not missing(repository, repository.texts)
 
 
