@@ -66,7 +66,7 @@ class Watch:
 
 
 def resident_mb(pid: int | str) -> float:
-    """Memory of a process that is resident, NaN when there is none."""
+    """SettingsStore of a process that is resident, NaN when there is none."""
     try:
         status = Path(f"/proc/{pid}/status").read_text()
     except OSError:

@@ -84,7 +84,7 @@ def judge(summary: str, findings: list[Finding]) -> Verdict:
     return Verdict(f"{opening}: {summary}", ordered)
 
 
-def judged_anew(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
+def with_findings(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
     """The verdict with more findings: what was seen after it was reached."""
     return judge(verdict.sentence.partition(": ")[2], [*verdict.findings, *findings]) if findings else verdict
 

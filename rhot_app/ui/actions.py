@@ -11,7 +11,7 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.state_badge import StateBadge
 from rhot_app.ui.scene.ellipsoid_mesh import LARGER
 from rhot_app.ui.scene.page import SceneBar
-from rhot_app.ui.wizards.framework.plan import WIZARDS
+from rhot_app.ui.wizards.framework.definition import WIZARDS
 
 CLOUD_KINDS = (("joints", "Of the hand's inner joints; the estimator estimates them."),
                ("fingertips", "Of the fingertips; the estimator estimates them."),

@@ -40,7 +40,7 @@ from rhot_app.ui.simulated_rig_menus import LensCaps, TwinShows
 from rhot_app.ui.status_words import RigFileWatch, label_of, look_of, notices_of
 from rhot_app.ui.tracked_objects import TrackedObjects
 from rhot_app.ui.welcome import WelcomePage
-from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD, WIZARDS, wizard_named
+from rhot_app.ui.wizards.framework.definition import OPEN_WIZARD, WIZARDS, wizard_named
 from rhot_app.ui.wizards.launcher import Launcher
 
 TICK_MS = 16

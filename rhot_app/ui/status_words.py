@@ -16,7 +16,7 @@ from rhot_app.ui.common.controller import RESTART_ENGINE, RESTART_TWIN, Controll
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
 from rhot_app.ui.models.words import NO_ENGINE, NO_RIG, STARTING, Look, condition_look
-from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD, wizard_named
+from rhot_app.ui.wizards.framework.definition import OPEN_WIZARD, wizard_named
 
 
 def look_of(controller: Controller) -> Look:

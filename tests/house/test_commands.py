@@ -19,7 +19,7 @@ from rhot_app.__main__ import SUBCOMMANDS, parse
 from rhot_app.__main__ import main as rhot
 from rhot_app.calibration.calibrate_command import FILES
 from rhot_app.calibration.registry import COMMANDS as CALIBRATING
-from rhot_app.ui.wizards.framework.plan import WIZARDS
+from rhot_app.ui.wizards.framework.definition import WIZARDS
 from rhot_node.__main__ import daemon_parser
 from rhot_node.commands import COMMANDS, parser_of
 

@@ -16,7 +16,7 @@ RETIRED = frozenset((
     "forgetting", "reappearing", "share", "desk", "slots", "lean", "company", "whereabouts", "litter", "strays",
     "warmth", "door", "tap", "admission", "act", "stage", "prop", "stations", "spans", "moments", "honesty", "honest",
     "alterations", "takes", "trial", "disagreement", "misfits", "voice", "teller", "passing", "looker", "theatre",
-    "clothes", "moods", "doubts"))
+    "clothes", "moods", "doubts", "coach"))
 """Words of our own for what has a name: pose prior, gate, robust weight, occlusion, workspace, illuminant, validator,
 record sink, authentication, scene object, rigid target, board poses, exposure samples, consistency, fault injection,
 data set, run, outlier."""

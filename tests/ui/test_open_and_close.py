@@ -27,7 +27,7 @@ from rhot_app.ui.dialogs import dialogs
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
 from rhot_app.ui.main_window import MainWindow
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.framework.plan import WIZARDS, Wizard
+from rhot_app.ui.wizards.framework.definition import WIZARDS, Wizard
 from rhot_app.ui.wizards.framework.window import WizardWindow
 
 ROUNDS, MANY = 3, 100

@@ -9,7 +9,7 @@ import pytest
 from rhot_app.errors import SimulatorError
 from rhot_app.ui.backend.session import key_of, show_named
 from rhot_app.ui.simulated_rig_menus import TITLE
-from rhot_app.ui.wizards.framework.plan import wizard_named
+from rhot_app.ui.wizards.framework.definition import wizard_named
 
 
 def ticked(bench):

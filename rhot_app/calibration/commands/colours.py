@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     """Learn, judge, print and write. Raises CalibrationError or SettingsError before anything is printed."""
     from rhot_app.calibration.colour.colours import solve_colours
     from rhot_app.calibration.colour.samples import ColourSamples
-    from rhot_app.calibration.verdict import judged_anew
+    from rhot_app.calibration.verdict import with_findings
     from rhot_app.progress import ProgressLine
     from rhot_node.markers import load_markers, save_markers
 
@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     line = ProgressLine("colours", sys.stderr)
     report = solve_colours(collector.samples, collector.views, skin=skin, base=base, progress=line.report)
     line.finish()
-    verdict, written = judged_anew(report.verdict, [*unreadable, *_note_enlarged(enlarged)]), ""
+    verdict, written = with_findings(report.verdict, [*unreadable, *_note_enlarged(enlarged)]), ""
     if report.verdict.acceptable:
         try:
             save_markers(args.out, report.markers)

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
     from rhot_app.calibration.depth.fit import fit_depth, replaced_calibration
     from rhot_app.calibration.depth.table import read_depth_table
-    from rhot_app.calibration.verdict import judged_anew
+    from rhot_app.calibration.verdict import with_findings
     from rhot_app.project import load_rig
     from rhot_app.rig_history import accept
 
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     report = fit_depth(read_depth_table(args.table), _geometry(args, rig))
     verdict, written = report.verdict, ""
     if rig is not None and args.out is not None and verdict.acceptable:
-        verdict = judged_anew(verdict, replaced_calibration(rig))
+        verdict = with_findings(verdict, replaced_calibration(rig))
         accept(args.out, msgspec.structs.replace(rig, depth=report.settings), DEPTH.reason)
         written = str(args.out)
     return show(_fields(report), _lines(report), verdict, as_json=args.json, written=written)

@@ -14,7 +14,7 @@ from rhot_app.handfit.session import HandFit
 from rhot_app.handfit.state import FitState
 from rhot_app.ui.common.job import Job, Progress
 from rhot_app.ui.handfit.frame import Kept
-from rhot_app.ui.wizards.framework.plan import Memory
+from rhot_app.ui.wizards.framework.plan import SettingsStore
 
 FOLDER_KEY = "fit/folder"
 
@@ -33,7 +33,7 @@ class Changes(QObject):
     said = Signal()
     used = Signal()
 
-    def __init__(self, fit: HandFit, kept: Kept, memory: Memory, window: QWidget) -> None:
+    def __init__(self, fit: HandFit, kept: Kept, memory: SettingsStore, window: QWidget) -> None:
         super().__init__(window)
         self.fit, self._kept, self._memory, self._window = fit, kept, memory, window
         self.message, self.bad = fit.warning, False

@@ -17,7 +17,7 @@ from rhot_app.ui.backend.feed import LiveFeed
 from rhot_app.ui.handfit.changes import FOLDER_KEY, Changes
 from rhot_app.ui.handfit.files import in_order, is_video, read_instant
 from rhot_app.ui.handfit.frame import FitFrame
-from rhot_app.ui.wizards.framework.plan import Memory
+from rhot_app.ui.wizards.framework.plan import SettingsStore
 from rhot_node.pictures import VIDEO_SUFFIXES
 
 TITLE: Final = "Fit the hand to pictures"
@@ -41,7 +41,7 @@ class LiveCameras:
 class Instants(QObject):
     """The list of instants; `cameras`: None without running ones."""
 
-    def __init__(self, changes: Changes, frame: FitFrame, memory: Memory, cameras: LiveCameras | None,
+    def __init__(self, changes: Changes, frame: FitFrame, memory: SettingsStore, cameras: LiveCameras | None,
                  window: QWidget) -> None:
         super().__init__(window)
         self._changes, self._fit, self._frame, self._memory = changes, changes.fit, frame, memory

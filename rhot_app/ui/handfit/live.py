@@ -20,14 +20,14 @@ from rhot_app.ui.handfit.instants import LiveCameras
 from rhot_app.ui.handfit.window import REASON, HandFitWindow
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.proposal import RigChange
-from rhot_app.ui.wizards.framework.plan import Memory
+from rhot_app.ui.wizards.framework.plan import SettingsStore
 
 RECENT_S = 0.5
 """s: a pose that was tracked so lately is where a hand held still is now."""
 
 
 def fit_live(fit: HandFit, path: Path | None, connect: Callable[[], Asker], listen: Callable[[], Listener],
-             scheme: Scheme, memory: Memory, parent: QWidget | None) -> HandFitWindow:
+             scheme: Scheme, memory: SettingsStore, parent: QWidget | None) -> HandFitWindow:
     """The window of `fit` on the engine's rig, whose file is at `path`; None: it came from no file."""
     nodes = [node for node in fit.rig.nodes if not node.text_datagrams]
     feed, states = LiveFeed({node.name: node.node_id for node in nodes}, connect), StateFeed(listen)

@@ -19,7 +19,7 @@ from rhot_app.ui.handfit.changes import Changes
 from rhot_app.ui.handfit.frame import FitFrame, Kept
 from rhot_app.ui.handfit.instants import TITLE, Instants, LiveCameras
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.framework.plan import Memory
+from rhot_app.ui.wizards.framework.plan import SettingsStore
 
 REASON: Final = "hand fitted to pictures"
 """In the history of a rig file."""
@@ -35,7 +35,7 @@ class HandFitWindow(QDialog):
 
     used = Signal()
 
-    def __init__(self, fit: HandFit, scheme: Scheme, memory: Memory, kept: Kept, live: LiveCameras | None = None,
+    def __init__(self, fit: HandFit, scheme: Scheme, memory: SettingsStore, kept: Kept, live: LiveCameras | None = None,
                  parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.fit, self.cameras, self._memory = fit, live, memory

@@ -15,7 +15,7 @@ To add one:
    same place. The Calibrate menu, `rhot calibrate` and the history follow;
 2. write the steps in ``steps/NAME_steps.py``, and test them without Qt: call `take` with what `see` returns, look at
    `view`. Long work is a `models.step.SolveStep`;
-3. write ``make_plan(kit) -> Plan`` in ``NAME.py``, with the pages that are its own; the last page is a
+3. write ``make_wizard(context) -> Definition`` in ``NAME.py``, with the pages that are its own; the last page is a
    `framework.page.AcceptPage` on a `models.step.AcceptStep`. The function given to that returns a
    `rhot_app.ui.models.proposal.Proposal`: rows before and after, the verdict, and the changes (`RigChange`,
    `NodeChange`) that put it into force and take it back. Nothing else writes anything;
@@ -25,7 +25,7 @@ To add one:
 
 The work of a `SolveStep` is a `models.step.Task`: a module function without Qt with a `progress` argument. It runs in a
 process of its own (`rhot_app.ui.backend.solver`) with remaining time and cancel, while pictures stay live. What
-`kit.connect()` gives is used in workers only: `Job`, `Proposal.use`, `Plan.put_back`.
+`context.connect()` gives is used in workers only: `Job`, `Proposal.use`, `Definition.put_back`.
 
 Live pictures (`rhot_app.ui.backend.feed`) are the nodes' stills in full size; `framework.work.PictureWorker` calls
 `see` with the newest of all cameras. What a step draws over them is in `models.drawing`, in px of the full frame.

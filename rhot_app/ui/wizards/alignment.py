@@ -14,8 +14,8 @@ from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page
-from rhot_app.ui.wizards.framework.plan import Kit, Memory, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep, StepView
 from rhot_app.ui.wizards.steps.alignment_steps import (
     KINDS,
@@ -29,15 +29,16 @@ from rhot_app.ui.wizards.steps.alignment_steps import (
 _KIND, _DETAIL, _TRACKER = "pose source", "pose source detail", "pose tracker"  # as they are remembered
 
 
-def make_plan(kit: Kit, poses: PoseFeed | None = None, now_ns: Callable[[], int] = time.monotonic_ns) -> Plan:
+def make_wizard(context: WizardContext, poses: PoseFeed | None = None,
+                now_ns: Callable[[], int] = time.monotonic_ns) -> Definition:
     """Connect, move both, look at the fit, use it. `poses` hears the other tracker; `now_ns` is the master's clock."""
-    if kit.listen is None:
+    if context.listen is None:
         raise EngineError("this window cannot hear the hand; open the wizard from the main window.")
-    states, poses = StateFeed(kit.listen), poses or PoseFeed()
-    simulated = simulated_kind(kit.rig_path)
+    states, poses = StateFeed(context.listen), poses or PoseFeed()
+    simulated = simulated_kind(context.rig_path)
     source = SourceStep(KINDS if simulated is None else (simulated, *KINDS), poses)
-    together = TogetherStep(kit.rig.markers.ids, poses, states.recent, now_ns)
-    solver = AlignmentSolver(together, kit.rig_path)
+    together = TogetherStep(context.rig.markers.ids, poses, states.recent, now_ns)
+    solver = AlignmentSolver(together, context.rig_path)
     solve = SolveStep(solver.task, lambda result: result.report.verdict, charts_of)
     accept = AcceptStep(lambda: solver.propose(solve.report), "Record a movement of both first.")
 
@@ -45,16 +46,16 @@ def make_plan(kit: Kit, poses: PoseFeed | None = None, now_ns: Callable[[], int]
         poses.stop()
         states.stop()
 
-    pages = (SourcePage(source, kit.memory), TogetherPage(together, states, kit), ChartPage(solve, kit.scheme),
-             AcceptPage(accept, kit.scheme))
-    return Plan(ALIGNMENT.title, pages, solver="rhot_app.ui.wizards.steps.alignment_steps",
+    pages = (SourcePage(source, context.memory), TogetherPage(together, states, context),
+             ChartPage(solve, context.scheme), AcceptPage(accept, context.scheme))
+    return Definition(ALIGNMENT.title, pages, solver="rhot_app.ui.wizards.steps.alignment_steps",
                 put_back=end)
 
 
 class SourcePage(Page):
     """Chooses the source and shows whether its poses come."""
 
-    def __init__(self, step: SourceStep, memory: Memory) -> None:
+    def __init__(self, step: SourceStep, memory: SettingsStore) -> None:
         super().__init__(step)
         self.source, self._memory = step, memory
         self.kind, self.detail, self.tracker = QComboBox(), QLineEdit(), QLineEdit()
@@ -107,9 +108,9 @@ class SourcePage(Page):
 class TogetherPage(Page):
     """Records both."""
 
-    def __init__(self, step: TogetherStep, states: StateFeed, kit: Kit) -> None:
+    def __init__(self, step: TogetherStep, states: StateFeed, context: WizardContext) -> None:
         super().__init__(step)
-        self.together, self._states, self._connect = step, states, kit.connect
+        self.together, self._states, self._connect = step, states, context.connect
         self._job: Job | None = None
         self.marker = QComboBox()
         self.marker.addItems(list(step.markers))

@@ -22,25 +22,25 @@ from rhot_app.calibration.hand.bones_report import BoneLength, BonesReport
 from rhot_app.calibration.registry import BONES
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.movement_page import Movements
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
-from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
-from rhot_app.ui.wizards.steps.bones_steps import SECONDS, EntryStep, HandStep, knowledge_of, make_coach, propose
+from rhot_app.ui.wizards.steps.bones_steps import SECONDS, EntryStep, HandStep, knowledge_of, make_guide, propose
 
 
-def make_plan(kit: Kit) -> Plan:
+def make_wizard(context: WizardContext) -> Definition:
     """Which hand, a minute of movement, the bones, use them."""
-    movements = Movements(kit)
-    entry = EntryStep(kit.rig.hand)
+    movements = Movements(context)
+    entry = EntryStep(context.rig.hand)
     page = movements.page("Move freely", "Press Record, then bend and stretch every finger and turn the hand.", SECONDS,
-                          lambda: make_coach(kit.rig))
+                          lambda: make_guide(context.rig))
     page.twin_facts = "Moves every joint: all of them within the minute."
     page.movement.unneeded = lambda: "Press Next: the bones were entered." if entry.report is not None else ""
-    hand = HandStep(entry, page.movement, kit.rig)
-    accept = AcceptStep(lambda: propose(hand.report, kit.rig, kit.rig_path), "Record the movement first.")
-    return Plan(BONES.title, (EntryPage(entry), page, HandPage(hand, kit.scheme),
-                                      AcceptPage(accept, kit.scheme)),
+    hand = HandStep(entry, page.movement, context.rig)
+    accept = AcceptStep(lambda: propose(hand.report, context.rig, context.rig_path), "Record the movement first.")
+    return Definition(BONES.title, (EntryPage(entry), page, HandPage(hand, context.scheme),
+                                      AcceptPage(accept, context.scheme)),
                 solver="rhot_app.calibration.hand.bones", put_back=movements.end)
 
 

@@ -17,18 +17,18 @@ from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.models.proposal import NodeChange
 from rhot_app.ui.wizards.framework.control_row import ControlRow
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page, shrinkable
-from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, Control, SettingsStep, Value
 
 
-def make_plan(kit: Kit) -> Plan:
+def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand."""
-    choices = CameraChoices(kit.rig.nodes, kit.node_settings)
-    step = SettingsStep(choices, kit.rig.markers)
-    tryout = Tryout(kit.connect)
-    accept = AcceptStep(lambda: step.propose(kit.rig_path),
+    choices = CameraChoices(context.rig.nodes, context.node_settings)
+    step = SettingsStep(choices, context.rig.markers)
+    tryout = Tryout(context.connect)
+    accept = AcceptStep(lambda: step.propose(context.rig_path),
                         missing="No picture shows these settings yet, or they cannot be used: go back.")
     page = CameraPage(step, tryout)
     tryout.setParent(page)
@@ -43,7 +43,7 @@ def make_plan(kit: Kit) -> Plan:
                     in_force[change.node_id]["camera"].update(change.after["camera"])
         tryout.put_back(in_force)
 
-    return Plan(CAMERA.title, (page, AcceptPage(accept, kit.scheme)), put_back=put_back)
+    return Definition(CAMERA.title, (page, AcceptPage(accept, context.scheme)), put_back=put_back)
 
 
 # -- the knobs of the camera wizard ------------------------------------------------------------------------------------

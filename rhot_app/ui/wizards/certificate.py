@@ -17,10 +17,10 @@ from rhot_app.certificate.latency import flash_edges
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.movement_page import MovementPage, Movements
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
-from rhot_app.ui.wizards.framework.plan import Kit, Plan
-from rhot_app.ui.wizards.models.movement import QuietCoach
+from rhot_app.ui.wizards.models.movement import QuietGuide
 from rhot_app.ui.wizards.models.step import SolveStep, StepView
 from rhot_app.ui.wizards.steps.certificate_steps import (
     CertificateStep,
@@ -39,33 +39,33 @@ _SEED = 7
 _SIDES = (("Palm to the cameras", "palm"), ("Back to the cameras", "back"), ("A board, no hand", None))
 
 
-def make_plan(kit: Kit) -> Plan:
+def make_wizard(context: WizardContext) -> Definition:
     """Still, ruler, rod, flash, plumb line; then the lines, and where they are kept."""
-    movements = Movements(kit)
-    ids = kit.rig.markers.ids
-    said = Statements(kit.rig, rod_markers=(ids[0], ids[1 % len(ids)]), flash_marker=ids[0])
+    movements = Movements(context)
+    ids = context.rig.markers.ids
+    said = Statements(context.rig, rod_markers=(ids[0], ids[1 % len(ids)]), flash_marker=ids[0])
 
     folder, recent = movements.folder, movements.states.recent
 
-    def still() -> QuietCoach:
-        return QuietCoach("Hold still.")
+    def still() -> QuietGuide:
+        return QuietGuide("Hold still.")
 
-    def moving() -> QuietCoach:
-        return QuietCoach("Go on.")
+    def moving() -> QuietGuide:
+        return QuietGuide("Go on.")
 
     made = {"static": movements.add(CertificateStep("static", folder, still, recent)),
             "ruler": movements.add(RulerDistances(folder, still, recent, ids[0])),
             "rod": movements.add(CertificateStep("rod", folder, moving, recent)),
             "flash": movements.add(CertificateStep("flash", folder, moving, recent)),
             "plumb": movements.add(CertificateStep("plumb", folder, still, recent))}
-    pages = (StillPage(made["static"], kit.connect, movements.states, said),
-             RulerPage(made["ruler"], kit.connect, movements.states, ids),
-             RodPage(made["rod"], kit.connect, movements.states, said),
-             FlashPage(made["flash"], kit.connect, movements.states, said),
-             MovementPage(made["plumb"], kit.connect, movements.states))
+    pages = (StillPage(made["static"], context.connect, movements.states, said),
+             RulerPage(made["ruler"], context.connect, movements.states, ids),
+             RodPage(made["rod"], context.connect, movements.states, said),
+             FlashPage(made["flash"], context.connect, movements.states, said),
+             MovementPage(made["plumb"], context.connect, movements.states))
     solve = SolveStep(lambda: task_of(said, made), verdict_of, charts_of)
-    keep = KeepStep(lambda: propose(solve.report, lambda: _place(kit.rig.name)), "Record a step first.")
-    return Plan(CERTIFICATE.title, (*pages, ChartPage(solve, kit.scheme), KeepPage(keep, kit.scheme)),
+    keep = KeepStep(lambda: propose(solve.report, lambda: _place(context.rig.name)), "Record a step first.")
+    return Definition(CERTIFICATE.title, (*pages, ChartPage(solve, context.scheme), KeepPage(keep, context.scheme)),
                 solver="rhot_app.certificate.certify", put_back=movements.end)
 
 

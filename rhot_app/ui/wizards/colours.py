@@ -25,25 +25,25 @@ from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.colour_list import PaintList, PaintRow
 from rhot_app.ui.wizards.framework.control_row import ControlRow
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartView, Page, shrinkable
-from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.camera_steps import Control, Value
 from rhot_app.ui.wizards.steps.colour_pick import PickStep
-from rhot_app.ui.wizards.steps.colour_result import BOUNDS, ApartStep, BoundsStep, matrix_cells, propose
+from rhot_app.ui.wizards.steps.colour_result import BOUNDS, BoundsStep, SeparationStep, matrix_cells, propose
 
 
-def make_plan(kit: Kit) -> Plan:
+def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand."""
-    cameras = tuple(node.name for node in kit.rig.nodes if not node.text_datagrams)
-    picks = PickStep(kit.rig.markers, cameras)
+    cameras = tuple(node.name for node in context.rig.nodes if not node.text_datagrams)
+    picks = PickStep(context.rig.markers, cameras)
     bounds = BoundsStep(picks)
-    apart = ApartStep(bounds)
-    accept = AcceptStep(lambda: propose(apart.judged, kit.rig, kit.rig_path, kit.node_settings),
+    apart = SeparationStep(bounds)
+    accept = AcceptStep(lambda: propose(apart.judged, context.rig, context.rig_path, context.node_settings),
                         "Pick the markers' colours first.")
-    pages = (PickPage(picks, kit.scheme), BoundsPage(bounds, kit.scheme), ApartPage(apart, kit.scheme),
-             AcceptPage(accept, kit.scheme))
-    return Plan(COLOURS.title, pages, solver="rhot_app.calibration.colour.colours")
+    pages = (PickPage(picks, context.scheme), BoundsPage(bounds, context.scheme), SeparationPage(apart, context.scheme),
+             AcceptPage(accept, context.scheme))
+    return Definition(COLOURS.title, pages, solver="rhot_app.calibration.colour.colours")
 
 
 # -- the page of the separability --------------------------------------------------------------------------------------
@@ -52,10 +52,10 @@ _ROW_PX = 28
 _LEAST = 0.005  # less is shown as nothing
 
 
-class ApartPage(Page):
+class SeparationPage(Page):
     """Nothing to enter: what the person can do about it stands in the verdict."""
 
-    def __init__(self, step: ApartStep, scheme: Scheme) -> None:
+    def __init__(self, step: SeparationStep, scheme: Scheme) -> None:
         super().__init__(step)
         self._apart = step
         self._shown: ColourReport | None = None

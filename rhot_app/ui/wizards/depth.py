@@ -22,22 +22,23 @@ from rhot_app.calibration.depth.table import DepthRow
 from rhot_app.calibration.registry import DEPTH
 from rhot_app.errors import EngineError
 from rhot_app.ui.backend.feed import StateFeed
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page, shrinkable
-from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.depth_steps import DistanceStep, LawStep, propose
 
 
-def make_plan(kit: Kit, clock: Callable[[], float] = time.monotonic) -> Plan:
+def make_wizard(context: WizardContext, clock: Callable[[], float] = time.monotonic) -> Definition:
     """Measure, look at the law, use it."""
-    if kit.listen is None:
+    if context.listen is None:
         raise EngineError("this window cannot hear the markers; open the wizard from the main window.")
-    states = StateFeed(kit.listen, clock)
-    distances = DistanceStep(kit.rig, states.recent)
+    states = StateFeed(context.listen, clock)
+    distances = DistanceStep(context.rig, states.recent)
     law = LawStep(distances)
-    accept = AcceptStep(lambda: propose(distances.report, kit.rig, kit.rig_path), "Measure some distances first.")
-    pages = (DistancePage(distances, states), ChartPage(law, kit.scheme), AcceptPage(accept, kit.scheme))
-    return Plan(DEPTH.title, pages, put_back=states.stop)
+    accept = AcceptStep(lambda: propose(distances.report, context.rig, context.rig_path),
+                        "Measure some distances first.")
+    pages = (DistancePage(distances, states), ChartPage(law, context.scheme), AcceptPage(accept, context.scheme))
+    return Definition(DEPTH.title, pages, put_back=states.stop)
 
 
 # -- the page of the distances -----------------------------------------------------------------------------------------

@@ -21,37 +21,37 @@ from rhot_app.calibration.registry import FILTERS
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.movement_page import MovementPage, Movements
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, shrinkable
-from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.movement import MovementStep
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.filter_steps import (
     FAST_S,
     STILL_S,
-    FastCoach,
+    FastGuide,
     LiveMeters,
-    StillCoach,
+    StillGuide,
     TuneStep,
     propose,
 )
 
 
-def make_plan(kit: Kit) -> Plan:
+def make_wizard(context: WizardContext) -> Definition:
     """Hold still, move fast, look at the charts, use it."""
-    movements, meters = Movements(kit), LiveMeters()
+    movements, meters = Movements(context), LiveMeters()
 
-    def page(title: str, sentence: str, seconds: float, coach: type[StillCoach] | type[FastCoach]) -> MeterPage:
+    def page(title: str, sentence: str, seconds: float, guide: type[StillGuide] | type[FastGuide]) -> MeterPage:
         return movements.page_of(lambda step, connect, states: MeterPage(step, connect, states, meters),
-                                 title, sentence, seconds, lambda: coach(meters))
+                                 title, sentence, seconds, lambda: guide(meters))
 
-    still = page("Hold still", "Rest the hand before both cameras, then press Record.", STILL_S, StillCoach)
-    fast = page("Move fast", "Press Record, then wave the hand briskly, 20 cm wide.", FAST_S, FastCoach)
+    still = page("Hold still", "Rest the hand before both cameras, then press Record.", STILL_S, StillGuide)
+    fast = page("Move fast", "Press Record, then wave the hand briskly, 20 cm wide.", FAST_S, FastGuide)
     still.twin_facts, fast.twin_facts = "Holds still.", "Waves briskly."
-    tune = TuneStep(lambda: (still.movement.log, fast.movement.log), kit.rig)
-    accept = AcceptStep(lambda: propose(tune.report, kit.rig, kit.rig_path, per_marker=tune.per_marker),
+    tune = TuneStep(lambda: (still.movement.log, fast.movement.log), context.rig)
+    accept = AcceptStep(lambda: propose(tune.report, context.rig, context.rig_path, per_marker=tune.per_marker),
                         "Record both movements first.")
-    return Plan(FILTERS.title, (still, fast, TunePage(tune, kit.scheme), AcceptPage(accept, kit.scheme)),
+    return Definition(FILTERS.title, (still, fast, TunePage(tune, context.scheme), AcceptPage(accept, context.scheme)),
                 solver="rhot_app.calibration.filters.tuning", put_back=movements.end)
 
 

@@ -9,39 +9,39 @@ from PySide6.QtWidgets import QPushButton
 from rhot_app.calibration.registry import FOREGROUND
 from rhot_app.errors import RhotError
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
-from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, LearningStep, SkinStep, ask_node, propose
 
 
-def make_plan(kit: Kit) -> Plan:
+def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand."""
-    cameras = {node.name: node.node_id for node in kit.rig.nodes if node.node_id in kit.node_settings}
-    empty, skin = EmptyStep(cameras), SkinStep(cameras, kit.connect)
+    cameras = {node.name: node.node_id for node in context.rig.nodes if node.node_id in context.node_settings}
+    empty, skin = EmptyStep(cameras), SkinStep(cameras, context.connect)
     accept = AcceptStep(lambda: propose(empty, skin), missing="Learn the empty scene and your hand first.")
-    pages = (LearnPage(empty, kit, "Learn the empty scene"), LearnPage(skin, kit, "Learn my skin"),
-             AcceptPage(accept, kit.scheme))
+    pages = (LearnPage(empty, context, "Learn the empty scene"), LearnPage(skin, context, "Learn my skin"),
+             AcceptPage(accept, context.scheme))
 
     def put_back() -> None:
         """What was only tried out goes, and what is being learnt is given up."""
         for step in (empty, skin):
             step.stop()
         if accept.state != "used" and (empty.tried or skin.tried):
-            with contextlib.closing(kit.connect()) as asker:
+            with contextlib.closing(context.connect()) as asker:
                 for node_id in cameras.values():
                     with contextlib.suppress(RhotError):  # a node that is gone has forgotten it anyway
                         ask_node(asker.command, node_id, "revert_foreground")
 
-    return Plan(FOREGROUND.title, pages, put_back=put_back)
+    return Definition(FOREGROUND.title, pages, put_back=put_back)
 
 
 class LearnPage(Page):
     """A button that has the nodes learn; the pictures stay live."""
 
-    def __init__(self, step: LearningStep, kit: Kit, label: str) -> None:
+    def __init__(self, step: LearningStep, context: WizardContext, label: str) -> None:
         super().__init__(step)
-        self._learning, self._kit = step, kit
+        self._learning, self._context = step, context
         self._job: Job | None = None
         self.learn_button = QPushButton(label)
         self.learn_button.setAutoDefault(False)
@@ -63,7 +63,7 @@ class LearnPage(Page):
         self.learn_button.setEnabled(self._job is None and bool(self._learning.nodes))
 
     def _ask(self) -> str:
-        with contextlib.closing(self._kit.connect()) as asker:
+        with contextlib.closing(self._context.connect()) as asker:
             return self._learning.learn(asker.command)
 
     def _learnt(self, problem: str) -> None:

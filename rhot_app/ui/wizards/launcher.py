@@ -27,8 +27,8 @@ from rhot_app.ui.common.shapes import shape_icon
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.proposal import Proposal, age_text, in_force, set_rig
 from rhot_app.ui.models.rows import rig_rows
+from rhot_app.ui.wizards.framework.definition import WIZARDS, SettingsStore, Wizard, WizardContext
 from rhot_app.ui.wizards.framework.page import RowTable
-from rhot_app.ui.wizards.framework.plan import WIZARDS, Kit, Memory, Wizard
 from rhot_app.ui.wizards.framework.window import WizardWindow
 
 if TYPE_CHECKING:  # they compile numerical code, which waits until it is wanted
@@ -54,7 +54,7 @@ class Launcher(QObject):
     failed = Signal(str)
 
     def __init__(self, connect: Callable[[], Asker], listen: Callable[[], Listener], scheme: Callable[[], Scheme],
-                 memory: Memory, window: QWidget, make_solver: Callable[[], Solver] = Solver) -> None:
+                 memory: SettingsStore, window: QWidget, make_solver: Callable[[], Solver] = Solver) -> None:
         super().__init__(window)
         self._make_solver = make_solver
         self._memory = memory
@@ -125,9 +125,9 @@ class Launcher(QObject):
 
     def _show(self, wizard: Wizard, now: RigNow) -> None:
         self._job = None
-        kit = Kit(now.rig, now.path, self._connect, self._scheme(), self._memory, now.node_settings,
+        context = WizardContext(now.rig, now.path, self._connect, self._scheme(), self._memory, now.node_settings,
                   self._listen, self._make_solver)
-        self.wizard = WizardWindow(wizard.make_plan(kit), kit, self._window)
+        self.wizard = WizardWindow(wizard.make_wizard(context), context, self._window)
         self.wizard.rig_used.connect(lambda rig: self.rig_used.emit())
         self.wizard.used.connect(lambda proposal, on: self._note(proposal, str(now.path or ""), on=on))
         self.wizard.finished.connect(self._forget)

@@ -8,9 +8,9 @@ from PySide6.QtWidgets import QAbstractItemView, QCheckBox, QComboBox, QHeaderVi
 from rhot_app.calibration.registry import LENS
 from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
+from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext
 from rhot_app.ui.wizards.framework.films_page import FilmsPage
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page, shrinkable
-from rhot_app.ui.wizards.framework.plan import Kit, Memory, Plan
 from rhot_app.ui.wizards.models.board_form import fields_from
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
 from rhot_app.ui.wizards.steps.lens_steps import LensBoardStep, LensShowStep, LensSolveStep, lens_proposal
@@ -19,23 +19,23 @@ from rhot_app.ui.wizards.steps.stereo_steps import chosen_nodes
 LAST = "lens camera"
 
 
-def make_plan(kit: Kit) -> Plan:
+def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand; it begins with the camera after the one that was done last."""
-    cameras = tuple(node.name for node in chosen_nodes(kit.rig))
-    board = LensBoardStep(fields_from(kit.memory.remembered(MEMORY)), cameras,
-                          _next(cameras, kit.memory.remembered(LAST)))
+    cameras = tuple(node.name for node in chosen_nodes(context.rig))
+    board = LensBoardStep(fields_from(context.memory.remembered(MEMORY)), cameras,
+                          _next(cameras, context.memory.remembered(LAST)))
     show = LensShowStep(board)
     solve = LensSolveStep(show)
 
     def propose() -> Proposal | None:
         if solve.report is None:
             return None
-        kit.memory.remember(LAST, board.camera)
-        return lens_proposal(kit.rig, kit.rig_path, board.camera, solve.report)
+        context.memory.remember(LAST, board.camera)
+        return lens_proposal(context.rig, context.rig_path, board.camera, solve.report)
 
-    pages = (LensBoardPage(board, kit.memory), FilmsPage(show), LensResultPage(solve),
-             AcceptPage(AcceptStep(propose), kit.scheme))
-    return Plan(LENS.title, pages, solver="rhot_app.calibration.lens.intrinsics")
+    pages = (LensBoardPage(board, context.memory), FilmsPage(show), LensResultPage(solve),
+             AcceptPage(AcceptStep(propose), context.scheme))
+    return Definition(LENS.title, pages, solver="rhot_app.calibration.lens.intrinsics")
 
 
 def _next(cameras: tuple[str, ...], done: str) -> str:
@@ -47,7 +47,7 @@ def _next(cameras: tuple[str, ...], done: str) -> str:
 class LensBoardPage(BoardPage):
     """The camera is chosen above the board's fields."""
 
-    def __init__(self, step: LensBoardStep, memory: Memory) -> None:
+    def __init__(self, step: LensBoardStep, memory: SettingsStore) -> None:
         super().__init__(step, memory)
         self.which = QComboBox()
         self.which.addItems(step.choices)

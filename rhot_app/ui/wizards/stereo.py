@@ -8,12 +8,12 @@ from rhot_app.calibration.registry import STEREO
 from rhot_app.simulator.scene.scene_description import RulerShow
 from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.films_page import FilmsPage
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
-from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.board_form import BoardStep, fields_from
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView
-from rhot_app.ui.wizards.steps.known_step import KnownStep
+from rhot_app.ui.wizards.steps.lengths_step import LengthsStep
 from rhot_app.ui.wizards.steps.stereo_steps import (
     ShowStep,
     StereoSolveStep,
@@ -24,22 +24,23 @@ from rhot_app.ui.wizards.steps.stereo_steps import (
 )
 
 
-def make_plan(kit: Kit) -> Plan:
+def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand."""
-    nodes = chosen_nodes(kit.rig)
+    nodes = chosen_nodes(context.rig)
     cameras = tuple(node.name for node in nodes)
-    board = BoardStep(fields_from(kit.memory.remembered(MEMORY)), cameras)
+    board = BoardStep(fields_from(context.memory.remembered(MEMORY)), cameras)
     show = ShowStep(board, cameras)
-    known = KnownStep(cameras)
+    known = LengthsStep(cameras)
     solve = StereoSolveStep(show, known_lenses(nodes), lambda: known.known)
     table = TableStep(board, solve, cameras)
 
     def propose() -> Proposal | None:
-        return stereo_proposal(kit.rig, kit.rig_path, solve.report, table.world) if solve.report is not None else None
+        report = solve.report
+        return None if report is None else stereo_proposal(context.rig, context.rig_path, report, table.world)
 
-    accept = AcceptPage(AcceptStep(propose), kit.scheme)
-    pages = (BoardPage(board, kit.memory), FilmsPage(show), KnownPage(known), Page(solve), Page(table), accept)
-    return Plan(STEREO.title, pages, solver="rhot_app.ui.wizards.steps.stereo_steps")
+    accept = AcceptPage(AcceptStep(propose), context.scheme)
+    pages = (BoardPage(board, context.memory), FilmsPage(show), LengthsPage(known), Page(solve), Page(table), accept)
+    return Definition(STEREO.title, pages, solver="rhot_app.ui.wizards.steps.stereo_steps")
 
 
 # -- the fields of the second known length, and clicks on the ruler's ends ---------------------------------------------
@@ -47,10 +48,10 @@ def make_plan(kit: Kit) -> Plan:
 SKIP = "Skip: lengths stay unproven"
 
 
-class KnownPage(Page):
+class LengthsPage(Page):
     """Two lengths in mm; 0 says that it was not measured. With neither, a person must say so."""
 
-    def __init__(self, step: KnownStep) -> None:
+    def __init__(self, step: LengthsStep) -> None:
         super().__init__(step)
         self._known = step
         self.pickable = True

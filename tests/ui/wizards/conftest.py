@@ -6,25 +6,26 @@ import pytest
 from fake_backend import InProcessSolver
 from patience import PATIENCE_S
 from wizard_hands import Hands
-from wizard_rig import FakeMemory
+from wizard_rig import FakeSettingsStore
 
 from rhot_app.project import save_rig
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.framework.plan import Kit
+from rhot_app.ui.wizards.framework.definition import WizardContext
 from rhot_app.ui.wizards.framework.window import WizardWindow
 
 
 def wizards(folder):
-    """Yields what opens ``make_plan(kit)`` in a window, on the rig of an asker and a file of it."""
+    """Yields what opens ``make_wizard(context)`` in a window, on the rig of an asker and a file of it."""
     opened = []
 
-    def open_(make_plan, asker, *, listen=None, make_solver=InProcessSolver, in_file=True):
+    def open_(make_wizard, asker, *, listen=None, make_solver=InProcessSolver, in_file=True):
         path = folder / "desk.json" if in_file else None
         if path is not None:
             save_rig(path, asker.rig)
-        kit = Kit(asker.rig, path, asker.connect, DARK, FakeMemory(), asker.told, listen, make_solver)
-        hands = Hands(WizardWindow(make_plan(kit), kit))
-        hands.path, hands.asker, hands.rig, hands.memory = path, asker, asker.rig, kit.memory
+        context = WizardContext(asker.rig, path, asker.connect, DARK, FakeSettingsStore(), asker.told, listen,
+                                make_solver)
+        hands = Hands(WizardWindow(make_wizard(context), context))
+        hands.path, hands.asker, hands.rig, hands.memory = path, asker, asker.rig, context.memory
         opened.append(hands)
         return hands
 

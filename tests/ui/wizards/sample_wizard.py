@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QSpinBox
 
 from rhot_app.calibration.verdict import Finding, Grade, judge
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
-from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Tag
 from rhot_app.ui.wizards.models.step import AcceptStep, AnnotatedPicture, Bar, Step, StepView, Task
 
@@ -123,15 +123,15 @@ class SolveStep(Step):
         return StepView("Look at the verdict.", done=True, verdict=self.verdict())
 
 
-def make_plan(kit: Kit, steps: int = 3) -> Plan:
+def make_wizard(context: WizardContext, steps: int = 3) -> Definition:
     """The wizard's pages."""
     solve = SolveStep(steps)
 
     def propose():
-        after = msgspec.structs.replace(kit.rig, name="calibrated")
+        after = msgspec.structs.replace(context.rig, name="calibrated")
         return Proposal("lens calibration", solve.verdict(), (Row("focal length", "530.0 px", "535.9 ± 0.4 px"),
                                                               Row("picture", "640 × 480", "640 × 480")),
-                        (RigChange(kit.rig, after, kit.rig_path, "lens calibration"),))
+                        (RigChange(context.rig, after, context.rig_path, "lens calibration"),))
 
     form, collect = FormPage(FormStep()), Page(CollectStep())
-    return Plan("Sample", (form, collect, Page(solve), AcceptPage(AcceptStep(propose), kit.scheme)))
+    return Definition("Sample", (form, collect, Page(solve), AcceptPage(AcceptStep(propose), context.scheme)))

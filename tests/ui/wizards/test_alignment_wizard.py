@@ -26,7 +26,7 @@ MARKERS = synthetic_rig().markers.ids
 def test_from_another_tracker_to_a_file_beside_the_rig_and_back(open_wizard):
     tracker = MovedTracker()
     poses = PoseFeed(lambda name, body: tracker if name == "udp:5000" else open_source(name, body))
-    hands = open_wizard(lambda kit: alignment.make_plan(kit, poses, tracker.now_ns),
+    hands = open_wizard(lambda context: alignment.make_wizard(context, poses, tracker.now_ns),
                         RecordingAsker(synthetic_rig(), write=lambda log: None), listen=tracker.listen)
     page, path = hands.window.page, alignment_path(hands.path)
     assert [page.kind.itemText(row) for row in range(page.kind.count())][:2] == ["SteamVR", "libsurvive"]

@@ -123,7 +123,7 @@ def accept(hands: Hands) -> None:
 
 def click_colours(hands: Hands) -> None:
     """Hold pictures that show the whole hand, and click each marker's paint and the skin beside the wrist."""
-    paints, view = load_markers(resource_path("markers", "rhot6.json")), hands.frame.wall.views["left"]
+    paints, view = load_markers(resource_path("markers", "rhot6.json")), hands.frame.grid.views["left"]
 
     def find() -> dict[str, tuple[float, float]]:
         found = FastDetector(paints).detect(from_bgr(view.shown.bgr)) if view.shown is not None else ()

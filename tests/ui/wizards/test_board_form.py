@@ -13,7 +13,7 @@ from msgspec.structs import replace as replace_fields
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QLabel
-from wizard_rig import FakeMemory
+from wizard_rig import FakeSettingsStore
 
 from rhot_app.__main__ import main
 from rhot_app.calibration.board.boards import STANDARD_BOARD, AprilGrid, CharucoBoard, Chessboard, CircleGrid
@@ -115,7 +115,7 @@ def test_a_board_that_nobody_measured_is_shown_but_not_done(scene):
 
 @pytest.fixture
 def memory():
-    return FakeMemory()
+    return FakeSettingsStore()
 
 
 @pytest.fixture

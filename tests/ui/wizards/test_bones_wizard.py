@@ -20,10 +20,10 @@ from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import load_rig
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
-from rhot_app.ui.wizards.bones import make_plan
-from rhot_app.ui.wizards.models.movement import QuietCoach
+from rhot_app.ui.wizards.bones import make_wizard
+from rhot_app.ui.wizards.models.movement import QuietGuide
 from rhot_app.ui.wizards.models.step import Bar
-from rhot_app.ui.wizards.steps.bones_steps import SweepCoach, make_coach, propose
+from rhot_app.ui.wizards.steps.bones_steps import SweepGuide, make_guide, propose
 
 SECONDS = 8.0
 SIZE = 1.06
@@ -43,7 +43,7 @@ def write_movement(rig, path):
 @pytest.fixture
 def hands(open_wizard):
     rig = make_rig()
-    return open_wizard(make_plan, RecordingAsker(rig, write=lambda log: write_movement(rig, log)),
+    return open_wizard(make_wizard, RecordingAsker(rig, write=lambda log: write_movement(rig, log)),
                        listen=HeldMarker(FakeEngine()).connect)
 
 
@@ -106,20 +106,20 @@ def test_centimetres_are_found_out(hands):
 
 def test_the_coach_counts_what_each_finger_has_done():
     tracks = record(person(3), SIX, 3, seconds=40.0, rate_hz=30.0, sloppiness=Sloppiness(0.0, 0.0, 0.0))
-    engine, coach = FakeEngine(make_rig()), make_coach(make_rig())
-    assert isinstance(coach, SweepCoach)
+    engine, guide = FakeEngine(make_rig()), make_guide(make_rig())
+    assert isinstance(guide, SweepGuide)
     states = [replace(engine.state(float(t_s)), marker_raw_positions=at)
               for t_s, at in zip(tracks.times_s, tracks.positions, strict=True)]
-    coach.watch(states[:60])
-    early = sum(bar.fraction for bar in coach.bars())
+    guide.watch(states[:60])
+    early = sum(bar.fraction for bar in guide.bars())
     for end in range(120, len(states), 60):
-        coach.watch(states[end - 120:end])
-        assert all(bar.full for bar in coach.bars()) == (coach.shortfall() == ""), "bars and words agree"
-        for bar in coach.bars():
-            assert not (bar.full and f"the {bar.name}" in coach.sentence()), "what is ticked is not asked for again"
-        assert " s done" not in coach.sentence(), "the time that is left is said already"
-    assert len(coach.bars()) == 6 and sum(bar.fraction for bar in coach.bars()) > early + 1.0
-    assert coach.sentence()
+        guide.watch(states[end - 120:end])
+        assert all(bar.full for bar in guide.bars()) == (guide.shortfall() == ""), "bars and words agree"
+        for bar in guide.bars():
+            assert not (bar.full and f"the {bar.name}" in guide.sentence()), "what is ticked is not asked for again"
+        assert " s done" not in guide.sentence(), "the time that is left is said already"
+    assert len(guide.bars()) == 6 and sum(bar.fraction for bar in guide.bars()) > early + 1.0
+    assert guide.sentence()
 
 
 def test_every_bar_of_the_movement_is_in_sight(hands):
@@ -137,7 +137,7 @@ def test_markers_that_name_no_place_get_a_quiet_coach():
     free = tuple(msgspec.structs.replace(marker, id=f"m{k}", role=None)
                  for k, marker in enumerate(rig.markers.markers))
     rig = msgspec.structs.replace(rig, markers=msgspec.structs.replace(rig.markers, markers=free))
-    assert isinstance(make_coach(rig), QuietCoach)
+    assert isinstance(make_guide(rig), QuietGuide)
 
 
 def test_bones_by_landmarks_are_proposed():

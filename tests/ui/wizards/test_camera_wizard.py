@@ -9,12 +9,12 @@ from fake_engine import synthetic_rig
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMessageBox
-from wizard_rig import FakeMemory, FakeRigAsker
+from wizard_rig import FakeRigAsker, FakeSettingsStore
 
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.camera import make_plan
-from rhot_app.ui.wizards.framework.plan import Kit
+from rhot_app.ui.wizards.camera import make_wizard
+from rhot_app.ui.wizards.framework.definition import WizardContext
 from rhot_app.ui.wizards.models.drawing import Layer
 from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, CameraEye, SettingsStep
 from rhot_node.config import CameraSettings
@@ -57,7 +57,7 @@ def asker():
 
 @pytest.fixture
 def hands(open_wizard, asker):
-    return open_wizard(make_plan, asker, in_file=False)
+    return open_wizard(make_wizard, asker, in_file=False)
 
 
 def row(hands, field):
@@ -69,7 +69,7 @@ def exposures(asker):
 
 
 def drag_grey(hands):
-    view = hands.frame.wall.views["left"]
+    view = hands.frame.grid.views["left"]
     hands.until(lambda: view.shown is not None)
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
                      view.rect().center() + QPoint(0, 80))
@@ -163,7 +163,7 @@ def test_too_bright_pictures_are_striped_and_told(hands, asker):
                 and "over" in hands.verdict.codes)
 
     def striped(camera):  # the other camera's pictures may be the first to be too bright
-        layer = next((mark for mark in hands.frame.wall.views[camera].overlay if isinstance(mark, Layer)), None)
+        layer = next((mark for mark in hands.frame.grid.views[camera].overlay if isinstance(mark, Layer)), None)
         return layer is not None and layer.rgba[..., 3].mean() > 20.0
 
     hands.until(lambda: striped("left") and striped("right"))
@@ -223,8 +223,8 @@ def test_choices_say_only_what_differs(asker):
 
 
 def test_a_silent_node_has_no_knobs(themed, asker, qtbot):
-    kit = Kit(asker.rig, None, asker.connect, DARK, FakeMemory())
-    plan = make_plan(kit)
+    context = WizardContext(asker.rig, None, asker.connect, DARK, FakeSettingsStore())
+    plan = make_wizard(context)
     view = plan.pages[0].step.view()
     assert "No camera" in view.sentence and not view.may_go_on
     for page in plan.pages:

@@ -45,9 +45,9 @@ def hands(open_wizard, made, tmp_path, monkeypatch):
                   min(protocol.ruler, key=lambda row: abs(row.distance_mm - hands.window.page.distance.value())))
         shutil.copyfile(made.folder / source.log, log)
 
-    hands = open_wizard(certificate_wizard.make_plan, RecordingAsker(made.rig, write=write),
+    hands = open_wizard(certificate_wizard.make_wizard, RecordingAsker(made.rig, write=write),
                         listen=HeldMarker(FakeEngine()).connect)
-    flash = next(page for page in hands.window.plan.pages if isinstance(page, certificate_wizard.FlashPage))
+    flash = next(page for page in hands.window.definition.pages if isinstance(page, certificate_wizard.FlashPage))
     flash.clock = itertools.count(T0_MASTER_NS, STEP_NS).__next__
     return hands
 

@@ -16,7 +16,7 @@ from rhot_app.calibration.verdict import Grade
 from rhot_app.project import Rig
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards.steps.colour_pick import PickStep
-from rhot_app.ui.wizards.steps.colour_result import ApartStep, BoundsStep, propose
+from rhot_app.ui.wizards.steps.colour_result import BoundsStep, SeparationStep, propose
 from rhot_node.detect.illuminant import gains_of
 from rhot_node.detect.image import to_bgr
 
@@ -35,7 +35,7 @@ def frame(seed: int, light: tuple) -> np.ndarray:
     return to_bgr(picture({}, seed=seed) if light == EMPTY else picture(seed=seed, **dict(light)))
 
 
-def look(step: PickStep | BoundsStep | ApartStep, times: int = 4, light: tuple = ()) -> None:
+def look(step: PickStep | BoundsStep | SeparationStep, times: int = 4, light: tuple = ()) -> None:
     """Let a step see some pictures by a light."""
     for number in range(times):
         image = frame(number % 3, light)
@@ -43,7 +43,7 @@ def look(step: PickStep | BoundsStep | ApartStep, times: int = 4, light: tuple =
 
 
 @pytest.fixture(scope="module")
-def steps(rig: Rig) -> tuple[BoundsStep, ApartStep]:
+def steps(rig: Rig) -> tuple[BoundsStep, SeparationStep]:
     """All markers picked and learnt in the light of the scene."""
     picks = PickStep(rig.markers, ("left",))
     look(picks, 1)
@@ -56,7 +56,7 @@ def steps(rig: Rig) -> tuple[BoundsStep, ApartStep]:
     task = bounds.task()
     assert task is not None and task.function is solve_colours
     bounds.take_result(task.function(*task.arguments, **task.options))
-    return bounds, ApartStep(bounds)
+    return bounds, SeparationStep(bounds)
 
 
 @pytest.mark.parametrize(("light", "word"), [((), None), (COLDER, "colder")])
@@ -69,7 +69,7 @@ def test_the_rigs_colours_are_held_against_the_light_before_anything_is_picked(r
 
 
 def test_a_light_that_has_changed_since_the_picking_is_said_on_the_mask_and_in_the_verdict(
-        rig: Rig, steps: tuple[BoundsStep, ApartStep]) -> None:
+        rig: Rig, steps: tuple[BoundsStep, SeparationStep]) -> None:
     bounds, apart = steps
     look(bounds)
     assert "colder" not in bounds.view().hint
@@ -98,7 +98,7 @@ def test_a_light_that_has_changed_since_the_picking_is_said_on_the_mask_and_in_t
     ({"little": (25, 165, 205)}, ("ring", "1 of 1", "doubtful", "1 more of its colour")),
 ], ids=["seen", "gone", "pale", "twice"])
 def test_the_masks_page_says_why_the_chosen_marker_is_not_found_or_in_doubt(
-        steps: tuple[BoundsStep, ApartStep], change: dict, said: tuple) -> None:
+        steps: tuple[BoundsStep, SeparationStep], change: dict, said: tuple) -> None:
     bounds = BoundsStep(steps[0].picks)
     bounds.enter()
     bounds.take_result(steps[0].report)

@@ -17,11 +17,11 @@ from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.project import load_rig
 from rhot_app.ui.common.theme import apply_theme
 from rhot_app.ui.models.palette import DARK, SCHEMES, contrast
-from rhot_app.ui.wizards.colours import MaskChoice, make_plan
+from rhot_app.ui.wizards.colours import MaskChoice, make_wizard
 from rhot_app.ui.wizards.framework.picture_painter import callout_boxes, fit
 from rhot_app.ui.wizards.models.drawing import Callout, Layer
 from rhot_app.ui.wizards.steps.colour_pick import PickStep
-from rhot_app.ui.wizards.steps.colour_result import ApartStep, BoundsStep, hue_chart, propose
+from rhot_app.ui.wizards.steps.colour_result import BoundsStep, SeparationStep, hue_chart, propose
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
 
@@ -43,7 +43,7 @@ def rig():
 
 @pytest.fixture(scope="module")
 def shared(open_shared, scene, rig):
-    return open_shared(make_plan, FakeRigAsker(rig, scene.draw))
+    return open_shared(make_wizard, FakeRigAsker(rig, scene.draw))
 
 
 @pytest.fixture
@@ -78,7 +78,7 @@ def look(step, scene):
 
 def click_at(hands, camera, x, y, to=None):
     """Click, or drag to another place, px of the frame."""
-    view = hands.frame.wall.views[camera]
+    view = hands.frame.grid.views[camera]
     if view.small:
         hands.click(view)
         hands.until(lambda: not view.small and view.width() > 400)
@@ -177,7 +177,7 @@ def move_a_bound(hands):
 
 
 def test_one_picture_is_large_and_a_click_enlarges_the_other(hands):
-    views = hands.frame.wall.views
+    views = hands.frame.grid.views
     if views["left"].small:
         hands.click(views["left"])
     hands.until(lambda: views["left"].width() >= 540)
@@ -212,9 +212,9 @@ def test_space_holds_the_pictures_for_a_click(hands, scene):
     assert "held" in hands.sentence
     newest = hands.window.feed.newest("left").number
     hands.until(lambda: hands.window.feed.newest("left").number > newest + 2)
-    assert hands.frame.wall.views["left"].shown is held
+    assert hands.frame.grid.views["left"].shown is held
     hands.window.page.mask_choice.setCurrentIndex(2)
-    assert hands.frame.wall.views["left"].overlay == ()
+    assert hands.frame.grid.views["left"].overlay == ()
     hands.window.page.mask_choice.setCurrentIndex(0)
     hands.key(Qt.Key.Key_Space)
     assert not hands.window.step.held
@@ -288,7 +288,7 @@ def test_clicks_one_finger_too_far_are_refused_with_the_skin_and_the_exchanged_c
     assert picks.doubt("index") == "as skin" and picks.doubt("middle") == "was index's"
     for name, other in zip(NAMES[3:], NAMES[2:], strict=False):
         pick(picks, name, PaintScene.where(other))
-    apart = learnt(ApartStep(learnt(BoundsStep(picks))))
+    apart = learnt(SeparationStep(learnt(BoundsStep(picks))))
     verdict = apart.view().verdict
     assert not verdict.acceptable and "index has the colour of skin" in said(verdict)
     for name, other in zip(NAMES[2:], NAMES[1:], strict=False):
@@ -331,7 +331,7 @@ def test_alike_paints_are_said_to_be_alike(rig):
     picks = PickStep(rig.markers, ("left", "right"))
     look(picks, alike)
     pick_all(picks)
-    apart = learnt(ApartStep(learnt(BoundsStep(picks))))
+    apart = learnt(SeparationStep(learnt(BoundsStep(picks))))
     assert not apart.view().verdict.acceptable
     bands = [curve for curve in hue_chart(apart.report).curves if curve.style == "band"]
     assert {curve.name for curve in bands if curve.name} == set(PAINTS)

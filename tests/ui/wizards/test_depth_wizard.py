@@ -44,7 +44,8 @@ def marker():
 
 def test_from_distances_to_a_rig_that_uses_them(open_wizard, marker):
     rig = msgspec.structs.replace(synthetic_rig(), calibration=CameraCalibration("exact"))
-    hands = open_wizard(lambda kit: depth.make_plan(kit, marker.clock), FakeRigAsker(rig), listen=marker.connect)
+    hands = open_wizard(lambda context: depth.make_wizard(context, marker.clock), FakeRigAsker(rig),
+                        listen=marker.connect)
     page = hands.window.page
     hands.until(lambda: "calibrated cameras" in hands.hint)
 

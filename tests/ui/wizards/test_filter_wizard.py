@@ -17,8 +17,8 @@ from waving import waving
 from wizard_hand import RecordingAsker
 
 from rhot_app.project import FilterSettings, OneEuroSettings, load_rig
-from rhot_app.ui.wizards.filters import make_plan
-from rhot_app.ui.wizards.steps.filter_steps import FastCoach, LiveMeters, StillCoach
+from rhot_app.ui.wizards.filters import make_wizard
+from rhot_app.ui.wizards.steps.filter_steps import FastGuide, LiveMeters, StillGuide
 
 SECONDS = 5.0
 LAZY = FilterSettings(pixel=OneEuroSettings(0.3, 0.0001, 1.0), position=OneEuroSettings(0.3, 0.001, 1.0))
@@ -54,7 +54,8 @@ def write_movement(rig, path):
 def hands(open_wizard):
     rig = msgspec.structs.replace(make_rig(), filters=LAZY)
     hand = MovingHand(FakeEngine())
-    hands = open_wizard(make_plan, RecordingAsker(rig, write=lambda log: write_movement(rig, log)), listen=hand.connect)
+    hands = open_wizard(make_wizard, RecordingAsker(rig, write=lambda log: write_movement(rig, log)),
+                        listen=hand.connect)
     hands.hand = hand
     return hands
 
@@ -119,11 +120,11 @@ def test_the_coaches_tell_a_still_hand_from_a_fast_one():
     still, fast = LiveMeters(), LiveMeters()
     still.watch(heard(0.0))
     fast.watch(heard(0.8))
-    assert "Good" in StillCoach(still).sentence() and "rest the hand" in StillCoach(fast).sentence()
-    assert "Faster" in FastCoach(still).sentence() and "Good" in FastCoach(fast).sentence()
-    coach = FastCoach(fast)
-    coach.watch(())
-    assert all(bar.full for bar in coach.bars()) and coach.shortfall() == ""
+    assert "Good" in StillGuide(still).sentence() and "rest the hand" in StillGuide(fast).sentence()
+    assert "Faster" in FastGuide(still).sentence() and "Good" in FastGuide(fast).sentence()
+    guide = FastGuide(fast)
+    guide.watch(())
+    assert all(bar.full for bar in guide.bars()) and guide.shortfall() == ""
     assert [row[3] for row in still.rows()] == ["–"] * 6, "a hand at rest shows no lag"
     assert float(fast.rows()[0][3]) == pytest.approx(10.0, abs=1.0)
     assert float(still.rows()[0][1]) == pytest.approx(0.2 * 3**0.5, abs=0.05)

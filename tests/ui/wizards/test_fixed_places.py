@@ -16,14 +16,14 @@ from PySide6.QtWidgets import (
     QMenu,
     QWidget,
 )
-from wizard_rig import FakeMemory, FakeRigAsker
+from wizard_rig import FakeRigAsker, FakeSettingsStore
 
 from rhot_app.project import load_rig
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.simulated_rig_menus import FIRST, THINGS
 from rhot_app.ui.wizards import framework, steps
+from rhot_app.ui.wizards.framework.definition import WIZARDS, WizardContext, wizard_named
 from rhot_app.ui.wizards.framework.frame import WizardFrame
-from rhot_app.ui.wizards.framework.plan import WIZARDS, Kit, wizard_named
 from rhot_app.ui.wizards.framework.work import Work
 from rhot_app.ui.wizards.models.step import StepView
 from rhot_node.files import resource_path
@@ -45,26 +45,27 @@ class Silence:
 
 @pytest.fixture
 def frame_of(themed):
-    """A function that lays out a wizard by its module's name, without processes; gives window, frame and plan."""
+    """A function that lays out a wizard by its module's name, without processes; gives window, frame and definition."""
     windows = []
 
     def lay_out(module, size):
         rig = load_rig(resource_path("rigs", "two_pis.json"))
         asker = FakeRigAsker(rig)
         asker.answers = {name: {"known": False} for name in ("refined", "adapted", "measured")}
-        kit = Kit(rig, None, asker.connect, DARK, FakeMemory(), asker.told, Silence)
-        plan, window = wizard_named(module).make_plan(kit), QWidget()
-        frame = WizardFrame(plan, tuple(node.name for node in rig.nodes), Work(InProcessSolver(), window), DARK, window)
+        context = WizardContext(rig, None, asker.connect, DARK, FakeSettingsStore(), asker.told, Silence)
+        definition, window = wizard_named(module).make_wizard(context), QWidget()
+        cameras = tuple(node.name for node in rig.nodes)
+        frame = WizardFrame(definition, cameras, Work(InProcessSolver(), window), DARK, window)
         window.resize(*size)
         window.show()
-        windows.append((window, plan))
-        return window, frame, plan
+        windows.append((window, definition))
+        return window, frame, definition
 
     yield lay_out
-    for window, plan in windows:
+    for window, definition in windows:
         window.hide()
-        if plan.put_back is not None:
-            plan.put_back()
+        if definition.put_back is not None:
+            definition.put_back()
         window.deleteLater()
 
 
@@ -79,13 +80,13 @@ def places(window):
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 @pytest.mark.parametrize("module", [one.name for one in WIZARDS])
 def test_nothing_moves_when_the_sentences_change(module, size, frame_of):
-    window, frame, plan = frame_of(module, size)
+    window, frame, definition = frame_of(module, size)
     frame.offer_twin(QMenu(window))
-    for number, page in enumerate(plan.pages):
+    for number, page in enumerate(definition.pages):
         frame.show_page(page, number)
         before = None
         for sentence, hint in (("Wait.", ""), (LONG, ""), (LONG, LONG), ("Wait.", LONG)):
-            frame.show_view(StepView(sentence, hint=hint), page.step, number, [False] * len(plan.pages))
+            frame.show_view(StepView(sentence, hint=hint), page.step, number, [False] * len(definition.pages))
             now = places(window)
             assert before in (None, now), page.step.title
             before = now
@@ -111,11 +112,11 @@ def known_sentences():
 def test_every_sentence_is_seen_whole_in_a_small_window(frame_of):
     sentences = set(known_sentences())
     for one in WIZARDS:
-        *_, plan = frame_of(one.name, SIZES[-1])
-        sentences |= {page.step.view().sentence for page in plan.pages}
+        *_, definition = frame_of(one.name, SIZES[-1])
+        sentences |= {page.step.view().sentence for page in definition.pages}
     assert len(sentences) > 60
-    _, frame, plan = frame_of("lens", SIZES[-1])
-    frame.show_page(plan.pages[0], 0)
+    _, frame, definition = frame_of("lens", SIZES[-1])
+    frame.show_page(definition.pages[0], 0)
     QApplication.processEvents()
     for sentence in sorted(sentences):
         frame.sentence.setText(sentence)
@@ -123,13 +124,13 @@ def test_every_sentence_is_seen_whole_in_a_small_window(frame_of):
 
 
 def test_the_last_button_keeps_its_width_whatever_it_says(frame_of):
-    _, frame, plan = frame_of("lens", SIZES[0])
-    last = plan.pages[-1]
-    frame.show_page(last, len(plan.pages) - 1)
+    _, frame, definition = frame_of("lens", SIZES[0])
+    last = definition.pages[-1]
+    frame.show_page(last, len(definition.pages) - 1)
     before = None
     for state in ("proposed", "used", "restored"):
         last.step.finish(state)
-        frame.show_view(last.step.view(), last.step, len(plan.pages) - 1, [False] * len(plan.pages))
+        frame.show_view(last.step.view(), last.step, len(definition.pages) - 1, [False] * len(definition.pages))
         QApplication.processEvents()
         now = frame.next_button.geometry(), frame.back_button.geometry()
         assert before in (None, now)
@@ -141,12 +142,12 @@ def test_the_simulated_rig_says_what_a_person_would_measure(frame_of):
     entries = {*FIRST.values(), *(text for _, text, _ in THINGS), "Shows one marker at"}
     told = {}
     for one in WIZARDS:
-        window, frame, plan = frame_of(one.name, SIZES[-1])
-        for number, page in enumerate(plan.pages):
+        window, frame, definition = frame_of(one.name, SIZES[-1])
+        for number, page in enumerate(definition.pages):
             frame.show_page(page, number)
             assert frame.twin_facts.text() == "", "a real rig has nobody to be told"
         frame.offer_twin(QMenu(window))
-        for number, page in enumerate(plan.pages):
+        for number, page in enumerate(definition.pages):
             frame.show_page(page, number)
             text = frame.twin_facts.text()
             assert not text or text.partition(":")[0].removesuffix(".") in entries, text

@@ -11,7 +11,7 @@ from wizard_rig import FakeRigAsker
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.project import Intrinsics, Rig, RigNode, load_rig
-from rhot_app.ui.wizards.lens import LAST, make_plan
+from rhot_app.ui.wizards.lens import LAST, make_wizard
 from rhot_app.ui.wizards.models.board_form import BoardFields
 from rhot_app.ui.wizards.models.drawing import Cells, Line
 from rhot_app.ui.wizards.steps.lens_steps import LensBoardStep, LensShowStep, straightened, what_follows
@@ -42,13 +42,13 @@ def hands(open_wizard, scene):
     lens = msgspec.structs.replace(truth.nodes[0].intrinsics, fx=572.0, fy=572.0)
     rig = msgspec.structs.replace(truth, nodes=tuple(msgspec.structs.replace(node, intrinsics=lens)
                                                      for node in truth.nodes))
-    return open_wizard(make_plan, FakeRigAsker(rig, scene.draw))
+    return open_wizard(make_wizard, FakeRigAsker(rig, scene.draw))
 
 
 def test_from_the_board_to_a_saved_lens(hands, scene):
     scene.place(*PLACES[0])
     hands.type(hands.window.page.square, "25")
-    wall = hands.frame.wall.views
+    wall = hands.frame.grid.views
     for camera in ("right", "left"):
         hands.window.page.which.setCurrentText(camera)
         hands.until(lambda camera=camera: hands.window.step.view().done and camera in hands.sentence)

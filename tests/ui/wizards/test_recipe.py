@@ -17,8 +17,8 @@ from rhot_app import rig_history
 from rhot_app.project import load_rig
 from rhot_app.ui import actions, main_window, wizards
 from rhot_app.ui.wizards import launcher
-from rhot_app.ui.wizards.framework import plan
-from rhot_app.ui.wizards.framework.plan import WIZARDS, Wizard
+from rhot_app.ui.wizards.framework import definition
+from rhot_app.ui.wizards.framework.definition import WIZARDS, Wizard
 
 ROW = Wizard(*toy_steps.TOY)
 
@@ -27,7 +27,7 @@ ROW = Wizard(*toy_steps.TOY)
 def bench(make_bench, tmp_path, monkeypatch):
     """The main window with the toy's row at the end of the menu."""
     monkeypatch.setitem(sys.modules, "rhot_app.ui.wizards.toy", toy)
-    for module in (actions, main_window, launcher, plan):
+    for module in (actions, main_window, launcher, definition):
         monkeypatch.setattr(module, "WIZARDS", (*WIZARDS, ROW))
     bench = make_bench(RigBackend(tmp_path / "desk.json"))
     bench.track()

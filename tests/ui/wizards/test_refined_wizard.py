@@ -19,7 +19,7 @@ from rhot_app.project import load_rig
 from rhot_app.rig_history import versions
 from rhot_app.ui.status_words import _advice_notice
 from rhot_app.ui.wizards import adapted, measured, refined
-from rhot_app.ui.wizards.framework.plan import OPEN_WIZARD
+from rhot_app.ui.wizards.framework.definition import OPEN_WIZARD
 from rhot_app.ui.wizards.steps.adapted_steps import ShowBonesStep, propose_hand
 from rhot_app.ui.wizards.steps.refined_steps import EngineFeed, MoveStep, propose
 
@@ -54,7 +54,7 @@ def hand_answer(rig, grade=Grade.GOOD):
 def hands(open_wizard, request):
     asker = RefiningAsker(synthetic_rig())
     asker.answer = {"known": False}
-    return open_wizard(lambda kit: request.param.make_plan(kit, ask_s=0.02), asker)
+    return open_wizard(lambda context: request.param.make_wizard(context, ask_s=0.02), asker)
 
 
 def test_it_is_used_only_when_asked_and_can_be_taken_back(hands):

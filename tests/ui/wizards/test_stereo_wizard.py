@@ -20,11 +20,11 @@ from rhot_app.calibration.check.checks import check_rig
 from rhot_app.estimation.se3 import rotation_from_quaternion
 from rhot_app.project import CameraPose, load_rig
 from rhot_app.ui.backend.feed import Picture
-from rhot_app.ui.wizards.framework.plan import Plan
+from rhot_app.ui.wizards.framework.definition import Definition
 from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep
-from rhot_app.ui.wizards.steps.known_step import KnownStep
+from rhot_app.ui.wizards.steps.lengths_step import LengthsStep
 from rhot_app.ui.wizards.steps.stereo_steps import ShowStep, StereoSolveStep, known_lenses, stereo_proposal
-from rhot_app.ui.wizards.stereo import KnownPage, make_plan
+from rhot_app.ui.wizards.stereo import LengthsPage, make_wizard
 
 CAMERAS = ("left", "right")
 replace_fields = msgspec.structs.replace
@@ -61,7 +61,7 @@ def scene():
 @pytest.fixture
 def hands(open_wizard, wrong_rig, scene):
     """The wizard on a rig file, before drawn boards."""
-    return open_wizard(make_plan, FakeRigAsker(wrong_rig, scene.draw))
+    return open_wizard(make_wizard, FakeRigAsker(wrong_rig, scene.draw))
 
 
 def test_from_the_board_to_a_saved_rig(hands, scene):
@@ -127,13 +127,14 @@ def test_nobody_gets_past_the_board_without_measuring_it(hands, scene):
 
 
 def test_the_ruler_is_clicked_in_held_pictures(open_wizard, wrong_rig):
-    hands = open_wizard(lambda kit: Plan("Ruler", (KnownPage(KnownStep(CAMERAS)),)), FakeRigAsker(wrong_rig))
+    hands = open_wizard(lambda context: Definition("Ruler", (LengthsPage(LengthsStep(CAMERAS)),)),
+                        FakeRigAsker(wrong_rig))
     page, step = hands.window.page, hands.window.step
     assert not page.hold.isEnabled()
     page.ruler.setValue(240.0)
     hands.until(page.hold.isEnabled)
     hands.until(lambda: set(step.frozen) == set(CAMERAS) or page.hold.click())  # once both have a picture
-    for view in hands.frame.wall.views.values():
+    for view in hands.frame.grid.views.values():
         for share in (0.3, 0.7):
             hands.click(view, QPoint(round(share * view.width()), view.height() // 2))
     hands.until(lambda: step.view().done and "scale" in hands.sentence)
@@ -195,7 +196,7 @@ def test_a_wrong_board_is_named_where_it_is_shown_and_gives_no_shots(compiled, c
 
 
 def test_a_length_check_is_skipped_knowingly_and_the_rig_says_so(shown, wrong_rig, tmp_path):
-    known = KnownStep(CAMERAS)
+    known = LengthsStep(CAMERAS)
     assert not known.view().may_go_on and "Skip" in known.view().hint
     known.skip(True)
     assert known.view().passable and not known.view().done and "unproven" in known.view().sentence
@@ -208,7 +209,7 @@ def test_a_length_check_is_skipped_knowingly_and_the_rig_says_so(shown, wrong_ri
 
 
 def test_a_wrong_square_size_is_found_by_the_baseline(shown, wrong_rig):
-    known = KnownStep(CAMERAS)
+    known = LengthsStep(CAMERAS)
     known.set_lengths(75.0, 0.0)
     step = solved(shown, wrong_rig, known, Chessboard(9, 6, 0.025 / 1.1))  # printed too large, and not measured
     view = step.view()
@@ -234,7 +235,7 @@ def test_undo_forgets_the_last_shot_and_another_board_all(scene):
 
 def test_a_ruler_needs_both_ends_in_two_pictures():
     blank = np.zeros((480, 640, 3), np.uint8)
-    step = KnownStep(CAMERAS)
+    step = LengthsStep(CAMERAS)
     assert not step.view().may_go_on and step.known.ruler is None
     step.set_lengths(0.0, 200.0)
     step.take({name: Picture(name, blank, 1, 0, 0) for name in CAMERAS})

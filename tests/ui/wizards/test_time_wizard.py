@@ -14,7 +14,7 @@ from waving import see, waving
 from wizard_hand import HeldMarker, RecordingAsker
 
 from rhot_app.project import load_rig
-from rhot_app.ui.wizards.time import make_plan
+from rhot_app.ui.wizards.time import make_wizard
 
 LATE_S = 0.006
 ROW_NS = 48_000
@@ -29,7 +29,7 @@ def hands(open_wizard):
                      said_ns=(ROW_NS, ROW_NS))
         write_log(Path(log), rig, frames)
 
-    return open_wizard(make_plan, RecordingAsker(rig, write=write), listen=HeldMarker(FakeEngine()).connect)
+    return open_wizard(make_wizard, RecordingAsker(rig, write=write), listen=HeldMarker(FakeEngine()).connect)
 
 
 def test_from_waving_to_a_rig_that_knows_the_delay(hands):

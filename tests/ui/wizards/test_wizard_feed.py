@@ -110,21 +110,21 @@ def test_a_stopped_feed_closes_its_connections(asker):
     assert asker.closed == 2
 
 
-def test_the_looker_gives_each_finding_once_and_only_to_its_step(feed):
-    looker, step, other = PictureWorker(feed).start(), Counting(), Counting()
-    looker.watch(step)
+def test_the_worker_gives_each_finding_once_and_only_to_its_step(feed):
+    worker, step, other = PictureWorker(feed).start(), Counting(), Counting()
+    worker.watch(step)
     found = []
 
     def take():
-        seen = looker.found(step)
+        seen = worker.found(step)
         if seen is not None:
             found.append(tuple(seen.items()))
         return len(found) >= 3
 
     eventually(take)
-    looker.watch(other)
-    assert looker.found(step) is None
-    looker.stop()
+    worker.watch(other)
+    assert worker.found(step) is None
+    worker.stop()
     assert len(set(found)) == len(found), "the same pictures were looked at twice"
 
 
@@ -136,13 +136,13 @@ def test_a_look_that_fails_does_not_end_the_live_view(feed):
             self.looks += 1
             raise ValueError("a strange picture")
 
-    looker, step = PictureWorker(feed).start(), Clumsy()
-    looker.watch(step)
+    worker, step = PictureWorker(feed).start(), Clumsy()
+    worker.watch(step)
     eventually(lambda: step.looks >= 2)
     other = Counting()
-    looker.watch(other)
-    eventually(lambda: looker.found(other) is not None)
-    looker.stop()
+    worker.watch(other)
+    eventually(lambda: worker.found(other) is not None)
+    worker.stop()
 
 
 def test_work_reports_progress_and_gives_its_result(solver):

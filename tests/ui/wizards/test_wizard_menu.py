@@ -21,8 +21,8 @@ from rhot_app.project import CameraPose, load_rig
 from rhot_app.ui import actions, main_window
 from rhot_app.ui.models.rows import place_figures, rig_rows
 from rhot_app.ui.wizards import launcher
-from rhot_app.ui.wizards.framework import plan
-from rhot_app.ui.wizards.framework.plan import Wizard
+from rhot_app.ui.wizards.framework import definition
+from rhot_app.ui.wizards.framework.definition import Wizard
 
 
 class SampleWizard(Wizard):
@@ -31,8 +31,8 @@ class SampleWizard(Wizard):
     def load(self):
         """Nothing to import."""
 
-    def make_plan(self, kit):
-        return sample_wizard.make_plan(kit)
+    def make_wizard(self, context):
+        return sample_wizard.make_wizard(context)
 
 
 SAMPLE = (SampleWizard("sample", "Sample", "A small wizard.", "lens calibration"),)
@@ -81,12 +81,12 @@ def test_a_wizard_that_cannot_open_says_why(bench):
 
 
 def test_a_stale_calibration_offers_the_wizard_that_mends_it(bench, monkeypatch):
-    monkeypatch.setattr(plan, "WIZARDS", SAMPLE)
+    monkeypatch.setattr(definition, "WIZARDS", SAMPLE)
     bench.backend.engine.advice = (Advice("warning", "The cameras' rays miss each other.", "sample"),)
     bench.until(lambda: bench.said("rays miss"))
     bench.click(bench.window.advice.buttons["Sample …"])
     bench.until(lambda: bench.window.wizards.wizard is not None)
-    assert bench.window.wizards.wizard.plan.title == "Sample"
+    assert bench.window.wizards.wizard.definition.title == "Sample"
 
 
 def test_closing_the_app_ends_an_open_wizard_without_a_question(bench):

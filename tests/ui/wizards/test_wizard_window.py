@@ -21,8 +21,8 @@ from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.guide import page_path
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.framework.picture_view import PictureWall
-from rhot_app.ui.wizards.framework.plan import WIZARDS
+from rhot_app.ui.wizards.framework.definition import WIZARDS
+from rhot_app.ui.wizards.framework.picture_view import PictureGrid
 from rhot_app.ui.wizards.models.drawing import Cells, Dots, Tag
 from rhot_app.ui.wizards.models.step import AnnotatedPicture, StepView
 
@@ -35,7 +35,8 @@ def asker():
 @pytest.fixture
 def open_sample(open_wizard, asker):
     """Opens the sample wizard on a rig file."""
-    return lambda steps=3, **options: open_wizard(lambda kit: sample_wizard.make_plan(kit, steps), asker, **options)
+    return lambda steps=3, **options: open_wizard(lambda context: sample_wizard.make_wizard(context, steps), asker,
+                                                  **options)
 
 
 @pytest.fixture
@@ -82,7 +83,7 @@ def test_the_pictures_are_live_and_marked(open_sample):
     hands = open_sample()
     hands.window.page.box.setValue(9)
     hands.next()
-    view = hands.frame.wall.views["left"]
+    view = hands.frame.grid.views["left"]
     hands.until(lambda: view.shown is not None and len(view.overlay) == 4)
     first = view.shown.number
     hands.until(lambda: view.shown.number > first + 4)
@@ -100,7 +101,7 @@ def test_what_is_drawn_was_found_in_the_very_picture_that_is_shown(open_sample):
         return see(pictures)
 
     hands.window.step.see = slow
-    numbers, views = {}, hands.frame.wall.views
+    numbers, views = {}, hands.frame.grid.views
 
     def drawn():
         for name, view in views.items():
@@ -125,7 +126,7 @@ def test_a_picture_without_results_is_drawn_without_any(qtbot, themed):
         def problem(self, name):
             return ""
 
-    wall = PictureWall(("left",), DARK)
+    wall = PictureGrid(("left",), DARK)
     qtbot.addWidget(wall)
     wall.show()
     view, fixed, own = wall.views["left"], Cells(np.eye(2)), Tag(1.0, 2.0, "a marker")
@@ -168,7 +169,7 @@ def test_long_work_shows_progress_stays_live_and_can_be_cancelled(open_sample, r
     hands.next()
     work_view, window = hands.frame.work_view, hands.window
     hands.until(lambda: "left" in work_view.remaining.text())
-    view = window.frame.wall.views["left"]
+    view = window.frame.grid.views["left"]
     first = view.shown.number
     hands.until(lambda: view.shown.number > first + 4)
     assert not window.frame.next_button.isEnabled()
@@ -238,7 +239,7 @@ def test_f1_opens_the_guide_beside_the_wizard(open_sample):
 
 def test_a_drag_over_a_picture_is_in_its_own_pixels(open_sample):
     hands = open_sample()
-    wall = hands.frame.wall
+    wall = hands.frame.grid
     hands.until(lambda: wall.views["left"].shown is not None)
     picked = []
     wall.picked.connect(lambda *args: picked.append(args))
@@ -252,6 +253,6 @@ def test_a_drag_over_a_picture_is_in_its_own_pixels(open_sample):
 def test_a_silent_camera_is_named_in_its_picture(open_sample, asker):
     hands = open_sample()
     asker.refuse = "node left does not answer on its control channel."
-    view = hands.frame.wall.views["left"]
+    view = hands.frame.grid.views["left"]
     hands.until(lambda: view.problem == asker.refuse)
     assert hands.window.isVisible()

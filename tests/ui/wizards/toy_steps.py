@@ -53,10 +53,10 @@ def verdict_of(level) -> Verdict:
     return judge(f"grey level {level:.0f}", [])
 
 
-def propose(level, kit):
+def propose(level, context):
     """The level as the rig's name."""
     if level is None:
         return None
-    after = msgspec.structs.replace(kit.rig, name=f"grey {level:.0f}")
-    return Proposal(TOY.reason, verdict_of(level), (Row("name", kit.rig.name, after.name),),
-                    (RigChange(kit.rig, after, kit.rig_path, TOY.reason),))
+    after = msgspec.structs.replace(context.rig, name=f"grey {level:.0f}")
+    return Proposal(TOY.reason, verdict_of(level), (Row("name", context.rig.name, after.name),),
+                    (RigChange(context.rig, after, context.rig_path, TOY.reason),))

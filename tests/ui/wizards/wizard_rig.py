@@ -28,7 +28,7 @@ def grey_picture(node_id: int, t_s: float) -> np.ndarray:
     return picture
 
 
-class FakeMemory(dict[str, str]):
+class FakeSettingsStore(dict[str, str]):
     """Remembers until the test is over."""
 
     def remembered(self, name: str) -> str:

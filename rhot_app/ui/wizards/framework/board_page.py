@@ -24,8 +24,8 @@ from PySide6.QtWidgets import (
 from rhot_app.calibration.board.standard_board import BOARD, KINDS, SQUARE_MM
 from rhot_app.calibration.board.target import write_target
 from rhot_app.errors import CalibrationError
+from rhot_app.ui.wizards.framework.definition import SettingsStore
 from rhot_app.ui.wizards.framework.page import Page
-from rhot_app.ui.wizards.framework.plan import Memory
 from rhot_app.ui.wizards.models.board_form import (
     DICTIONARIES,
     SIZES,
@@ -68,7 +68,7 @@ _WORDS = {
 class BoardPage(Page):
     """What is entered is remembered for the next wizard; the measured size only as a hint, for a person to confirm."""
 
-    def __init__(self, step: BoardStep, memory: Memory) -> None:
+    def __init__(self, step: BoardStep, memory: SettingsStore) -> None:
         super().__init__(step)
         self._board = step
         self._memory = memory

@@ -23,9 +23,9 @@ from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import ShapeMark, paint_shape
 from rhot_app.ui.common.theme import TEXT_PT, app_font
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.wizards.framework.definition import Definition
 from rhot_app.ui.wizards.framework.page import Page, VerdictView
-from rhot_app.ui.wizards.framework.picture_view import PictureWall
-from rhot_app.ui.wizards.framework.plan import Plan
+from rhot_app.ui.wizards.framework.picture_view import PictureGrid
 from rhot_app.ui.wizards.framework.work import Work
 from rhot_app.ui.wizards.models.step import AcceptStep, Bar, Step, StepView
 
@@ -43,19 +43,20 @@ _BARS_PX = 340
 class WizardFrame:
     """The widgets, laid out in `parent`."""
 
-    def __init__(self, plan: Plan, cameras: tuple[str, ...], work: Work, scheme: Scheme, parent: QWidget) -> None:
+    def __init__(self, definition: Definition, cameras: tuple[str, ...], work: Work, scheme: Scheme,
+                 parent: QWidget) -> None:
         self._shown: Page | None = None
-        self.steps = StepList([page.step.title for page in plan.pages], scheme)
-        self.wall = PictureWall(cameras, scheme)
+        self.steps = StepList([page.step.title for page in definition.pages], scheme)
+        self.grid = PictureGrid(cameras, scheme)
         self.middle = QStackedWidget()
-        self.middle.addWidget(self.wall)
+        self.middle.addWidget(self.grid)
         self.middle.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.sentence = Sentence(_SENTENCE_LINES, size_pt=SENTENCE_PT, smallest_pt=SMALLEST_PT, bold=True)
         self.hint = QLabel()
         self.hint.setWordWrap(True)
         self.hint.setTextFormat(Qt.TextFormat.PlainText)
         self.pages = QStackedWidget()
-        for page in plan.pages:
+        for page in definition.pages:
             self.pages.addWidget(_scrolling(page))
             if page.centre is not None:
                 self.middle.addWidget(page.centre)
@@ -81,11 +82,12 @@ class WizardFrame:
         policy.setRetainSizeWhenHidden(True)
         self.close_button.setSizePolicy(policy)
         self._lay_out(parent)
-        self._keep_width(plan)
+        self._keep_width(definition)
 
-    def _keep_width(self, plan: Plan) -> None:
+    def _keep_width(self, definition: Definition) -> None:
         """Next is as wide as its longest word, so that Back never comes under a mouse that presses it."""
-        words = {"Next", "Close", *(page.step.use_label for page in plan.pages if isinstance(page.step, AcceptStep))}
+        steps = [page.step for page in definition.pages]
+        words = {"Next", "Close", *(step.use_label for step in steps if isinstance(step, AcceptStep))}
         self.next_button.ensurePolished()
         for word in sorted(words, key=len):
             self.next_button.setText(word)
@@ -143,17 +145,17 @@ class WizardFrame:
         self._shown = page
         self.twin_facts.setText(page.twin_facts if self.twin_button.menu() is not None else "")
         self.pages.setCurrentIndex(number)
-        self.middle.setCurrentWidget(page.centre if page.centre is not None else self.wall)
-        self.wall.set_pickable(page.pickable)
-        self.wall.show_one_large(page.one_large)
+        self.middle.setCurrentWidget(page.centre if page.centre is not None else self.grid)
+        self.grid.set_pickable(page.pickable)
+        self.grid.show_one_large(page.one_large)
         self.back_button.setEnabled(number > 0)
         (page.first_field or self.middle).setFocus()  # so that Space captures and no button has it
 
     def show_view(self, view: StepView, step: Step, current: int, done: list[bool]) -> None:
         """What the step says now."""
         self.steps.show_steps(current, done)
-        self.wall.show_cameras(step.cameras)
-        self.wall.show_view(view)
+        self.grid.show_cameras(step.cameras)
+        self.grid.show_view(view)
         self.sentence.setText(view.sentence)
         working = self.work_view.wanted(step)
         self.hint.setText(view.hint)

@@ -15,9 +15,9 @@ from rhot_app.errors import EngineError
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.wizards.framework.definition import WizardContext
 from rhot_app.ui.wizards.framework.page import Page
-from rhot_app.ui.wizards.framework.plan import Kit
-from rhot_app.ui.wizards.models.movement import Coach, MovementStep, Request
+from rhot_app.ui.wizards.models.movement import Guide, MovementStep, Request
 from rhot_app.ui.wizards.models.step import StepView
 
 _LABELS = {"waiting": "Record", "beginning": "Record", "recording": "Stop", "ending": "Stop",
@@ -87,24 +87,24 @@ StepT = TypeVar("StepT", bound=MovementStep)
 
 
 class Movements:
-    """Makes the pages of recorded movements; `end` is the plan's `put_back`."""
+    """Makes the pages of recorded movements; `end` is the definition's `put_back`."""
 
-    def __init__(self, kit: Kit) -> None:
-        if kit.listen is None:
+    def __init__(self, context: WizardContext) -> None:
+        if context.listen is None:
             raise EngineError("this window cannot hear the hand; open the wizard from the main window.")
-        self.states = StateFeed(kit.listen)
-        self._connect = kit.connect
+        self.states = StateFeed(context.listen)
+        self._connect = context.connect
         self.folder = Path(tempfile.mkdtemp(prefix="rhot-wizard-"))
         self._steps: list[MovementStep] = []
 
-    def page(self, title: str, sentence: str, seconds: float, coach: Callable[[], Coach]) -> MovementPage:
+    def page(self, title: str, sentence: str, seconds: float, guide: Callable[[], Guide]) -> MovementPage:
         """A page that records `seconds` of a movement; see `MovementStep`."""
-        return self.page_of(MovementPage, title, sentence, seconds, coach)
+        return self.page_of(MovementPage, title, sentence, seconds, guide)
 
     def page_of(self, make: Callable[[MovementStep, Callable[[], Asker], StateFeed], PageT], title: str, sentence: str,
-                seconds: float, coach: Callable[[], Coach]) -> PageT:
+                seconds: float, guide: Callable[[], Guide]) -> PageT:
         """The same on a page that shows more."""
-        step = self.add(MovementStep(title, sentence, seconds, self.folder, coach, self.states.recent))
+        step = self.add(MovementStep(title, sentence, seconds, self.folder, guide, self.states.recent))
         return make(step, self._connect, self.states)
 
     def add(self, step: StepT) -> StepT:

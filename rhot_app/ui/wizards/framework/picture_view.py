@@ -170,7 +170,7 @@ class PictureView(QWidget):
         self.picked.emit(self.name, min(x0, x1), min(y0, y1), abs(x1 - x0), abs(y1 - y0))
 
 
-class PictureWall(QWidget):
+class PictureGrid(QWidget):
     """The pictures of some cameras, beside or above each other, whichever makes them larger."""
 
     picked = Signal(str, float, float, float, float)

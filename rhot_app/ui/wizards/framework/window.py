@@ -13,9 +13,9 @@ from rhot_app.ui.backend.feed import LiveFeed
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.keys import bind_space
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.frame import WizardFrame
 from rhot_app.ui.wizards.framework.page import AcceptPage
-from rhot_app.ui.wizards.framework.plan import Kit, Plan
 from rhot_app.ui.wizards.framework.work import PictureWorker, Work
 from rhot_app.ui.wizards.models.step import AcceptStep, State, Step
 
@@ -25,7 +25,7 @@ _SIZE = (1280, 800)
 
 
 class WizardWindow(QDialog):
-    """Shows one `Plan`, as large as the window that it stands over. `rig_used` gives the rig that is in force after
+    """Shows one `Definition`, as large as the window that it stands over. `rig_used` gives the rig in force after
     "Use this calibration" and after a restore; `used` the proposal, and whether it is in force now.
 
     `tick` is one turn of the timer, so that tests can turn by hand.
@@ -34,19 +34,19 @@ class WizardWindow(QDialog):
     rig_used = Signal(object)
     used = Signal(object, bool)
 
-    def __init__(self, plan: Plan, kit: Kit, parent: QWidget | None = None) -> None:
+    def __init__(self, definition: Definition, context: WizardContext, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.plan = plan
-        self._kit = kit
-        self.setWindowTitle(plan.title)
-        self.setProperty("guide", plan.guide)
+        self.definition = definition
+        self._context = context
+        self.setWindowTitle(definition.title)
+        self.setProperty("guide", definition.guide)
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
         self.resize(parent.window().size() if parent is not None else QSize(*_SIZE))
-        self.feed = LiveFeed({node.name: node.node_id for node in kit.rig.nodes if not node.text_datagrams},
-                             kit.connect)
-        self.looker = PictureWorker(self.feed)
-        self.work = Work(kit.make_solver(), self)
-        self.frame = WizardFrame(plan, self.feed.cameras, self.work, kit.scheme, self)
+        self.feed = LiveFeed({node.name: node.node_id for node in context.rig.nodes if not node.text_datagrams},
+                             context.connect)
+        self.picture_worker = PictureWorker(self.feed)
+        self.work = Work(context.make_solver(), self)
+        self.frame = WizardFrame(definition, self.feed.cameras, self.work, context.scheme, self)
         self.current = 0
         self._dirty = True
         self._next_show = 0.0
@@ -57,9 +57,9 @@ class WizardWindow(QDialog):
         self._connect_everything()
         self._go_to(0)
         self.feed.start()
-        self.looker.start()
-        if plan.solver:
-            self.work.solver.prepare(plan.solver)
+        self.picture_worker.start()
+        if definition.solver:
+            self.work.solver.prepare(definition.solver)
         self._timer = QTimer(self)
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self.tick)
@@ -71,9 +71,9 @@ class WizardWindow(QDialog):
         frame.next_button.clicked.connect(self.next)
         frame.close_button.clicked.connect(self.reject)
         frame.work_view.again_asked.connect(lambda: self.work.again(self.step))
-        frame.wall.picked.connect(self._pick)
+        frame.grid.picked.connect(self._pick)
         self.work.changed.connect(self.refresh)
-        for page in self.plan.pages:
+        for page in self.definition.pages:
             page.changed.connect(self._page_changed)
             if isinstance(page, AcceptPage):
                 page.restore_asked.connect(self.restore)
@@ -86,12 +86,12 @@ class WizardWindow(QDialog):
     @property
     def page(self) -> QWidget:
         """The page shown."""
-        return self.plan.pages[self.current]
+        return self.definition.pages[self.current]
 
     @property
     def step(self) -> Step:
         """The step shown."""
-        return self.plan.pages[self.current].step
+        return self.definition.pages[self.current].step
 
     @property
     def busy(self) -> bool:
@@ -123,11 +123,11 @@ class WizardWindow(QDialog):
     def _go_to(self, number: int) -> None:
         self.work.leave()
         self.current = number
-        page = self.plan.pages[number]
+        page = self.definition.pages[number]
         page.step.enter()
         self.frame.show_page(page, number)
         page.entered()
-        self.looker.watch(page.step)
+        self.picture_worker.watch(page.step)
         self.feed.pause(page.centre is not None and not page.step.watches)
         self._kept = page.step.view().kept
         self.refresh()
@@ -142,7 +142,7 @@ class WizardWindow(QDialog):
         self.refresh()
 
     def _carry_out(self, step: AcceptStep, outcome: State) -> None:
-        with contextlib.closing(self._kit.connect()) as asker:
+        with contextlib.closing(self._context.connect()) as asker:
             (step.apply if outcome == "used" else step.take_back)(asker.command)
 
     def _applied(self, step: AcceptStep, outcome: State) -> None:
@@ -164,7 +164,7 @@ class WizardWindow(QDialog):
 
     def tick(self) -> None:
         """What was seen in the newest pictures; what the step says to it; the pictures."""
-        seen = self.looker.found(self.step)
+        seen = self.picture_worker.found(self.step)
         if seen is not None:
             self.step.take(seen)
             self._dirty = True
@@ -172,19 +172,19 @@ class WizardWindow(QDialog):
         if self._dirty or now >= self._next_show:
             self._next_show = now + SHOW_S
             self.refresh()
-        self.frame.wall.refresh(self.feed)
+        self.frame.grid.refresh(self.feed)
 
     def refresh(self) -> None:
         """Ask the step and show it; begin its long work if it has some."""
         self._dirty = False
         self.work.offer(self.step)
-        views = [page.step.view() for page in self.plan.pages]
+        views = [page.step.view() for page in self.definition.pages]
         view = views[self.current]
-        self.plan.pages[self.current].show_view(view)
+        self.definition.pages[self.current].show_view(view)
         self.frame.show_view(view, self.step, self.current, [each.done for each in views])
-        self.frame.wall.refresh(self.feed)
+        self.frame.grid.refresh(self.feed)
         if view.kept > self._kept:
-            self.frame.wall.flash()
+            self.frame.grid.flash()
         self._kept = view.kept
 
     def _page_changed(self) -> None:
@@ -192,7 +192,7 @@ class WizardWindow(QDialog):
         self.refresh()
 
     def _pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
-        self.plan.pages[self.current].pick(camera, x, y, width, height)
+        self.definition.pages[self.current].pick(camera, x, y, width, height)
         self.refresh()
 
     # -- keys ------------------------------------------------------------------------------------------------------
@@ -212,15 +212,15 @@ class WizardWindow(QDialog):
         """This wizard's section of the guide, beside it."""
         if self.guide is None:
             self.guide = GuideViewer(self)
-        self.guide.open_page(self.plan.guide, self.plan.title)
+        self.guide.open_page(self.definition.guide, self.definition.title)
 
     # -- the end ---------------------------------------------------------------------------------------------------
 
     @property
     def would_lose(self) -> bool:
         """Whether closing now throws away what the person has done."""
-        used = any(isinstance(page.step, AcceptStep) and page.step.state == "used" for page in self.plan.pages)
-        return not used and any(page.step.keeps for page in self.plan.pages)
+        used = any(isinstance(page.step, AcceptStep) and page.step.state == "used" for page in self.definition.pages)
+        return not used and any(page.step.keeps for page in self.definition.pages)
 
     def reject(self) -> None:
         """Escape and Close: ask only when something would be lost."""
@@ -234,7 +234,7 @@ class WizardWindow(QDialog):
 
     def _may_lose(self) -> bool:
         answer = QMessageBox.question(
-            self, self.plan.title, "Close without using this calibration? What was captured here is lost; the "
+            self, self.definition.title, "Close without using this calibration? What was captured here is lost; the "
             "calibration in force stays as it is.",
             QMessageBox.StandardButton.Discard | QMessageBox.StandardButton.Cancel, QMessageBox.StandardButton.Cancel)
         return answer == QMessageBox.StandardButton.Discard
@@ -245,10 +245,10 @@ class WizardWindow(QDialog):
             return self._ending
         self._timer.stop()
         self.work.close()
-        put_back, feed, looker = self.plan.put_back, self.feed, self.looker
+        put_back, feed, worker = self.definition.put_back, self.feed, self.picture_worker
 
         def stop() -> None:
-            looker.stop()
+            worker.stop()
             feed.stop()
             if put_back is not None:
                 put_back()

@@ -135,7 +135,7 @@ class PictureWorker:
         self._found: tuple[Step, Any] | None = None
         self._looked_at: dict[str, Picture] = {}
         self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="looker", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="wizard pictures", daemon=True)
 
     def start(self) -> PictureWorker:
         """Begin; returns itself."""

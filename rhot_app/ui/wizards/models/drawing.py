@@ -1,4 +1,4 @@
-"""What a step wants drawn over a picture, in px of the full frame. The picture wall paints it; nothing here is Qt.
+"""What a step wants drawn over a picture, in px of the full frame. The grid of pictures paints it; nothing here is Qt.
 
 A colour is ``#rrggbb`` or the name of a tone of `rhot_app.ui.models.palette.Scheme` ("good", "accent").
 """

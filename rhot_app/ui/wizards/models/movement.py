@@ -23,7 +23,7 @@ class Request:
     path: Path
 
 
-class Coach(Protocol):
+class Guide(Protocol):
     """Watches the movement while it is recorded; a new one is made for every recording."""
 
     def watch(self, states: Sequence[HandState]) -> None:
@@ -48,7 +48,7 @@ class MovementStep(Step):
 
     captures = True
 
-    def __init__(self, title: str, sentence: str, seconds: float, folder: Path, coach: Callable[[], Coach],
+    def __init__(self, title: str, sentence: str, seconds: float, folder: Path, guide: Callable[[], Guide],
                  recent: Callable[[], Sequence[HandState]]) -> None:
         """`sentence` says what to do before it begins; it ends by itself after `seconds`. `recent` gives the states of
         the last seconds; logs are written into `folder`. `unneeded` may be set to say why nothing need be recorded."""
@@ -60,8 +60,8 @@ class MovementStep(Step):
         self.unneeded: Callable[[], str] = lambda: ""
         self._sentence = sentence
         self._folder = folder
-        self._make_coach = coach
-        self._coach: Coach | None = None
+        self._make_guide = guide
+        self._guide: Guide | None = None
         self._recent = recent
         self._number = 0
         self._began_s = 0.0
@@ -80,7 +80,7 @@ class MovementStep(Step):
             self.phase, self.problem, self.log = "beginning", "", None
             self._number += 1
             self._path = self._folder / f"{self.title.lower().replace(' ', '-')}-{self._number}.log"
-            self._coach = self._make_coach()
+            self._guide = self._make_guide()
         elif self.phase == "recording":
             self.phase = "ending"
         else:
@@ -112,8 +112,8 @@ class MovementStep(Step):
             return StepView(self.unneeded(), done=True)
         elapsed = time.monotonic() - self._began_s
         if self.phase == "recording":
-            assert self._coach is not None
-            self._coach.watch(self._recent())
+            assert self._guide is not None
+            self._guide.watch(self._recent())
             if elapsed >= self.seconds:
                 self.capture()
         recorded = self.phase == "recorded"
@@ -122,23 +122,23 @@ class MovementStep(Step):
 
     @property
     def _shortfall(self) -> str:
-        return self._coach.shortfall() if self._coach is not None else ""
+        return self._guide.shortfall() if self._guide is not None else ""
 
     def _say(self, elapsed_s: float) -> str:
         if self.phase == "recording":
-            assert self._coach is not None
-            return f"{self._coach.sentence()} {max(0.0, self.seconds - elapsed_s):.0f} s left."
+            assert self._guide is not None
+            return f"{self._guide.sentence()} {max(0.0, self.seconds - elapsed_s):.0f} s left."
         if self.phase == "recorded":
             return f"{self._shortfall} Record again." if self._shortfall else "Recorded. Go on, or record again."
         return "One moment." if self.phase in ("beginning", "ending") else self._sentence
 
     def _bars(self, elapsed_s: float) -> tuple[Bar, ...]:
         done = {"recording": min(elapsed_s / self.seconds, 1.0), "ending": 1.0, "recorded": 1.0}.get(self.phase, 0.0)
-        coach = self._coach.bars() if self._coach is not None else ()
-        return (Bar("time", done, f"of {self.seconds:.0f} s recorded"), *coach)
+        guide = self._guide.bars() if self._guide is not None else ()
+        return (Bar("time", done, f"of {self.seconds:.0f} s recorded"), *guide)
 
 
-class QuietCoach:
+class QuietGuide:
     """Says one sentence all the time, and shows how many of the markers are seen."""
 
     def __init__(self, sentence: str) -> None:

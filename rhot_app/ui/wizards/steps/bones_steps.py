@@ -20,7 +20,7 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import rig_rows
-from rhot_app.ui.wizards.models.movement import Coach, MovementStep, QuietCoach
+from rhot_app.ui.wizards.models.movement import Guide, MovementStep, QuietGuide
 from rhot_app.ui.wizards.models.step import Bar, SolveStep, Step, StepView, Task
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ class EntryStep(Step):
         return StepView("Press Next: the bones are as entered.", done=True, verdict=self.report.verdict)
 
 
-class SweepCoach:
+class SweepGuide:
     """Which fingers have bent and stretched enough, by the collector that the command uses."""
 
     def __init__(self, rig: Rig) -> None:
@@ -168,14 +168,14 @@ class SweepCoach:
         return "" if self._collector is not None and self._collector.progress.done else self.sentence()
 
 
-def make_coach(rig: Rig) -> Coach:
-    """A coach for the markers of the rig; a quiet one when none of them names its place on the hand."""
+def make_guide(rig: Rig) -> Guide:
+    """A guide for the markers of the rig; a quiet one when none of them names its place on the hand."""
     roles, painted = _roles(rig)
     try:
         tracks_of(np.zeros(1), np.zeros((1, len(rig.markers.ids), 3)), rig.markers.ids, roles, painted=painted)
     except CalibrationError:
-        return QuietCoach("Bend and stretch every finger.")
-    return SweepCoach(rig)
+        return QuietGuide("Bend and stretch every finger.")
+    return SweepGuide(rig)
 
 
 def solve_log(log: Path, rig: Rig, base: HandAnatomy, *, progress: Progress) -> BonesReport:

@@ -170,7 +170,7 @@ class PictureAdvice:
 
 
 class CameraEye:
-    """Looks at the pictures of one camera; used by the looker's thread only."""
+    """Looks at the pictures of one camera; used by the picture worker's thread only."""
 
     def __init__(self, markers: MarkerSet) -> None:
         self._markers = markers

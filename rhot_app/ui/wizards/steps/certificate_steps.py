@@ -46,9 +46,9 @@ TITLES: dict[str, str] = {"static": "Still", "ruler": "Ruler", "rod": "Rod", "fl
 class CertificateStep(MovementStep):
     """A step of the protocol: a recording that may be left out, which the certificate then says."""
 
-    def __init__(self, name: str, folder: Path, coach: Callable[[], Any],
+    def __init__(self, name: str, folder: Path, guide: Callable[[], Any],
                  recent: Callable[[], Sequence[Any]]) -> None:
-        super().__init__(TITLES[name], _SENTENCES[name], SECONDS[name], folder, coach, recent)
+        super().__init__(TITLES[name], _SENTENCES[name], SECONDS[name], folder, guide, recent)
         self.name = name
 
     def view(self) -> StepView:
@@ -60,9 +60,9 @@ class CertificateStep(MovementStep):
 class RulerDistances(CertificateStep):
     """Many short recordings, one for each distance. `distance_mm` and `marker` are what is recorded next."""
 
-    def __init__(self, folder: Path, coach: Callable[[], Any], recent: Callable[[], Sequence[Any]],
+    def __init__(self, folder: Path, guide: Callable[[], Any], recent: Callable[[], Sequence[Any]],
                  marker: str) -> None:
-        super().__init__("ruler", folder, coach, recent)
+        super().__init__("ruler", folder, guide, recent)
         self.distance_mm = 200.0
         self.marker = marker
         self.rows: list[RulerStep] = []

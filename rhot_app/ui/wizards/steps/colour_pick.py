@@ -175,7 +175,7 @@ class PickStep(Step):
         return bool(self.gathering.names)
 
     def see(self, pictures: Pictures) -> tuple[Pictures, MaskedPictures]:
-        """The mask; the detectors are the looker's own."""
+        """The mask; the detectors are the picture worker's own."""
         return pictures, self._maker.look(self.held or pictures, self._markers, tuple(self._learnt))
 
     def take(self, seen: tuple[Pictures, MaskedPictures]) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from rhot_app.calibration.colour.colours import ColourReport, solve_colours
 from rhot_app.calibration.colour.surroundings import HUE_STEP_DEG
 from rhot_app.calibration.registry import COLOURS
-from rhot_app.calibration.verdict import Finding, judged_anew
+from rhot_app.calibration.verdict import Finding, with_findings
 from rhot_app.project import Rig
 from rhot_app.ui.models.palette import hex_of
 from rhot_app.ui.models.proposal import Change, NodeChange, Proposal, RigChange, Row
@@ -187,7 +187,7 @@ def learning(picks: PickStep, given: dict[str, ChromaModel], title: str) -> Task
 _HEADROOM = 1.05  # of the chart above the highest column
 
 
-class ApartStep(ChartedStep):
+class SeparationStep(ChartedStep):
     """The verdict on the colours with the bounds that a person has left them, and on the light since then."""
 
     title = "Tell them apart"
@@ -206,7 +206,7 @@ class ApartStep(ChartedStep):
     @property
     def judged(self) -> ColourReport | None:
         """The report with what the cameras say of the light now."""
-        return self.report and replace(self.report, verdict=judged_anew(self.report.verdict, self._drift))
+        return self.report and replace(self.report, verdict=with_findings(self.report.verdict, self._drift))
 
     @property
     def keeps(self) -> bool:

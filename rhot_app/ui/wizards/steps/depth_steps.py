@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthReport, fit_depth, geometry_of, replaced_calibration
 from rhot_app.calibration.depth.table import DepthRow, DepthTable
 from rhot_app.calibration.registry import DEPTH
-from rhot_app.calibration.verdict import Verdict, judged_anew
+from rhot_app.calibration.verdict import Verdict, with_findings
 from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
 from rhot_app.state import HandState
@@ -169,7 +169,7 @@ class LawStep(ChartedStep):
 
 def verdict_of(report: DepthReport, rig: Rig) -> Verdict:
     """On the law, and on what it replaces in the rig."""
-    return judged_anew(report.verdict, replaced_calibration(rig))
+    return with_findings(report.verdict, replaced_calibration(rig))
 
 
 def chart_of(report: DepthReport) -> Chart:

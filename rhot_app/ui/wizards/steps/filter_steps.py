@@ -208,7 +208,7 @@ class _Visibility:
         return f"Both cameras have not seen {', '.join(names)}." if names else ""
 
 
-class StillCoach:
+class StillGuide:
     """Rest the hand."""
 
     def __init__(self, meters: LiveMeters) -> None:
@@ -235,7 +235,7 @@ class StillCoach:
         return self._visibility.shortfall() if self._still.share >= 1.0 else "The hand moved: rest it on something."
 
 
-class FastCoach:
+class FastGuide:
     """Wave the hand briskly."""
 
     def __init__(self, meters: LiveMeters) -> None:

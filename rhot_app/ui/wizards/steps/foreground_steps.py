@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.registry import FOREGROUND
-from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, judged_anew, told_apart
+from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, told_apart, with_findings
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import Picture, ask_picture
@@ -361,7 +361,7 @@ def propose(empty: EmptyStep, skin: SkinStep) -> Proposal | None:
     verdict = skin.verdict
     if not (empty.learnt and skin.learnt) or verdict is None or empty.verdict is None:
         return None
-    verdict = judged_anew(verdict, empty.verdict.findings)
+    verdict = with_findings(verdict, empty.verdict.findings)
     rows = [row for name in empty.nodes for row in (
         Row(f"{name}: background", _background(empty.before.get(name, {})), "learnt now"),
         Row(f"{name}: skin", str(empty.before.get(name, {}).get("skin", "none")), "learnt now"))]

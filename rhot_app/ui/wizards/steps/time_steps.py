@@ -36,7 +36,7 @@ def solve_log(log: Path, rig: Rig, *, progress: Progress) -> TimeReport:
     return calibrate_times(table, rig, progress)
 
 
-class WaveCoach:
+class WaveGuide:
     """Tells whether the hand moves fast enough up and down: a delay shows as speed times time."""
 
     def __init__(self) -> None:

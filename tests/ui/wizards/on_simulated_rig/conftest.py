@@ -10,14 +10,14 @@ import msgspec
 import pytest
 from PySide6.QtWidgets import QWidget
 from wizard_hands import Hands, opened
-from wizard_rig import FakeMemory
+from wizard_rig import FakeSettingsStore
 
 from rhot_app.project import Rig, load_rig, save_rig
 from rhot_app.simulator.nodes.remote import TwinRemote
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.framework.plan import WIZARDS
+from rhot_app.ui.wizards.framework.definition import WIZARDS
 from rhot_app.ui.wizards.launcher import Launcher
 
 
@@ -67,7 +67,7 @@ def rig_launcher(themed: Any, simulated_rig: SimulatedRig) -> Iterator[Launcher]
     """What the Calibrate menu opens windows with, on the simulated rig; afterwards the rig is the true one again."""
     parent = QWidget()
     session = simulated_rig.session
-    launcher = Launcher(session.asker, session.client, lambda: DARK, FakeMemory(), parent)
+    launcher = Launcher(session.asker, session.client, lambda: DARK, FakeSettingsStore(), parent)
     yield launcher
     launcher.close()
     simulated_rig.use(simulated_rig.truth)

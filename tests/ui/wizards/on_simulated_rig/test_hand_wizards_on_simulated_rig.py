@@ -64,7 +64,7 @@ def test_depth_is_found_without_a_board(simulated_rig, open_on_rig):
 
 
 def click_marker(hands, camera, at):
-    view = hands.frame.wall.views[camera]
+    view = hands.frame.grid.views[camera]
     hands.click(view, view.to_widget(*at))
 
 

@@ -17,7 +17,7 @@ from rhot_app.ui.wizards.framework.page import Page
 
 # -- What wizards remember between runs --------------------------------------------------------------------------------
 
-class Memory(Protocol):
+class SettingsStore(Protocol):
     """`rhot_app.ui.common.settings.Settings` is one."""
 
     def remembered(self, name: str) -> str:
@@ -32,7 +32,7 @@ class Memory(Protocol):
 # -- What a wizard is made of, and what it is made from ----------------------------------------------------------------
 
 @dataclass(frozen=True, slots=True)
-class Kit:
+class WizardContext:
     """What every wizard is given: the rig in force, its file (None: it came from none), a way to ask the engine, the
     colours of the screen, and what was entered before. Node settings by node id are as the nodes gave them when the
     wizard was opened. `listen` makes a client that hears the hand's states, for wizards that calibrate by a moving
@@ -42,14 +42,14 @@ class Kit:
     rig_path: Path | None
     connect: Callable[[], Asker]
     scheme: Scheme
-    memory: Memory
+    memory: SettingsStore
     node_settings: dict[int, dict[str, Any]] = field(default_factory=dict)
     listen: Callable[[], Listener] | None = None
     make_solver: Callable[[], Solver] = Solver
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class Definition:
     """A wizard ready to be shown: its pages in order, the last one an `AcceptPage`. `guide` is its page in the guide,
     where a section has the wizard's title;
     `solver` a module that the solving process should import in good time; `put_back` undoes in a worker what the wizard
@@ -65,7 +65,7 @@ class Plan:
 # -- All wizards -------------------------------------------------------------------------------------------------------
 
 class Wizard(Calibration):
-    """A calibration with a wizard: the module of its name in this package has ``make_plan(kit)``."""
+    """A calibration with a wizard: the module of its name in this package has ``make_wizard(context)``."""
 
     __slots__ = ()
 
@@ -73,10 +73,10 @@ class Wizard(Calibration):
         """Import what it needs; takes a moment the first time, so call it in a worker."""
         importlib.import_module(f"rhot_app.ui.wizards.{self.name}")
 
-    def make_plan(self, kit: Kit) -> Plan:
+    def make_wizard(self, context: WizardContext) -> Definition:
         """Its pages for the rig at hand."""
-        plan: Plan = importlib.import_module(f"rhot_app.ui.wizards.{self.name}").make_plan(kit)
-        return plan
+        made: Definition = importlib.import_module(f"rhot_app.ui.wizards.{self.name}").make_wizard(context)
+        return made
 
 
 OPEN_WIZARD = "wizard "

@@ -16,7 +16,7 @@ NEEDED = ("The scale comes from the board's squares alone; a second length finds
 SKIPPED = "The rig file will say that no length was checked, and so will the app."
 
 
-class KnownStep(Step):
+class LengthsStep(Step):
     """One of them is needed, or a person who knows what it means to skip it. The ruler's ends are clicked in pictures
     that stand still; lengths in mm, 0 for none."""
 
