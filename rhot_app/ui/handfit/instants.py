@@ -17,7 +17,7 @@ from rhot_app.ui.backend.feed import LiveFeed
 from rhot_app.ui.handfit.changes import FOLDER_KEY, Changes
 from rhot_app.ui.handfit.files import in_order, is_video, read_instant
 from rhot_app.ui.handfit.frame import FitFrame
-from rhot_app.ui.wizards.framework.plan import SettingsStore
+from rhot_app.ui.wizards.framework.definition import SettingsStore
 from rhot_node.pictures import VIDEO_SUFFIXES
 
 TITLE: Final = "Fit the hand to pictures"

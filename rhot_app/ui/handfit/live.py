@@ -20,7 +20,7 @@ from rhot_app.ui.handfit.instants import LiveCameras
 from rhot_app.ui.handfit.window import REASON, HandFitWindow
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.proposal import RigChange
-from rhot_app.ui.wizards.framework.plan import SettingsStore
+from rhot_app.ui.wizards.framework.definition import SettingsStore
 
 RECENT_S = 0.5
 """s: a pose that was tracked so lately is where a hand held still is now."""

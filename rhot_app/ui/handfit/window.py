@@ -19,7 +19,7 @@ from rhot_app.ui.handfit.changes import Changes
 from rhot_app.ui.handfit.frame import FitFrame, Kept
 from rhot_app.ui.handfit.instants import TITLE, Instants, LiveCameras
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.framework.plan import SettingsStore
+from rhot_app.ui.wizards.framework.definition import SettingsStore
 
 REASON: Final = "hand fitted to pictures"
 """In the history of a rig file."""
