@@ -138,10 +138,9 @@ class BareHandTracker:
         self.constraints: list[Residual] = [JointLimits(self.model.limits)]
         if self.plane is not None:
             self.constraints.append(self.plane)
-        self.tracking = False
         self.frames: list[ContourFrame | None] = [None] * len(self.cameras)
         self.noise = [0.0] * len(self.cameras)
-        self._sequence, self._first_update = 0, False
+        self._sequence, self.starting = 0, False
         self.search = PoseSearch(self.model, self.surface, self.cameras, self.plane)
         self.start_pose = shown_pose(rig, self.cameras, self.model, self.plane, lateral_m)
         self._repeated, self._taken_s = [1.0] * len(self.cameras), [-np.inf] * len(self.cameras)
@@ -154,7 +153,7 @@ class BareHandTracker:
         known = np.linalg.inv(covariance[TANGENT.angles, TANGENT.angles]) + np.eye(POSE - 6) / place_sd[2] ** 2
         covariance[TANGENT.angles, TANGENT.angles] = np.linalg.inv(known)
         self.filter.begin(t_ns, state, covariance)
-        self.tracking = self._first_update = True
+        self.starting = True
         self._taken_s = [-np.inf] * len(self.cameras)
         self.search.last_search_s = -np.inf
         self.frames = [None] * len(self.cameras)
@@ -162,10 +161,9 @@ class BareHandTracker:
     def begin(self, images: Sequence[Image | None], t_ns: int) -> bool:
         """Start a track if a hand has taken `start_pose` in these images. Returns whether it has."""
         pose = self.taken(self.maps_of(images))
-        self.tracking = pose is not None
         if pose is not None:
             self.start(pose, t_ns)
-        return self.tracking
+        return pose is not None
 
     def maps_of(self, images: Sequence[Image | None]) -> list[NDArray[np.float32] | None]:
         """Foreground probabilities of every STEP-th pixel of each image; None without an image."""
@@ -189,7 +187,7 @@ class BareHandTracker:
         """The hand after one image (H, W, 3) RGB of each camera, None without one, at master times `t_ns`. Raises
         TrackingError before a start."""
         begun = time.perf_counter()
-        if not self.tracking:
+        if not self.filter.knots:
             raise TrackingError("the bare hand has no start; give one by start(pose, t_ns), or by begin(images, t_ns) "
                                 "once it has taken its start pose")
         given = {c: image for c, image in enumerate(images) if image is not None}
@@ -208,10 +206,10 @@ class BareHandTracker:
         self.frames = [frame if c in images else None for c, frame in enumerate(self.frames)]
         maps, search, start = self._maps(images), self.search, None
         odds = None if maps is None else search.odds_of(maps)
-        if maps and odds and (self._first_update or search.search_due(odds, prediction[0], t_s)):
+        if maps and odds and (self.starting or search.search_due(odds, prediction[0], t_s)):
             start = search.relocalise(maps, prediction, self.process.stationary, since_s)
             search.last_search_s = t_s
-        passes = START_PASSES if self._first_update or start is not None else PASSES
+        passes = START_PASSES if self.starting or start is not None else PASSES
         knot = self._fit(images, late, t_s, prediction, prediction[0] if start is None else start, extra, passes)
         if odds is not None:
             per_pixel = search.log_odds_per_pixel(odds, knot.state)
@@ -219,8 +217,8 @@ class BareHandTracker:
                 # Edges have drawn the pose away from the foreground: restart there, without the prediction.
                 knot = self._fit(images, late, t_s, self._restart(t_s, start), start, extra, START_PASSES)
                 per_pixel = search.log_odds_per_pixel(odds, knot.state)
-            search.average(per_pixel, first=self._first_update)
-        self._first_update = False
+            search.average(per_pixel, first=self.starting)
+        self.starting = False
         return knot
 
     def _restart(self, t_s: float, start: Array) -> tuple[Array, Array]:

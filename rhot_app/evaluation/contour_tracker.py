@@ -3,6 +3,7 @@ wait for a hand that takes the start pose."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -11,12 +12,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.follower import HandFollower
 from rhot_app.errors import TrackingError
 from rhot_app.evaluation.searched_nodes import FIRST_NS, SearchedNodes
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig, TrackerSettings
 from rhot_app.state import HandState
+from rhot_app.tracking.contours.follower import HandFollower
 from rhot_app.tracking.scene import make_tracker
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 
@@ -31,24 +32,22 @@ class ContourTracker:
     """A `HandFollower` of the evaluation. `waits`: it waits for a hand from the beginning, else from `start` on."""
 
     def __init__(self, rig: Rig, *, known_size: bool, waits: bool) -> None:
-        self._follower = HandFollower(rig, None, known_size=known_size)
-        self._waits = waits
+        self._rig, self._known_size, self._empty_until_ns = rig, known_size, 0 if waits else sys.maxsize
         self._background = _Background(len(rig.nodes))
-        self._learnt = False
+        self._follower: HandFollower | None = None
 
     def start(self, pose: HandPose, t_ns: int) -> None:
-        """Begin at a pose."""
-        self._follower.start(pose, t_ns)
-        self._waits = True
+        """Begin at a pose, with a background that has been learnt."""
+        assert self._follower is not None
+        self._follower.follow(pose, t_ns)
 
     def step(self, images: Sequence[Picture | None], t_ns: Sequence[int]) -> HandState:
         """The hand after one picture of each camera. Raises TrackingError while there is none."""
-        if not self._learnt:
-            self._follower.set_foreground(self._background.learnt_from(images))
-            self._learnt = True
+        if self._follower is None:
+            foreground = self._background.learnt_from(images)
+            self._follower = HandFollower(self._rig, foreground, known_size=self._known_size,
+                                          empty_until_ns=self._empty_until_ns)
             raise TrackingError("the background has been learnt.")
-        if not self._waits:
-            raise TrackingError("there is no hand in the pictures yet.")
         return _tracked(self._follower.step(images, t_ns))
 
 

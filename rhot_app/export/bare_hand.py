@@ -13,7 +13,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.follower import HandFollower
 from rhot_app.barehand.overlay import overlay
 from rhot_app.calibration.registry import ADAPTED
 from rhot_app.errors import ExportError, RecordingError, note_loss
@@ -27,6 +26,7 @@ from rhot_app.project import Rig
 from rhot_app.rig_history import accept_hand, require_hand_place
 from rhot_app.sources.frame_sets import CameraVideo, frame_sets, frames_left_out, overlap
 from rhot_app.state import HandState
+from rhot_app.tracking.contours.follower import HandFollower
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 
 Image = NDArray[np.uint8]
@@ -108,7 +108,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
         drawn = stack.enter_context(whole_pictures(pictures, fps)) if pictures is not None else None
         for number, frames in enumerate(frame_sets(videos)):
             if number == start_frame:
-                run.start(tracker.start_pose, frames.first_ns)
+                run.follow(tracker.start_pose, frames.first_ns)
             progress("tracking", min(max((frames.first_ns - first) / max(last - first, 1), 0.0), 1.0))
             state = run.step(frames.images, frames.t_ns)
             spent.append((state.t_master_ns, state.tracked))
@@ -117,7 +117,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
             if drawn is not None:
                 def draw(c: int, picture: Image, state: HandState = state) -> Image:
                     frame = tracker.frames[c]
-                    return picture if frame is None or not run.following else overlay(
+                    return picture if frame is None or not run.confirmed else overlay(
                         picture, frame, tracker.filter.newest.state, tracker.cameras[c].project(state.joint_positions))
                 drawn.add(side_by_side(tracker.cameras, frames.images, state.condition.value, draw))
         if start_frame is not None and start_frame >= len(spent):

@@ -10,10 +10,10 @@ import pytest
 from bare_scenes import DISTANCE_M, model_and_surface, near, poses, rig_of
 from pictures import person, picture, taken, two_cameras, wall
 
-from rhot_app.barehand.follower import HandFollower
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.state import HandState
+from rhot_app.tracking.contours.follower import HandFollower
 from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
 
 IMAGES = 12  # a hand that holds its start pose in so many is followed
@@ -124,7 +124,7 @@ def test_a_hand_that_holds_the_pose_is_followed(known: bool) -> None:
 
 def test_a_hand_whose_pose_somebody_has_given_is_followed_by_its_skin() -> None:
     follower = HandFollower(rig_of(CAMERAS), None, known_size=True)
-    follower.start(near(pose_of(0)), 0)
+    follower.follow(near(pose_of(0)), 0)
     found = [follower.step([hand(camera, empty, number) for camera, empty in zip(CAMERAS, WALLS, strict=True)],
                            [round(1e9 * number / FPS)] * 2) for number in range(3)]
     assert all(state.tracked for state in found) and wrong(found) == []

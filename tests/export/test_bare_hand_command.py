@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 from recorded_landmarks import FOLDER, needs_recording, recorded_nodes
 
 from rhot_app.__main__ import main
-from rhot_app.barehand.follower import HandFollower
 from rhot_app.barehand.start import start_pose_file
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import RecordingError
 from rhot_app.export.bare_hand import lost_intervals
-from rhot_app.hand.skeleton import JOINTS
+from rhot_app.hand.skeleton import JOINTS, HandPose
 from rhot_app.project import Rig, TrackerSettings, load_rig, save_rig
 from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
 from rhot_app.simulator.bare_hand.sequence import BareHandFrame, BareHandOptions, bare_hand_frames, bare_hand_rig
 from rhot_app.sources.frame_sets import frame_sets, frames_left_out, on_one_clock, open_video
+from rhot_app.tracking.contours.follower import HandFollower
 from rhot_node.capture.yuv import YuvWriter
 from rhot_node.detect.foreground import learn_background, skin_foreground
 from rhot_node.detect.image import from_bgr
@@ -97,7 +97,7 @@ def test_a_hand_in_two_videos_is_a_table_and_a_film(recorded: Recorded, tmp_path
                                                      capsys: pytest.CaptureFixture[str]) -> None:
     given = str(EMPTY)
     if start == "pose":
-        monkeypatch.setattr("rhot_app.barehand.follower.MIN_DWELL_NS", 0)  # the film is short
+        monkeypatch.setattr("rhot_app.tracking.contours.tracker.MIN_DWELL_NS", 0)  # the film is short
         for threshold, least in (("CONTOUR_THRESHOLD", 0.5), ("LOG_ODDS_THRESHOLD", 0.2)):  # pictures 320 px wide
             monkeypatch.setattr(f"rhot_app.barehand.tracker.{threshold}", least)
         document = msgspec.to_builtins(load_rig(recorded.rig).tracker.start_poses[0])
@@ -129,20 +129,19 @@ def test_a_hand_in_two_videos_is_a_table_and_a_film(recorded: Recorded, tmp_path
 
 def test_a_hand_that_is_found_again_has_its_own_key_frames(recorded: Recorded,
                                                            monkeypatch: pytest.MonkeyPatch) -> None:
-    def find(tracker: BareHandTracker, _: object, t_ns: int) -> bool:
-        tracker.start(there[0].truth.pose, t_ns)
-        return True
+    def find(*_: object) -> HandPose:
+        return there[0].truth.pose
 
     away, there = recorded.frames[:EMPTY], recorded.frames[EMPTY:]
     empty = [[frame.images[c] for frame in away] for c in range(2)]
     followed = HandFollower(load_rig(recorded.rig), [learn_background(skin_foreground(), one) for one in empty],
                             known_size=True)
-    followed.start(there[0].truth.pose, 0)
+    followed.follow(there[0].truth.pose, 0)
     shown = [*there[:4], *away, *[there[0]] * 8]
     monkeypatch.setattr("rhot_app.barehand.tracker.CONTOUR_THRESHOLD", 0.5)
     for number, frame in enumerate(shown):
         if number == len(shown) - 8:
-            monkeypatch.setattr(BareHandTracker, "begin", find)
+            monkeypatch.setattr(BareHandTracker, "taken", find)
         state = followed.step(frame.images, [round(1e9 * number / FPS)] * 2)
         if number == 3:
             assert state.tracked and followed.key_frames.kept

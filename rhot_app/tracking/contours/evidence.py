@@ -3,7 +3,7 @@ foreground."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.contour_residual import ContourFrame
 from rhot_app.barehand.joints import points_in
-from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame
 from rhot_app.barehand.start import MAJORITY, joints_on_foreground
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.estimation.track import LOST_NS, LOST_PERIODS, NEVER, WRONG_NS, WRONG_PERIODS
@@ -68,24 +67,22 @@ class Evidence:
         self._of_camera = [_CameraEvidence() for _ in self._cameras]
         self.observed_ns, self._checked_ns = t_ns, NEVER
 
-    def take_edges(self, weighed: Iterable[tuple[EdgeFrame, ContourFrame]]) -> None:
-        """Take the contours of some frames, after the update by their edges."""
-        for frame, contour in weighed:
-            camera, counts = self._of_camera[frame.camera], contour.slice_counts.sum(axis=0)
-            camera.searched_ns = frame.t_row0_master_ns
-            if counts[0] > MAJORITY * counts[1]:
-                camera.supported_ns = frame.t_row0_master_ns
+    def take_contour(self, camera: int, t_ns: int, contour: ContourFrame) -> None:
+        """Take the contour in one camera's frame of `t_ns`, after the update by its edges."""
+        own, (found, expected) = self._of_camera[camera], contour.slice_counts.sum(axis=0)
+        own.searched_ns = t_ns
+        if found > MAJORITY * expected:
+            own.supported_ns = t_ns
         self._update()
 
-    def take_map(self, frame: ForegroundFrame, state: Array) -> None:
-        """Take the foreground of one frame, at whose time the hand is in `state`."""
-        camera = self._of_camera[frame.camera]
-        inside, share = joints_on_foreground(self._hand.cameras[frame.camera], joints_of(self._hand, state),
-                                             frame.probability)
-        camera.whole = inside > MAJORITY
-        camera.mapped_ns = frame.t_row0_master_ns
-        if share > MAJORITY and (self.confirmed or camera.whole):
-            camera.covered_ns = frame.t_row0_master_ns
+    def take_map(self, camera: int, t_ns: int, probability: NDArray[np.float32], state: Array) -> None:
+        """Take the foreground `probability` (h, w) in one camera's frame of `t_ns`, where the hand is in `state`."""
+        own = self._of_camera[camera]
+        inside, share = joints_on_foreground(self._hand.cameras[camera], joints_of(self._hand, state), probability)
+        own.whole = inside > MAJORITY
+        own.mapped_ns = t_ns
+        if share > MAJORITY and (self.confirmed or own.whole):
+            own.covered_ns = t_ns
         self._update()
 
     def lost(self, t_ns: int) -> bool:

@@ -41,29 +41,30 @@ _PERIOD_S = 1.0 / 30.0  # assumed of a camera until its second frame
 
 @dataclass(slots=True)
 class CameraFrames:
-    """The times of one camera's frames and requests, master ns. `period_ns`: between two frames. `target_ns`: the frame
-    of the last request for slices. `map_requested_ns`: the last request for a map alone. `answered_ns`: the newest
-    frame with edges. `has_slices`: the last request or answer has slices, because the hand is in the image.
+    """The times of one camera's frames and requests, master ns. `newest`: what its node reported last of markers.
+    `newest_ns`: its newest frame. `period_ns`: between two frames. `target_ns`: the frame of the last request for
+    slices. `map_requested_ns`: the last request for a map alone. `answered_ns`: the newest frame with edges.
+    `has_slices`: the last request or answer has slices, because the hand is in the image.
     """
 
     newest: CameraObservations | None = None
+    newest_ns: int = NEVER
     period_ns: float = 1e9 * _PERIOD_S
     target_ns: int = NEVER
     map_requested_ns: int = NEVER
     answered_ns: int = NEVER
     has_slices: bool = False
 
-    def take(self, frame: CameraObservations) -> None:
+    def take(self, t_ns: int) -> None:
         """Take the time of one frame."""
-        since_ns = 0 if self.newest is None else frame.t_row0_master_ns - self.newest.t_row0_master_ns
+        since_ns = t_ns - self.newest_ns
         if 0 < since_ns < SESSION_NS:
             self.period_ns += 0.1 * (since_ns - self.period_ns)
-        self.newest = frame
+        self.newest_ns = t_ns
 
     def delivers(self, t_ns: int) -> bool:
         """Whether the camera delivers frames about `t_ns`."""
-        return (self.newest is not None
-                and abs(t_ns - self.newest.t_row0_master_ns) < WRONG_PERIODS * self.period_ns)
+        return abs(t_ns - self.newest_ns) < WRONG_PERIODS * self.period_ns
 
     def returns_edges(self, t_ns: int) -> bool:
         """Whether edges of the hand about `t_ns` can be expected from the camera."""

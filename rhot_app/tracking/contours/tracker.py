@@ -70,7 +70,7 @@ class ContourEstimator(Tracker):
         self.key_frames.clear()
         if self._markers is not None:
             self._markers.reset()
-        self._hand.frames, self._hand.tracking = [None] * len(self._names), False
+        self._hand.frames = [None] * len(self._names)
         self._hand.search.average_odds = 0.0
         self._requests = Requests(self._hand, self._predict, lambda t_ns: self.occluder(t_ns), self._max_slices)
         self._cameras = self._requests.cameras
@@ -80,7 +80,8 @@ class ContourEstimator(Tracker):
         self._used = self._waiting  # by the last update
         self.overlaps = [False] * len(self._names)
         self._agreed_ns = NEVER
-        self._tracking = self._was_confirmed = False
+        self._tracking = False
+        self.starts = 0
         self._latest: CameraObservations | EdgeFrame | None = None
 
     # -- Tracker -------------------------------------------------------------------------------------------------------
@@ -184,10 +185,14 @@ class ContourEstimator(Tracker):
         self._evidence.start(t_ns)
         self._requests.start(t_ns)
 
+    def confirm(self) -> None:
+        """The track is confirmed."""
+        self.starts += not self._evidence.confirmed
+        self._evidence.confirmed = True
+
     def drop_track(self) -> None:
         """End the track, and wait for a hand that takes its start pose."""
         self._tracking = False
-        self._hand.tracking = False
         self._hand.frames = [None] * len(self._names)
         self._requests.stop()
         self._waiting = {}
@@ -217,19 +222,12 @@ class ContourEstimator(Tracker):
 
     def _take_frame(self, frame: CameraObservations) -> bool:
         """Take the time and the markers of one frame, and end a lost track. Returns whether a state is due."""
-        camera = self._cameras[frame.camera]
-        if camera.newest is not None:
-            since_ns = frame.t_row0_master_ns - camera.newest.t_row0_master_ns
-            if -SESSION_NS < since_ns <= 0:
-                return False
-            if since_ns <= -SESSION_NS:  # another session, or a clock that was set
-                self._clear()
-                camera = self._cameras[frame.camera]
-        camera.take(frame)
-        self._hand.row_s[frame.camera] = 1e-9 * frame.row_time_ns
         t_ns = frame.t_row0_master_ns
-        if self._tracking and (self._hand.filter.newest_ns - t_ns > SESSION_NS or self._evidence.lost(t_ns)):
-            self.drop_track()
+        if not self._advance(frame.camera, t_ns):
+            return False
+        camera = self._cameras[frame.camera]
+        camera.newest = frame
+        self._hand.row_s[frame.camera] = 1e-9 * frame.row_time_ns
         marked = self._markers is not None and self._take_markers(frame, self._markers)
         if not self._tracking:
             self._requests.request_map(frame)
@@ -239,6 +237,18 @@ class ContourEstimator(Tracker):
             self._latest = frame
             return True
         return False
+
+    def _advance(self, camera: int, t_ns: int) -> bool:
+        """Take the time of a frame, and end a track that is lost by then. Returns whether it is the camera's newest."""
+        since_ns = t_ns - self._cameras[camera].newest_ns
+        if -SESSION_NS < since_ns <= 0:
+            return False
+        if since_ns <= -SESSION_NS:  # another session, or a clock that was set
+            self._clear()
+        self._cameras[camera].take(t_ns)
+        if self._tracking and (self._hand.filter.newest_ns - t_ns > SESSION_NS or self._evidence.lost(t_ns)):
+            self.drop_track()
+        return True
 
     def _weigh(self, frame: HandFrame) -> None:
         """Weigh what another kind observes of a hand that is tracked."""
@@ -281,7 +291,8 @@ class ContourEstimator(Tracker):
                 contour.ambiguous = 0.0  # markers tell the fingers apart
             self._hand.frames[number] = contour
             self._requests.request_slices(number, one.t_row0_master_ns)
-        self._evidence.take_edges(waiting.values())
+        for number, (one, contour) in waiting.items():
+            self._evidence.take_contour(number, one.t_row0_master_ns, contour)
         if not self._evidence.confirmed:
             return False
         self.key_frames.offer(self._hand)
@@ -310,7 +321,8 @@ class ContourEstimator(Tracker):
         """Take the foreground of one frame: to verify the track, or to acquire one."""
         maps = self._maps.take(frame)
         if self._tracking:
-            self._evidence.take_map(frame, self.state_at(frame.t_row0_master_ns))
+            t_ns = frame.t_row0_master_ns
+            self._evidence.take_map(frame.camera, t_ns, frame.probability, self.state_at(t_ns))
             self._unverified = maps or self._unverified
             return
         found = self._finder.found()
@@ -320,7 +332,7 @@ class ContourEstimator(Tracker):
             self._finder.look(maps)
 
     def _verify(self) -> None:
-        """Relocalise or confirm the track by the newest maps of all cameras, once all edges are used."""
+        """Relocalise and check the track by the newest maps of all cameras, once all edges are used."""
         maps = self._unverified
         if maps is None or self._waiting or not self._tracking:
             return
@@ -329,6 +341,10 @@ class ContourEstimator(Tracker):
         if not any(self.overlaps) and self._finder.verify(
                 maps, self._hand.filter.seconds(maps.t_ns), 1e-9 * min(one.period_ns for one in self._cameras)):
             self._requests.restart()
+        self._check(maps)
+
+    def _check(self, maps: Maps) -> None:
+        """Confirm a track that has held its start pose, or end it, by maps of all cameras."""
         observed_ns = self._evidence.observed_ns
         held = observed_ns - self._hand.filter.begun_ns >= MIN_DWELL_NS
         if self._evidence.confirmed or observed_ns <= max(
@@ -336,7 +352,7 @@ class ContourEstimator(Tracker):
             return
         if maps.t_ns - self._agreed_ns < SAME_MAPS_NS or (
                 held and self._hand.verified(maps.probabilities, self._predict(maps.t_ns)[0])):
-            self._evidence.confirmed = self._was_confirmed = True
+            self.confirm()
         elif held:
             self.drop_track()
 
@@ -375,7 +391,7 @@ class ContourEstimator(Tracker):
         not estimated."""
         ids = self._rig.markers.ids
         hand = self._hand.state(begun, ids) if self.confirmed else no_hand(
-            frame.t_row0_master_ns, Condition.LOST if self._was_confirmed else Condition.SEARCHING, self._names,
+            frame.t_row0_master_ns, Condition.LOST if self.starts else Condition.SEARCHING, self._names,
             markers=ids)
         for number, one in enumerate(self.newest_frames()):
             if one is not None:
