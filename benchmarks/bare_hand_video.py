@@ -28,8 +28,8 @@ from bare_scenes import rig_of  # noqa: E402
 
 from rhot_app.articulated.bodies import hand_bodies  # noqa: E402
 from rhot_app.articulated.tracker import LayeredTracker  # noqa: E402
-from rhot_app.barehand.overlay import overlay  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
+from rhot_app.export.overlay import overlay  # noqa: E402
 from rhot_app.geometry.camera import CameraModel, intrinsics_row  # noqa: E402
 from rhot_app.geometry.transforms import inverse, rigid  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402

@@ -35,8 +35,8 @@ from shipped_rig import RIGHT_HAND  # noqa: E402
 
 from rhot_app.articulated.bodies import ANGLES, camera_rays, hand_bodies, place  # noqa: E402
 from rhot_app.articulated.tracker import ConstantVelocity, LayeredTracker, free_of, rest_of  # noqa: E402
-from rhot_app.articulated.view import draw_layers  # noqa: E402
 from rhot_app.articulated.visibility import segment, visibility  # noqa: E402
+from rhot_app.export.layers_picture import draw_layers  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.limits import pose_prior  # noqa: E402

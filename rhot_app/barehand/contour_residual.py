@@ -20,13 +20,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contours import COLUMNS, INNER, contour_on_slices
+from rhot_app.barehand.contours import COLUMNS, INNER, SILHOUETTE, contour_on_slices
 from rhot_app.barehand.joints import POSE_AND_SHAPE
 from rhot_app.barehand.surface import FOREARM, PALM, Surface
 from rhot_app.estimation.residual import UNIT, Rows, compressed
 from rhot_app.geometry.camera import CameraRecord
 from rhot_app.hand.limits import LIMIT_SD_RAD
 from rhot_app.hand.motion.hand_state import POSE, STATE, TANGENT, tangent_size
+from rhot_app.state import SeenContour
 from rhot_node.detect.edges import Edges
 
 Array = NDArray[np.float64]
@@ -52,6 +53,9 @@ UNSURE = 0.02
 
 SAME_TIME_S = 1e-3
 """s: images nearer in time count as simultaneous: a hand at 2 m/s moves by 2 mm."""
+
+NEAR_SD = 3.0
+"""Standard deviations from the contour within which an edge is displayed as the hand's."""
 
 _STUDENT_4 = 0.375  # density at 0 of Student's t of 4 degrees of freedom
 _LEAST_CLUTTER = 1e-3  # edges per px
@@ -107,6 +111,25 @@ class ContourFrame:
         slices = _Slices(self.points, self.surface.group[self.points.capsule], self.edges, self.clutter,
                          self.shape_variance, self.expected_sd**2)
         return float(_gather(slices, *predicted, information, pull, self.slice_counts))
+
+
+def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array, t_node_ns: int = 0,
+                 shown: bool = False) -> SeenContour:
+    """The contour of a hand in `state` in the image of `t_ns`, `t_node_ns` by its node's clock, with slices and edges,
+    for display. `shown`: see `SeenContour`."""
+    offset, _, good = frame.predict(state)
+    centre, normal, half = frame.slices[:, :2], frame.slices[:, 2:4], frame.slices[:, 4:]
+    ends = np.hstack([centre - half * normal, centre + half * normal])
+    places, near = np.empty((0, 2)), np.empty(0, np.bool_)
+    if frame.edges is not None:
+        edges = frame.edges
+        row, column = np.nonzero((np.arange(edges.offset.shape[1]) < edges.number[:, None]) & good[:, None])
+        along = edges.offset[row, column]
+        places = centre[row] + along[:, None] * normal[row]
+        near = np.abs(along - offset[row]) < NEAR_SD * np.hypot(frame.expected_sd[row], edges.sd[row, column])
+    return SeenContour(camera, t_ns, (centre + offset[:, None] * normal)[good],
+                       frame.points.behind[good] == SILHOUETTE, ends[good] if not shown else np.empty((0, 4)), places,
+                       near, t_node_ns, shown=shown)
 
 
 def in_a_fit(frame: ContourFrame) -> ContourFrame:

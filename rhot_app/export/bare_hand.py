@@ -13,10 +13,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.overlay import overlay
 from rhot_app.calibration.registry import ADAPTED
 from rhot_app.errors import ExportError, RecordingError, note_loss
 from rhot_app.export.export import check_place, format_of, make_writer, whole_file
+from rhot_app.export.overlay import overlay
 from rhot_app.export.pictures import check_pictures, side_by_side, whole_pictures
 from rhot_app.export.plan import Plan
 from rhot_app.export.states import BLOCK, states_of

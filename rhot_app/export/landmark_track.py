@@ -19,13 +19,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.overlay import draw_skeleton
 from rhot_app.calibration.hand.landmark_bones import are_landmarks, measure_bones
 from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.calibration.recorded_observations import read_instants
 from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.errors import CalibrationError, RecordingError, input_file, note_loss
 from rhot_app.export.bare_hand import check_outputs, closing_sentences, lost_intervals, open_table
+from rhot_app.export.overlay import draw_skeleton
 from rhot_app.export.pictures import side_by_side, whole_pictures
 from rhot_app.export.recording import one_of_each_instant
 from rhot_app.geometry.camera import CameraModel

@@ -180,7 +180,7 @@ def _pictures(bodies: Bodies, placed: Placed, cameras: list[CameraModel],
     import numpy as np
 
     from rhot_app.articulated.bodies import camera_rays
-    from rhot_app.articulated.view import draw_layers
+    from rhot_app.export.layers_picture import draw_layers
 
     width, height = SIZE_PX
     rays = camera_rays(cameras[0])

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from bare_scenes import model_and_surface, near, poses, rig_of, scene, state_of
 
-from rhot_app.barehand.overlay import overlay
 from rhot_app.barehand.surface import FOREARM
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.errors import TrackingError
 from rhot_app.estimation.residual import Rows
+from rhot_app.export.overlay import overlay
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.motion.hand_state import tangent_size
 from rhot_app.state import Condition

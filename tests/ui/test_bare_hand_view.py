@@ -11,7 +11,7 @@ from bare_scenes import poses, rig_of, scene
 from PySide6.QtGui import QImage
 from screen_pictures import check
 
-from rhot_app.barehand.overlay import seen_contour
+from rhot_app.barehand.contour_residual import seen_contour
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.engine.status import TOPIC_CONTOUR, Preview, decode, encode
 from rhot_app.state import SeenContour

@@ -22,7 +22,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from rhot_app.barehand.overlay import INNER_RGB, SILHOUETTE_RGB
+from rhot_app.export.overlay import INNER_RGB, SILHOUETTE_RGB
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.handfit.session import Outline
 from rhot_app.ui.common.shapes import paint_tag

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.articulated.bodies import Bodies, camera_rays, hand_bodies, place
-from rhot_app.articulated.view import draw_layers, layer_colours
 from rhot_app.articulated.visibility import visibility
 from rhot_app.barehand.surface import surface_of
 from rhot_app.engine.status import Preview
+from rhot_app.export.layers_picture import draw_layers, layer_colours
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.model import build_model

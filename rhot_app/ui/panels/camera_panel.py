@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 OUTLINE_COLOUR, INNER_COLOUR, SLICE_COLOUR = "#28e650", "#3c8cff", "#60808080"
 HAND_COLOUR, OTHER_COLOUR, SHOWN_COLOUR, BONE_COLOUR = "#ff2828", "#ffdc00", "#ffffff", "#ffffff"
-"""As in `barehand.overlay`: the contour before the background and within the hand, slices; edges, the hand's and
+"""As in `export.overlay`: the contour before the background and within the hand, slices; edges, the hand's and
 others; and a pose that the hand is to take."""
 
 TAKE_POSE, TAKE_POSE_SHORT = "Take this pose with {hands}, and hold it", "Take this pose"

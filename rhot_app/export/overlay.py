@@ -8,38 +8,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import ContourFrame
-from rhot_app.barehand.contours import SILHOUETTE
-from rhot_app.state import SeenContour
+from rhot_app.barehand.contour_residual import ContourFrame, seen_contour
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 SILHOUETTE_RGB, INNER_RGB, BONE_RGB = (40, 230, 80), (60, 140, 255), (255, 255, 255)
 FOUND_RGB, OTHER_RGB, SLICE_RGB = (255, 40, 40), (255, 220, 0), (110, 110, 110)
-NEAR_SD = 3.0
-"""Standard deviations from the contour within which an edge is displayed as the hand's."""
 
 _SUB = 4  # bits of a pixel's fraction in OpenCV's drawing
-
-
-def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array, t_node_ns: int = 0,
-                 shown: bool = False) -> SeenContour:
-    """The contour of a hand in `state` in the image of `t_ns`, `t_node_ns` by its node's clock, with slices and edges,
-    for display. `shown`: see `SeenContour`."""
-    offset, _, good = frame.predict(state)
-    centre, normal, half = frame.slices[:, :2], frame.slices[:, 2:4], frame.slices[:, 4:]
-    ends = np.hstack([centre - half * normal, centre + half * normal])
-    places, near = np.empty((0, 2)), np.empty(0, np.bool_)
-    if frame.edges is not None:
-        edges = frame.edges
-        row, column = np.nonzero((np.arange(edges.offset.shape[1]) < edges.number[:, None]) & good[:, None])
-        along = edges.offset[row, column]
-        places = centre[row] + along[:, None] * normal[row]
-        near = np.abs(along - offset[row]) < NEAR_SD * np.hypot(frame.expected_sd[row], edges.sd[row, column])
-    return SeenContour(camera, t_ns, (centre + offset[:, None] * normal)[good],
-                       frame.points.behind[good] == SILHOUETTE, ends[good] if not shown else np.empty((0, 4)), places,
-                       near, t_node_ns, shown=shown)
 
 
 def overlay(image: Image, frame: ContourFrame, state: Array, joints: Array | None = None, zoom: int = 1) -> Image:
