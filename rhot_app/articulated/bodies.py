@@ -15,6 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.barehand.surface import FOREARM, PALM, Surface, ray_to_capsule
+from rhot_app.estimation.layout import SE3, Layout
 from rhot_app.estimation.vectors import (
     along,
     axis_of,
@@ -43,10 +44,11 @@ FLESH = 2.0
 """Radii: where several bodies carry a link, what lies so near to its joint, beyond the plane, is the link's. Chosen: a
 knuckle's own radius, and as much of the flesh about it."""
 
-ROOT_POSE = 6
+_ROOT = Layout(root=SE3)
+ROOT_POSE = _ROOT.tangent_size
 """Columns of a tangent space before the angles: the root's translation, m, and rotation, rad, along world axes."""
 
-ANGLES = 12
+ANGLES = _ROOT.size
 """Numbers of a state before the angles: world_from_root (3, 4), row by row."""
 
 _SAME = 1e-9  # m, or of a direction: as good as nothing

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contours import COLUMNS, INNER, SILHOUETTE, contour_on_slices
+from rhot_app.barehand.contours import COLUMNS, INNER, SHORTEST_PX, SILHOUETTE, contour_on_slices
 from rhot_app.barehand.joints import POSE_AND_SHAPE
 from rhot_app.barehand.surface import FOREARM, PALM, Surface
 from rhot_app.estimation.residual import UNIT, Rows, compressed
@@ -54,8 +54,14 @@ UNSURE = 0.02
 SAME_TIME_S = 1e-3
 """s: images nearer in time count as simultaneous: a hand at 2 m/s moves by 2 mm."""
 
-NEAR_SD = 3.0
-"""Standard deviations from the contour within which an edge is displayed as the hand's."""
+AMBIGUOUS_PX = 6.0
+"""px: largest standard deviation of a contour that cannot be confused with its neighbour's: half a finger at 0.5 m."""
+
+REACH = 3.0
+"""Half of a slice in standard deviations of the prediction: 99.7 % of contours lie on it."""
+
+LONGEST_PX = (REACH + 1.0) * AMBIGUOUS_PX
+"""px: half of the longest slice. Farther away, the edges of other fingers are as probable."""
 
 _STUDENT_4 = 0.375  # density at 0 of Student's t of 4 degrees of freedom
 _LEAST_CLUTTER = 1e-3  # edges per px
@@ -126,7 +132,7 @@ def seen_contour(camera: str, t_ns: int, frame: ContourFrame, state: Array, t_no
         row, column = np.nonzero((np.arange(edges.offset.shape[1]) < edges.number[:, None]) & good[:, None])
         along = edges.offset[row, column]
         places = centre[row] + along[:, None] * normal[row]
-        near = np.abs(along - offset[row]) < NEAR_SD * np.hypot(frame.expected_sd[row], edges.sd[row, column])
+        near = np.abs(along - offset[row]) < REACH * np.hypot(frame.expected_sd[row], edges.sd[row, column])
     return SeenContour(camera, t_ns, (centre + offset[:, None] * normal)[good],
                        frame.points.behind[good] == SILHOUETTE, ends[good] if not shown else np.empty((0, 4)), places,
                        near, t_node_ns, shown=shown)
@@ -215,11 +221,10 @@ class JointLimits:
 
 
 def slices_of(surface: Surface, state: Array, covariance: Array, camera: CameraRecord, points: np.recarray,
-              row_s: float, reach: float, longest_px: float, repeated: float = 1.0,
-              late_s: float = 0.0) -> ContourFrame:
+              row_s: float, repeated: float = 1.0, late_s: float = 0.0) -> ContourFrame:
     """The slices at the contour `points` that are expected of a hand in `state` with `covariance` (n, n). They reach
-    `reach` standard deviations to both sides, at most `longest_px`. `row_s`: time between rows, s; `late_s`: the
-    image's time less the state's, s."""
+    REACH standard deviations to both sides, at most LONGEST_PX. `row_s`: time between rows, s; `late_s`: the image's
+    time less the state's, s."""
     count = len(points)
     late = np.full(count, late_s)
     if count and row_s:
@@ -231,9 +236,11 @@ def slices_of(surface: Surface, state: Array, covariance: Array, camera: CameraR
     if abs(late_s) > SAME_TIME_S:
         own, rows = np.r_[own, POSE:2 * POSE], np.hstack([rows, late_s * rows[:, :POSE]])
     variance = np.sum((rows @ covariance[np.ix_(own, own)]) * rows, axis=1)
-    frame.expected_sd = np.sqrt(np.maximum(variance, 0.0))
+    expected_sd = np.sqrt(np.maximum(variance, 0.0))
+    frame.ambiguous = float(np.mean(expected_sd > AMBIGUOUS_PX)) if count else 0.0
+    frame.expected_sd = np.minimum(expected_sd, AMBIGUOUS_PX)
     spread = np.sqrt(variance + 4.0 * frame.shape_variance)
-    slices[:, 4] = np.clip(reach * spread + 1.0, 3.0, longest_px)
+    slices[:, 4] = np.clip(REACH * spread + 1.0, SHORTEST_PX, LONGEST_PX)
     return frame
 
 

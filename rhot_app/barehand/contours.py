@@ -48,6 +48,9 @@ GRAZE_M = 1e-4
 JUMP_M = 6e-3
 """m: smallest step in depth that makes a contour; flesh fills smaller ones."""
 
+SHORTEST_PX = 3.0
+"""px: half of the shortest slice, and so the least distance of a contour point from the image's border."""
+
 SIDE, OTHER_SIDE, START_BALL, END_BALL = range(4)
 """Kinds of contour points: the two straight contours of a capsule and those of its balls."""
 
@@ -63,7 +66,6 @@ POINT = np.dtype([("capsule", np.int64), ("kind", np.int64), ("along", np.float6
 SILHOUETTE or INNER; `pixel` (2,) px; `normal` (2,) unit, outwards; `scale` px/m."""
 
 _MOST = 1500  # points of one camera
-_MARGIN_PX = 3.0  # to the image's border: half of the shortest slice
 
 
 def contour_points(surface: Surface, state: Array, camera: CameraRecord, step_m: float = STEP_M) -> np.recarray:
@@ -178,8 +180,8 @@ def _contours(surface, state, camera, step_m, points):
             point = points[used]
             if not project_point(p[0], p[1], p[2], camera.pose, camera.intrinsics, point.pixel, slope):
                 continue
-            if not (_MARGIN_PX < point.pixel[0] < camera.size[0] - 1 - _MARGIN_PX
-                    and _MARGIN_PX < point.pixel[1] < camera.size[1] - 1 - _MARGIN_PX):
+            if not (SHORTEST_PX < point.pixel[0] < camera.size[0] - 1 - SHORTEST_PX
+                    and SHORTEST_PX < point.pixel[1] < camera.size[1] - 1 - SHORTEST_PX):
                 continue
             behind = what_is_behind(hand.centres, hand.radii, o, p, n, OUTSIDE_M)
             if behind == HIDDEN or what_is_behind(hand.centres, hand.radii, o, p, n, GRAZE_M) == HIDDEN:

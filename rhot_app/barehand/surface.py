@@ -23,14 +23,21 @@ from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.motion.hand_state import SHAPE, STATE
 from rhot_app.hand.shape import FLESH
+from rhot_app.hand.skeleton import FINGERS
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-PALM, FOREARM = 5, 6
+PALM = len(FINGERS)
+FOREARM = PALM + 1
 """Groups of capsules after the fingers 0..4."""
 
-HAND_SIZE, FINGER_SIZE, THICKNESS, LENGTH, RADIUS, FOREARM_RADIUS, FOREARM_TURN = 0, 1, 2, 3, 18, 33, 34
+_BONES = 3 * len(FINGERS)
+HAND_SIZE, FINGER_SIZE, THICKNESS = range(3)
+LENGTH = THICKNESS + 1
+RADIUS = LENGTH + _BONES
+FOREARM_RADIUS = RADIUS + _BONES
+FOREARM_TURN = FOREARM_RADIUS + 1
 """Indices into a shape. Each is relative to the hand file and to those before it.
 
 HAND_SIZE, FINGER_SIZE, THICKNESS: logarithms of the hand's size, of all phalanges' length, and of all radii but the

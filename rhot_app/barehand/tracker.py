@@ -65,15 +65,6 @@ from rhot_node.detect.foreground import Foreground, foreground_map, no_foregroun
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
-AMBIGUOUS_PX = 6.0
-"""px: largest standard deviation of a contour that cannot be confused with its neighbour's: half a finger at 0.5 m."""
-
-REACH = 3.0
-"""Half of a slice in standard deviations of the prediction: 99.7 % of contours lie on it."""
-
-LONGEST_PX = REACH * AMBIGUOUS_PX + 6.0
-"""px: half of the longest slice. Farther away, the edges of other fingers are as probable."""
-
 PASSES, START_PASSES = 2, 6
 """Searches of an image, and of the first one after a start. Each search halves the standard
 deviation of the expected contour: six leave less than a pixel of LONGEST_PX."""
@@ -302,11 +293,8 @@ class BareHandTracker:
             step[TANGENT.pose] = late_s * state[STATE.velocity]
             then = self.process.retract(state, step)
         points = contour_points(self.surface, then, record, step_m)
-        frame = slices_of(self.surface, state, covariance, record, points, self.row_s[camera], REACH, LONGEST_PX,
-                          self._repeated[camera], late_s)
-        frame.ambiguous = float(np.mean(frame.expected_sd > AMBIGUOUS_PX)) if len(frame.slices) else 0.0
-        frame.expected_sd = np.minimum(frame.expected_sd, AMBIGUOUS_PX)
-        return frame
+        return slices_of(self.surface, state, covariance, record, points, self.row_s[camera], self._repeated[camera],
+                         late_s)
 
     @property
     def slice_counts(self) -> Array:

@@ -100,7 +100,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
     first, last = overlap(videos)
     run = HandFollower(rig, foreground, known_size=known_size,
                        empty_until_ns=first + round(1e9 * empty_s) if start_frame is None else last + 1)
-    tracker, spent = run.tracker, list[tuple[int, bool]]()
+    tracker, spent = run.hand, list[tuple[int, bool]]()
     begun = time.perf_counter()
     with contextlib.ExitStack() as stack:
         table = stack.enter_context(open_table(rig, videos[0].path.name, out)) if out is not None else None

@@ -128,4 +128,4 @@ def test_a_hand_whose_pose_somebody_has_given_is_followed_by_its_skin() -> None:
     found = [follower.step([hand(camera, empty, number) for camera, empty in zip(CAMERAS, WALLS, strict=True)],
                            [round(1e9 * number / FPS)] * 2) for number in range(3)]
     assert all(state.tracked for state in found) and wrong(found) == []
-    assert all(model.informative for model in follower.tracker.foreground)
+    assert all(model.informative for model in follower.hand.foreground)

@@ -26,7 +26,7 @@ def process_of(side: str = "right") -> HandProcess:
 
 def frame_of(surface: Surface, state: np.ndarray, camera: CameraModel) -> ContourFrame:
     points = contour_points(surface, state, camera.record)
-    return slices_of(surface, state, 1e-6 * np.eye(process_of().size), camera.record, points, 0.0, 3.0, 20.0)
+    return slices_of(surface, state, 1e-6 * np.eye(process_of().size), camera.record, points, 0.0)
 
 
 @pytest.mark.parametrize("side", ["right", "left"])

@@ -14,7 +14,6 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, no_hand
@@ -39,11 +38,6 @@ class HandFollower(ContourEstimator):
         self.step_s: list[float] = []
         self._learns_skin, self._empty_until_ns = foreground is None, empty_until_ns
         self._hand.foreground = [no_foreground() for _ in rig.nodes] if foreground is None else list(foreground)
-
-    @property
-    def tracker(self) -> BareHandTracker:
-        """The tracker of its contours."""
-        return self._hand
 
     def follow(self, pose: HandPose, t_ns: int) -> None:
         """Start a confirmed track at a pose that somebody has shown (`BareHandTracker.start`)."""

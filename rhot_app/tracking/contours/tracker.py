@@ -15,12 +15,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.barehand.contour_residual import ContourFrame, seen_contour
+from rhot_app.barehand.contour_residual import AMBIGUOUS_PX, ContourFrame, seen_contour
 from rhot_app.barehand.contours import STEP_M
 from rhot_app.barehand.key_frames import KeyFrames
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFrame, SliceRequest, edges_of
 from rhot_app.barehand.start import MIN_DWELL_NS
-from rhot_app.barehand.tracker import AMBIGUOUS_PX, BareHandTracker
+from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.estimation.track import NEVER, SESSION_NS
 from rhot_app.hand.skeleton import HandPose
