@@ -61,14 +61,12 @@ class ConstantVelocity(PoseState):
     """Implements `estimation.residual.Process`. `free` (6 + A,): what moves. `density` (6 + A,): of the white
     acceleration, squared units of the tangent space per s^3; `speed` (6 + A,): standard deviation of velocities."""
 
-    def __init__(self, free: NDArray[np.bool_], amplitude: tuple[float, float, float] = AMPLITUDE,
-                 pace_hz: float = PACE_HZ) -> None:
-        """`amplitude` m, rad, rad and `pace_hz`: of the harmonic motion that is expected. Its acceleration lasts a
-        quarter of a period."""
+    def __init__(self, free: NDArray[np.bool_], pace_hz: float = PACE_HZ) -> None:
+        """`pace_hz`: of the harmonic motion that is expected. Its acceleration lasts a quarter of a period."""
         self.free = free
         self.pose = len(free)
         self.size = 2 * self.pose
-        self.speed = 2.0 * np.pi * pace_hz * self._each(amplitude) / np.sqrt(2.0)
+        self.speed = 2.0 * np.pi * pace_hz * self._each(AMPLITUDE) / np.sqrt(2.0)
         self.density = (2.0 * np.pi * pace_hz * self.speed) ** 2 / (4.0 * pace_hz)
 
     def _each(self, values: tuple[float, float, float]) -> Array:

@@ -67,17 +67,27 @@ class PoseSearch:
         """`plane`: on which the palm lies, if it is known."""
         self.model, self.surface, self.cameras, self.plane = model, surface, cameras, plane
         self._rng = np.random.default_rng(0)
-        self.average_odds, self.last_search_s = 0.0, -np.inf
+        self.restart()
 
-    def search_due(self, odds: LogOddsMaps, state: Array, t_s: float) -> bool:
-        """Whether a search about the predicted `state` is due at `t_s`, s: because of the time, or because the
-        prediction covers the foreground worse than the hand did on average."""
-        late = t_s - self.last_search_s > LOCAL_SEARCH_S
-        return bool(late or self.log_odds_per_pixel(odds, state) < self.average_odds - ODDS_DROP)
+    def restart(self) -> None:
+        """Another track begins."""
+        self.average_odds, self._last_search_s = 0.0, -np.inf
 
-    def average(self, odds_per_pixel: float, *, first: bool) -> None:
-        """Take the log odds per pixel of one estimate into the average, or begin it with them."""
-        self.average_odds += (1.0 if first else ODDS_SMOOTHING) * (odds_per_pixel - self.average_odds)
+    def worse(self, odds_per_pixel: float) -> bool:
+        """Whether a prediction with these log odds per pixel covers the foreground worse than the hand did on
+        average."""
+        return odds_per_pixel < self.average_odds - ODDS_DROP
+
+    def search_due(self, odds_per_pixel: float, t_s: float) -> bool:
+        """Whether a search about such a prediction begins at `t_s`, s, because of the time or because it is worse."""
+        due = self.worse(odds_per_pixel) or t_s - self._last_search_s > LOCAL_SEARCH_S
+        if due:
+            self._last_search_s = t_s
+        return due
+
+    def average(self, odds_per_pixel: float) -> None:
+        """Take the log odds per pixel of one estimate into the average, which the first one begins."""
+        self.average_odds += (ODDS_SMOOTHING if self.average_odds else 1.0) * (odds_per_pixel - self.average_odds)
 
     def odds_of(self, maps: ForegroundMaps, rate: float | None = None) -> LogOddsMaps:
         """Log odds of the foreground, of the cameras that have a map. `rate`: see `log_odds_maps`."""

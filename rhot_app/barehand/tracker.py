@@ -146,7 +146,7 @@ class BareHandTracker:
         self.filter.begin(t_ns, state, covariance)
         self.starting = True
         self._taken_s = [-np.inf] * len(self.cameras)
-        self.search.last_search_s = -np.inf
+        self.search.restart()
         self.frames = [None] * len(self.cameras)
 
     def begin(self, images: Sequence[Image | None], t_ns: int) -> bool:
@@ -197,9 +197,8 @@ class BareHandTracker:
         self.frames = [frame if c in images else None for c, frame in enumerate(self.frames)]
         maps, search, start = self._maps(images), self.search, None
         odds = None if maps is None else search.odds_of(maps)
-        if maps and odds and (self.starting or search.search_due(odds, prediction[0], t_s)):
+        if maps and odds and search.search_due(search.log_odds_per_pixel(odds, prediction[0]), t_s):
             start = search.relocalise(maps, prediction, self.process.stationary, since_s)
-            search.last_search_s = t_s
         passes = START_PASSES if self.starting or start is not None else PASSES
         knot = self._fit(images, late, t_s, prediction, prediction[0] if start is None else start, extra, passes)
         if odds is not None:
@@ -208,7 +207,7 @@ class BareHandTracker:
                 # Edges have drawn the pose away from the foreground: restart there, without the prediction.
                 knot = self._fit(images, late, t_s, self._restart(t_s, start), start, extra, START_PASSES)
                 per_pixel = search.log_odds_per_pixel(odds, knot.state)
-            search.average(per_pixel, first=self.starting)
+            search.average(per_pixel)
         self.starting = False
         return knot
 

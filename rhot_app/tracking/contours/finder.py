@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import ForegroundFrame
-from rhot_app.barehand.pose_search import LOCAL_SEARCH_S, ODDS_DROP, RELOCALISATION_LOG_ODDS
+from rhot_app.barehand.pose_search import RELOCALISATION_LOG_ODDS
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.hand.motion.hand_process import FASTEST
 from rhot_app.hand.motion.hand_state import POSE, TANGENT
@@ -69,13 +69,11 @@ class Finder:
         self._found: tuple[int, HandPose, int] | None = None  # of which run
         self._change: tuple[int, Array | None] | None = None
         self._run = 0
-        self._searched_s = -np.inf
 
     def reset(self) -> None:
         """Discard the result of the running search."""
         self._run += 1
         self._found = self._change = None
-        self._searched_s = -np.inf
 
     def look(self, maps: Maps) -> None:
         """Look in these maps whether a hand has taken its start pose."""
@@ -90,15 +88,15 @@ class Finder:
         """Verify the predicted pose by maps of `t_s`, s, and relocalise the hand where the last search found a better
         one. Returns whether it was relocalised.
 
-        A search starts every LOCAL_SEARCH_S, and when the pose's log odds per pixel drop below their average. Its
-        result is compared in the newest maps, into which the hand has moved since. Edges locate a hand more accurately,
-        so small changes are left to them, unless a finger was mistaken for another one.
+        A search starts when one is due (`PoseSearch.search_due`). Its result is compared in the newest maps, into which
+        the hand has moved since. Edges locate a hand more accurately, so small changes are left to them, unless a
+        finger was mistaken for another one.
         """
         hand, search = self._hand, self._hand.search
         state, covariance = hand.filter.predict(t_s)
         odds, change = search.odds_of(maps.probabilities), self.change()
         per_pixel = search.log_odds_per_pixel(odds, state)
-        worse = per_pixel < search.average_odds - ODDS_DROP
+        worse = search.worse(per_pixel)
         if change is not None:
             moved = hand.process.retract(state, change)
             way = joints_of(hand, moved) - joints_of(hand, state)
@@ -107,10 +105,9 @@ class Finder:
             if (worse or confused) and gain > RELOCALISATION_LOG_ODDS:
                 hand.filter.start(t_s, moved, _inflated(covariance, change))
                 return True
-        if worse or t_s - self._searched_s > LOCAL_SEARCH_S:
+        if search.search_due(per_pixel, t_s):
             self.relocalise(maps, state, covariance, dt_s)
-            self._searched_s = t_s
-        search.average(per_pixel, first=not search.average_odds)
+        search.average(per_pixel)
         return False
 
     def found(self) -> tuple[HandPose, int] | None:

@@ -70,7 +70,6 @@ class ContourEstimator(Tracker):
         if self._markers is not None:
             self._markers.reset()
         self._hand.frames = [None] * len(self._names)
-        self._hand.search.average_odds = 0.0
         self._requests = Requests(self._hand, self._predict, lambda t_ns: self.occluder(t_ns), self._max_slices)
         self._cameras = self._requests.cameras
         self._evidence, self._maps = Evidence(self._hand, self._cameras), NewestMaps(self._cameras)
@@ -173,7 +172,6 @@ class ContourEstimator(Tracker):
     def start(self, pose: HandPose, t_ns: int) -> None:
         """Start a track, not yet confirmed, at a pose of master time `t_ns`."""
         self._hand.start(pose, t_ns)
-        self._hand.search.average_odds = 0.0
         self._finder.reset()
         self.key_frames.clear()
         if self._markers is not None:
