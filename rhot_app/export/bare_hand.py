@@ -99,7 +99,8 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
     check_outputs(videos, out, pictures, again, hand_file)
     first, last = overlap(videos)
     run = HandFollower(rig, foreground, known_size=known_size,
-                       empty_until_ns=first + round(1e9 * empty_s) if start_frame is None else last + 1)
+                       empty_until_ns=first + round(1e9 * empty_s) if start_frame is None else last + 1,
+                       period_ns=min(video.period_ns for video in videos))
     tracker, spent = run.hand, list[tuple[int, bool]]()
     begun = time.perf_counter()
     with contextlib.ExitStack() as stack:

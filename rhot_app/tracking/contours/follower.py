@@ -29,15 +29,22 @@ class HandFollower(ContourEstimator):
     took."""
 
     def __init__(self, rig: Rig, foreground: Sequence[Foreground] | None, *, known_size: bool,
-                 empty_until_ns: int = 0) -> None:
+                 empty_until_ns: int = 0, period_ns: int | None = None) -> None:
         """`foreground`: each camera's model; None: the colours of skin are learnt from every image until there is a
-        track. `empty_until_ns`: master time before which no hand is expected."""
+        track. `empty_until_ns`: master time before which no hand is expected. `period_ns`: between two images, if it
+        is known."""
+        self._period_ns = period_ns
         settings = msgspec.structs.replace(rig.tracker, kind="estimator", observe="contours",
                                           float_scale=not known_size)
         super().__init__(msgspec.structs.replace(rig, tracker=settings))
         self.step_s: list[float] = []
         self._learns_skin, self._empty_until_ns = foreground is None, empty_until_ns
         self._hand.foreground = [no_foreground() for _ in rig.nodes] if foreground is None else list(foreground)
+
+    def _clear(self) -> None:
+        super()._clear()
+        for camera in self._cameras:
+            camera.period_ns = self._period_ns or camera.period_ns
 
     def follow(self, pose: HandPose, t_ns: int) -> None:
         """Start a confirmed track at a pose that somebody has shown (`BareHandTracker.start`)."""
