@@ -78,8 +78,9 @@ class PoseSearch:
         average."""
         return odds_per_pixel < self.average_odds - ODDS_DROP
 
-    def search_due(self, odds_per_pixel: float, t_s: float) -> bool:
-        """Whether a search about such a prediction begins at `t_s`, s, because of the time or because it is worse."""
+    def begins_search(self, odds_per_pixel: float, t_s: float) -> bool:
+        """Begin a search about such a prediction at `t_s`, s, if it is time or the prediction is worse; whether it
+        has begun."""
         due = self.worse(odds_per_pixel) or t_s - self._last_search_s > LOCAL_SEARCH_S
         if due:
             self._last_search_s = t_s

@@ -197,7 +197,7 @@ class BareHandTracker:
         self.frames = [frame if c in images else None for c, frame in enumerate(self.frames)]
         maps, search, start = self._maps(images), self.search, None
         odds = None if maps is None else search.odds_of(maps)
-        if maps and odds and search.search_due(search.log_odds_per_pixel(odds, prediction[0]), t_s):
+        if maps and odds and search.begins_search(search.log_odds_per_pixel(odds, prediction[0]), t_s):
             start = search.relocalise(maps, prediction, self.process.stationary, since_s)
         passes = START_PASSES if self.starting or start is not None else PASSES
         knot = self._fit(images, late, t_s, prediction, prediction[0] if start is None else start, extra, passes)

@@ -1,7 +1,7 @@
 """All calibrations: what each is called wherever it is named, in the order in which a new rig needs them.
 
-The Calibrate menu, `rhot calibrate`, a rig's history, its health and the documents' list follow these records. Nothing
-else imports a calibration by its name: a wizard is the module of that name in `rhot_app.ui.wizards`.
+The Calibrate menu, `rhot calibrate`, a rig's history, its health and the documents' list follow these records. No other
+list of calibrations exists. A wizard is loaded as the module of that name in `rhot_app.ui.wizards`.
 """
 
 from __future__ import annotations

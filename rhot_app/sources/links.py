@@ -68,33 +68,36 @@ class UdpNodes(RigLinks):
             self.receivers = tuple(NodeReceiver(sock, link.door, link.node.name)
                                    for sock, link in zip(sockets, self.links, strict=True))
             self._keys = KeyExchange(self.links, own)
+            stack.callback(self._keys.close)
+            self._tap: RecordSink | None = None
+            self._recent: deque[tuple[RecordKind, int, int, bytes]] = deque(maxlen=RECENT * len(self.links))
+            # text nodes are not spoken to
+            spoken_to = [(link, receiver) for link, receiver in zip(self.links, self.receivers, strict=True)
+                         if not link.node.text_datagrams]
+            self._links = {link.node.node_id: link for link, _ in spoken_to}
+            self._entries = {link.node.node_id: StartEntry(link.node.node_id, receiver.port, 0)
+                             for link, receiver in spoken_to}
+            self._broadcast = (rig.broadcast.address, rig.broadcast.port)
+            self._addresses: dict[int, str | None] = {}
+            for node_id, link in self._links.items():
+                with contextlib.suppress(ValueError):
+                    self._addresses[node_id] = str(ipaddress.ip_address(link.node.address))
+            self._named = [link for node_id, link in self._links.items() if node_id not in self._addresses]
+            self._lost = LostNodes(list(self._links.values()), rig.broadcast.port, time.monotonic_ns())
+            stack.callback(self._lost.close)
+            self._due_ns = dict.fromkeys(self._links, 0)
+            self._sequence = 0
+            self._lock = threading.Lock()
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            stack.callback(self._socket.close)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+            self._socket.bind(("", 0))
+            ask_for_times(self._socket)
+            self._followed = FollowedObjects(rig)
             stack.pop_all()
-        self._tap: RecordSink | None = None
-        self._recent: deque[tuple[RecordKind, int, int, bytes]] = deque(maxlen=RECENT * len(self.links))
-        # text nodes are not spoken to
-        spoken_to = [(link, receiver) for link, receiver in zip(self.links, self.receivers, strict=True)
-                     if not link.node.text_datagrams]
-        self._links = {link.node.node_id: link for link, _ in spoken_to}
-        self._entries = {link.node.node_id: StartEntry(link.node.node_id, receiver.port, 0)
-                         for link, receiver in spoken_to}
-        self._broadcast = (rig.broadcast.address, rig.broadcast.port)
-        self._addresses: dict[int, str | None] = {}
-        for node_id, link in self._links.items():
-            with contextlib.suppress(ValueError):
-                self._addresses[node_id] = str(ipaddress.ip_address(link.node.address))
-        self._named = [link for node_id, link in self._links.items() if node_id not in self._addresses]
-        self._lost = LostNodes(list(self._links.values()), rig.broadcast.port, time.monotonic_ns())
-        self._due_ns = dict.fromkeys(self._links, 0)
-        self._sequence = 0
-        self._lock = threading.Lock()
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        self._socket.bind(("", 0))
-        ask_for_times(self._socket)
         self._kernel_time = KernelTime()
         self._worker = Worker("commands the nodes", lambda: self.step(0.02))
         self._resolver = Worker("looks up the nodes' addresses", self._resolve, hang_s=None)
-        self._followed = FollowedObjects(rig)
         for receiver in self.receivers:
             receiver.start()
         self._followed.start()

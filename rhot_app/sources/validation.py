@@ -156,7 +156,8 @@ class DatagramValidator:
         kind, collected, times = verified
         try:
             return kind.observe(collected, times)
-        except Exception:  # as in `verify`
+        except Exception:  # as in `verify`, which has counted the frame
+            self.frames[kind.name] -= 1
             self.drop(self._failed())
             return None
 

@@ -19,6 +19,8 @@ MAGNITUDE_LEAST = 12.0  # grey levels of mean chroma; less is grey
 TOLERANCE_DEG = (8.0, 22.0)  # narrower loses paint in noise, wider takes the neighbour's colour
 SPREADS = 3.0  # robust standard deviations on both sides of the mean that the hue tolerance spans
 WEAKEST = 10  # per cent of the samples that may be weaker: glints, and what is no paint
+BLACK_NOISE = 8  # luma: darker pixels have chroma of noise alone
+BURNT, BRIGHT = 250, 235  # luma: highlights beyond are no paint, unless the paint itself is as bright
 LIGHT_LEFT = 0.5  # of the weakest sample: shadow on the paint leaves about this much of its chroma and luma
 MAGNITUDE_MIN = 8.0  # grey levels of chroma below which a paint shows no hue
 
@@ -73,7 +75,8 @@ def learn_chroma_from_colours(colours: Colours) -> ChromaModel:
         cb=round(mean_cb, 1), cr=round(mean_cr, 1),
         hue_tolerance_deg=round(min(max(SPREADS * spread, TOLERANCE_DEG[0]), TOLERANCE_DEG[1]), 1),
         magnitude_min=round(max(LIGHT_LEFT * weakest, MAGNITUDE_MIN), 1),
-        luma_min=int(LIGHT_LEFT * float(np.percentile(luma, WEAKEST))), luma_max=WHITE)
+        luma_min=max(int(LIGHT_LEFT * float(np.percentile(luma, WEAKEST))), BLACK_NOISE),
+        luma_max=BURNT if float(np.percentile(luma, 100 - WEAKEST)) < BRIGHT else WHITE)
 
 
 # -- colour tables -----------------------------------------------------------------------------------------------------

@@ -74,8 +74,8 @@ def measure(image, paint, request, scratch, careful, noises, measured):
 
     False when the window of the `request` (1,) does not show it.
 
-    `careful` False: by the pixels that are more than half paint, without partial coverage. What is measured of the
-    paint, its shading, and of a band's sag is then 0, and no noise is learnt.
+    `careful` False: by the pixels that are more than half paint, without partial coverage. The paint's
+    shading and a band's sag are then 0, its colour is not set, and no noise is learnt.
     """
     expected, result = request[0], measured[0]
     components, own = scratch.components, scratch.own

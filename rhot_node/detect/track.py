@@ -151,10 +151,12 @@ def widen_band(axis_x, axis_y, breadth, report):
 
 # -- track of one marker -----------------------------------------------------------------------------------------------
 
-MEMORY_FRAMES = 40  # how long a lost marker's motion and size are held against candidates
+MEMORY_FRAMES = 40  # for which a lost marker's size and velocity are kept
 VELOCITY_GAIN = 0.7
 AREA_GAIN = 0.4  # per frame, of the expected log area
 PARTIAL_AREA = 0.82  # of the expected area: less is half hidden
+BROKEN_AREA = 0.93  # of the expected area: a band with less whose rims no longer fit is half hidden
+HIDDEN_DECAY = 0.99  # per frame, of the expected area: what looks hidden for long is that small
 SLIVER_AREA = 0.15  # of the expected area: too little to be believed without the gate of a search
 JUMP_AREA = 1.35  # of the expected area: something else joined the marker
 RIVAL_MARGIN = 4.0  # squared standard deviations that a second blob must be worse by
@@ -273,7 +275,7 @@ def _judge(track, row, ratio, known):
     if row.at_border > 0.0:
         flags |= EDGE
     broken = track.band > 0.0 and track.fitted > 0.0 and row.fit == 0.0
-    if ratio < PARTIAL_AREA or row.fragments > 1.0 or broken:
+    if ratio < PARTIAL_AREA or row.fragments > 1.0 or (broken and ratio < BROKEN_AREA):
         flags |= PARTIAL
     if row.rival_cost < row.cost + RIVAL_MARGIN or (known and ratio > JUMP_AREA):
         flags |= AMBIGUOUS
@@ -306,7 +308,9 @@ def take(track, place, extent, level, hidden):
         gain = VELOCITY_GAIN if track.alive > 0.0 else 1.0
         track.vx += gain * ((place.x - track.x) / gap - track.vx)
         track.vy += gain * ((place.y - track.y) / gap - track.vy)
-        if not hidden:
+        if hidden:
+            track.area *= HIDDEN_DECAY
+        else:
             track.area *= (place.area / track.area) ** AREA_GAIN
             track.extent = extent
     else:

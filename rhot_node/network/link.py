@@ -19,7 +19,7 @@ from rhot_node.network.presence import Presence
 from rhot_node.network.session import LinkKeys, Sessions, Stream
 from rhot_node.threads import Worker
 from rhot_node.wire.codec import Seal, asks_who_is_there, decode, encode
-from rhot_node.wire.fields import BURST, RECEIVE_MAX
+from rhot_node.wire.fields import RECEIVE_MAX
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
@@ -33,6 +33,8 @@ from rhot_node.wire.messages import (
 )
 
 log = logging.getLogger(__name__)
+
+BURST = 64  # datagrams of one socket before the other one is looked at: a flood of one must not delay clocks
 
 ANSWERS_PER_S = 20  # to strangers who ask who is there
 

@@ -226,3 +226,16 @@ def test_a_marker_of_one_column_at_the_border_is_found_with_a_covariance(column:
     for _ in range(4):
         seen = detector.detect(image)[0]
         assert not seen.found or (math.isfinite(seen.cov_xx) and seen.cov_xx > 0.0)
+
+
+def test_a_marker_that_went_farther_away_unseen_is_whole_again_after_a_while() -> None:
+    detector = only("ring")
+
+    def shown(radius: float) -> MarkerObservation:
+        canvas = Canvas(320, 240).paint(disc(160, 120, radius), RGB["ring"], (160, 120), radius + 3, 0.25)
+        return detector.detect(canvas.expose())[0]
+    assert not [shown(9.0) for _ in range(8)][-1].flags & DOUBTS
+    assert not detector.detect(Canvas(320, 240).expose())[0].found
+    farther = [shown(7.8) for _ in range(60)]  # three quarters of the area: it may as well be half hidden
+    assert farther[0].flags & MarkerFlag.PARTIAL and not farther[-1].flags & DOUBTS
+    assert error(farther[-1], 160.0, 120.0) < 0.1

@@ -208,7 +208,8 @@ def align(foreign: MotionStream, rig: MotionStream, search_s: float = SEARCH_S,
         estimate = refined.state
     if model.count < SAMPLES:
         raise _no_overlap(foreign, rig)
-    kept = len(model.foreign.times_s) / len(foreign.times_s) * len(model.rig.times_s) / len(rig.times_s)
+    # two samples at either end have no neighbours to be compared with
+    kept = (len(model.foreign.times_s) + 4) / len(foreign.times_s) * (len(model.rig.times_s) + 4) / len(rig.times_s)
     return _finished(model, estimate, kept), found
 
 

@@ -88,8 +88,8 @@ class Finder:
         """Verify the predicted pose by maps of `t_s`, s, and relocalise the hand where the last search found a better
         one. Returns whether it was relocalised.
 
-        A search starts when one is due (`PoseSearch.search_due`). Its result is compared in the newest maps, into which
-        the hand has moved since. Edges locate a hand more accurately, so small changes are left to them, unless a
+        A search starts when one is due (`PoseSearch.begins_search`). Its result is compared in the newest maps, into
+        which the hand has moved since. Edges locate a hand more accurately, so small changes are left to them, unless a
         finger was mistaken for another one.
         """
         hand, search = self._hand, self._hand.search
@@ -105,7 +105,7 @@ class Finder:
             if (worse or confused) and gain > RELOCALISATION_LOG_ODDS:
                 hand.filter.start(t_s, moved, _inflated(covariance, change))
                 return True
-        if search.search_due(per_pixel, t_s):
+        if search.begins_search(per_pixel, t_s):
             self.relocalise(maps, state, covariance, dt_s)
         search.average(per_pixel)
         return False

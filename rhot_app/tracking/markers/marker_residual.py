@@ -101,7 +101,7 @@ class MarkerFrame:
     def predict_pixels(self, state: Array, covariance: Array) -> tuple[Array, Array]:
         """Pixels (M, 2) where the markers are expected, NaN behind the camera, and their covariances (M, 2, 2)."""
         pixels, jacobian, _ = project_markers(state, self.markers.arrays, self.camera, self.late_s)
-        jacobian[:, :, POSE:MOTION] = 0.0  # the motion until its row adds little, but before a velocity is known
+        jacobian[:, :, POSE:MOTION] = 0.0  # of the way until the row: little, but for a start, whose gate it would open
         return pixels, _spread(jacobian, covariance)
 
     def add_landmark_noise(self, state: Array) -> None:

@@ -23,8 +23,6 @@ DETERMINED_RAD, DETERMINED_M = math.radians(0.05), 5e-4
 """Standard deviations beyond which an angle or a shift counts as not determined. A twentieth of a degree about the
 vertical makes 4 mm of depth at 0.6 m with a baseline of 75 mm."""
 
-"""Of the change in a rig's history."""
-
 NOTABLE = 3.0
 """Standard deviations from which a turn or a shift is reported."""
 
