@@ -49,7 +49,7 @@ def make_wizard(context: WizardContext, poses: PoseFeed | None = None,
     pages = (SourcePage(source, context.memory), TogetherPage(together, states, context),
              ChartPage(solve, context.scheme), AcceptPage(accept, context.scheme))
     return Definition(ALIGNMENT.title, pages, solver="rhot_app.ui.wizards.steps.alignment_steps",
-                put_back=end)
+                      put_back=end)
 
 
 class SourcePage(Page):

@@ -41,7 +41,7 @@ def make_wizard(context: WizardContext) -> Definition:
     accept = AcceptStep(lambda: propose(hand.report, context.rig, context.rig_path), "Record the movement first.")
     return Definition(BONES.title, (EntryPage(entry), page, HandPage(hand, context.scheme),
                                       AcceptPage(accept, context.scheme)),
-                solver="rhot_app.calibration.hand.bones", put_back=movements.end)
+                      solver="rhot_app.calibration.hand.bones", put_back=movements.end)
 
 
 # -- the pages of the bones wizard -------------------------------------------------------------------------------------

@@ -66,7 +66,7 @@ def make_wizard(context: WizardContext) -> Definition:
     solve = SolveStep(lambda: task_of(said, made), verdict_of, charts_of)
     keep = KeepStep(lambda: propose(solve.report, lambda: _place(context.rig.name)), "Record a step first.")
     return Definition(CERTIFICATE.title, (*pages, ChartPage(solve, context.scheme), KeepPage(keep, context.scheme)),
-                solver="rhot_app.certificate.certify", put_back=movements.end)
+                      solver="rhot_app.certificate.certify", put_back=movements.end)
 
 
 def _place(rig: str) -> Path:

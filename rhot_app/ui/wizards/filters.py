@@ -52,7 +52,7 @@ def make_wizard(context: WizardContext) -> Definition:
     accept = AcceptStep(lambda: propose(tune.report, context.rig, context.rig_path, per_marker=tune.per_marker),
                         "Record both movements first.")
     return Definition(FILTERS.title, (still, fast, TunePage(tune, context.scheme), AcceptPage(accept, context.scheme)),
-                solver="rhot_app.calibration.filters.tuning", put_back=movements.end)
+                      solver="rhot_app.calibration.filters.tuning", put_back=movements.end)
 
 
 # -- the pages of the filter wizard ------------------------------------------------------------------------------------

@@ -26,4 +26,4 @@ def make_wizard(context: WizardContext) -> Definition:
     accept = AcceptStep(lambda: propose(solve.report, context.rig, context.rig_path, context.node_settings),
                         "Record a movement first.")
     return Definition(TIME.title, (wave, ChartPage(solve, context.scheme), AcceptPage(accept, context.scheme)),
-                solver="rhot_app.calibration.time.offset", put_back=movements.end)
+                      solver="rhot_app.calibration.time.offset", put_back=movements.end)

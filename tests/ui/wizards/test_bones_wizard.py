@@ -104,7 +104,7 @@ def test_centimetres_are_found_out(hands):
     assert "Next" not in hands.sentence and not hands.frame.next_button.isEnabled()
 
 
-def test_the_coach_counts_what_each_finger_has_done():
+def test_the_guide_counts_what_each_finger_has_done():
     tracks = record(person(3), SIX, 3, seconds=40.0, rate_hz=30.0, sloppiness=Sloppiness(0.0, 0.0, 0.0))
     engine, guide = FakeEngine(make_rig()), make_guide(make_rig())
     assert isinstance(guide, SweepGuide)
@@ -130,7 +130,7 @@ def test_every_bar_of_the_movement_is_in_sight(hands):
     hands.until(lambda: bars.visibleRegion().boundingRect().bottom() + 1 >= len(bars.bars) * bars.row_px)
 
 
-def test_markers_that_name_no_place_get_a_quiet_coach():
+def test_markers_that_name_no_place_get_a_quiet_guide():
     import msgspec
 
     rig = make_rig()

@@ -116,7 +116,7 @@ def heard(speed_m_s, noise_m=2e-4, seconds=3.0):
     return states
 
 
-def test_the_coaches_tell_a_still_hand_from_a_fast_one():
+def test_the_guides_tell_a_still_hand_from_a_fast_one():
     still, fast = LiveMeters(), LiveMeters()
     still.watch(heard(0.0))
     fast.watch(heard(0.8))
