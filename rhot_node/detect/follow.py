@@ -29,6 +29,10 @@ from rhot_node.wire.messages import MarkerObservation
 
 NOISE_MOST = 0.12  # of the contrast
 SOFT = 0.25  # projected chroma that counts not at all; so much below that of paint, it counts as paint
+LEVEL_OFF = 0.10  # of the paint's contrast from one frame to the next: another light, or another paint
+AWAY_MOST = 0.8  # px from the soft centroid to the outline's
+DENT_MOST = 0.45  # px that a radius may move against the others in a frame: a neighbour touches the outline
+SPEED_MOST = 8.0  # px per frame: a faster marker's edges are smeared, by one side more than by the other
 OTHER_HUE = 0.4  # of the contrast: what lies further beside the line from surroundings to paint is another paint
 SOFT_RATIO = 1.35  # of the expected area: what the soft area may be off, both ways; a switched lamp changes it
 AREA_RATIO = 1.10  # and the outline's
@@ -172,7 +176,7 @@ def _soft(image, track, outline, fitted):
     px, py = track.x + track.vx + track.sag_x, track.y + track.vy + track.sag_y
     edge = 0.5 * track.extent + c.BAND + 0.5 * speed
     height, width = u.shape
-    if not min(px, py, width - 1.0 - px, height - 1.0 - py) > edge:
+    if not speed < SPEED_MOST or not min(px, py, width - 1.0 - px, height - 1.0 - py) > edge:
         return False
     x0, x1 = max(int(px - half), 0), min(int(px + half) + 1, width - 1)
     y0, y1 = max(int(py - half), 0), min(int(py + half) + 1, height - 1)
@@ -205,7 +209,12 @@ def _soft(image, track, outline, fitted):
 def _outline(image, track, outline, noise, work):
     """Fit the outline about the soft centroid; False when the marker is not as plainly in view as it was."""
     fitted = work.fitted[0]
-    return (fit(image, fitted.x, fitted.y, outline, np.int64(1), work)
+    x, y, before_u, before_v = fitted.x, fitted.y, outline.paint_u, outline.paint_v
+    contrast = math.hypot(before_u - outline.around_u, before_v - outline.around_v)
+    return (fit(image, x, y, outline, np.int64(1), work)
+            and math.hypot(outline.paint_u - before_u, outline.paint_v - before_v) < LEVEL_OFF * contrast
+            and math.hypot(fitted.x - x, fitted.y - y) < AWAY_MOST
+            and fitted.dent < DENT_MOST
             and track.area < AREA_RATIO * fitted.area and fitted.area < AREA_RATIO * track.area
             and _misfit_is_noise(outline, fitted, noise)
             and _axes_hold(outline, fitted))

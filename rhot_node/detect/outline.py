@@ -61,15 +61,16 @@ def fit(image, cx, cy, outline, steps, work):
     if count < NODES:
         return False
     smooth_around(nodes)
+    result.dent = 0.0
     for step in range(steps):
         learns = step == steps - 1 and (outline.age < SETTLED or outline.age % RESTING == 0.0)
-        misfit = _step(outline, pixels, count, nodes, learns)
+        misfit = _step(outline, pixels, count, nodes, learns, result)
     result.misfit = math.sqrt(max(misfit, 0.0) / count)
     return _centre(cx, cy, outline, nodes, result)
 
 
 @njit(**FAST)
-def _step(outline, pixels, count, nodes, learns):
+def _step(outline, pixels, count, nodes, learns, result):
     """One Gauss-Newton step of the radii, which may learn the rim and the blur as well. Returns the squared misfit."""
     _set_levels(outline, nodes)
     blur, slope_x, slope_y = outline.blur, outline.slope_x, outline.slope_y
@@ -108,7 +109,7 @@ def _step(outline, pixels, count, nodes, learns):
     gain = max(SLOW, 0.5 / (outline.age + 1.0)) if learns and outline.width == 0.0 else 0.0
     if gain > 0.0 and blur_2 > 0.0:
         outline.blur = min(max(blur + 0.5 * gain * blur_e / blur_2, BLUR_LEAST), BLUR_MOST)
-    return misfit - _move(outline, gain, nodes)
+    return misfit - _move(outline, gain, nodes, result)
 
 
 @njit(**FAST)
@@ -123,7 +124,7 @@ def _set_levels(outline, nodes):
 
 
 @njit(**FAST)
-def _move(outline, gain, nodes):
+def _move(outline, gain, nodes, result):
     """Move the radii, and the rim's levels by `gain`, as the step's sums say. Returns by how much the misfit falls."""
     radius, rim = outline.radius, outline.rim
     first, last = nodes[0], nodes[NODES]
@@ -133,11 +134,12 @@ def _move(outline, gain, nodes):
     mean = 0.0
     for j in range(NODES):
         mean += nodes[j].g2 / NODES
-    fall = 0.0
+    shift = fall = 0.0
     for j in range(NODES):
         node = nodes[j]
         node.g2 += BARE * mean
         node.ge /= node.g2
+        shift += node.ge / NODES
     for j in range(NODES):
         node = nodes[j]
         inside, taken = _learn(gain, node, node.gp, node.p2, node.pe)
@@ -145,6 +147,7 @@ def _move(outline, gain, nodes):
         rim[0, j] += inside
         rim[1, j] += outside
         fall += node.ge * node.ge * node.g2
+        result.dent = max(result.dent, abs(node.ge - shift))
         radius[j] += min(max(node.ge - taken - more, -BAND), BAND)
     radius[NODES], rim[0, NODES], rim[1, NODES] = radius[0], rim[0, 0], rim[1, 0]
     return fall

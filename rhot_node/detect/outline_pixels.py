@@ -63,8 +63,8 @@ _NODE = np.dtype([(name, np.float64) for name in (
 
 
 class Fitted(NamedTuple):
-    """An outline's fit: centroid, area, covariance per unit variance of the noise, second moments, misfit, and the
-    paint's level. Chroma px."""
+    """An outline's fit: centroid, area, covariance per unit variance of the noise, second moments, misfit, the farthest
+    that a radius moved against the others, and the paint's level. Chroma px."""
 
     x: float
     y: float
@@ -76,6 +76,7 @@ class Fitted(NamedTuple):
     m_xy: float
     m_yy: float
     misfit: float
+    dent: float
     level: float
 
 
