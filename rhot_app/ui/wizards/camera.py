@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QScro
 from rhot_app.calibration.registry import CAMERA
 from rhot_app.errors import RhotError
 from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.models.proposal import NodeChange
 from rhot_app.ui.wizards.framework.control_row import ControlRow
@@ -126,9 +127,9 @@ class CameraPage(Page):
         if self._settings.balance():
             self.changed.emit()
 
-    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
+    def pick(self, picture: Picture, x: float, y: float, width: float, height: float) -> None:
         """Something grey."""
-        self._settings.mark_grey(camera, (round(x), round(y), round(x + width), round(y + height)))
+        self._settings.mark_grey(picture.camera, (round(x), round(y), round(x + width), round(y + height)))
 
     def _answered(self, problem: str) -> None:
         self._settings.note_sent(time.monotonic_ns())

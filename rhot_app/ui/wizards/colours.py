@@ -21,6 +21,7 @@ from rhot_app.calibration.colour.colours import ColourReport
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.colour.verdict import OVERLAP
 from rhot_app.calibration.registry import COLOURS
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.colour_list import PaintList, PaintRow
@@ -170,9 +171,9 @@ class PickPage(Page):
         self._picks.undo()
         self.changed.emit()
 
-    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
+    def pick(self, picture: Picture, x: float, y: float, width: float, height: float) -> None:
         """The chosen marker is there."""
-        self._picks.pick(camera, x, y, width, height)
+        self._picks.pick(picture, x, y, width, height)
 
     def show_view(self, view: StepView) -> None:
         """The list; the button says what it would do."""

@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout, QPushButton
 
 from rhot_app.calibration.registry import STEREO
 from rhot_app.simulator.scene.scene_description import RulerShow
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.proposal import Proposal
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
@@ -91,9 +92,9 @@ class LengthsPage(Page):
         self._known.capture()
         self.changed.emit()
 
-    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
+    def pick(self, picture: Picture, x: float, y: float, width: float, height: float) -> None:
         """An end of the ruler; a drag is a click that slipped."""
-        self._known.pick(camera, x, y)
+        self._known.pick(picture.camera, x, y)
 
     def show_view(self, view: StepView) -> None:
         """The button says what it would do; there is nothing to skip once a length is known."""

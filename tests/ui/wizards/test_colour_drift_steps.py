@@ -50,7 +50,7 @@ def steps(rig: Rig) -> tuple[BoundsStep, SeparationStep]:
     for name in PAINTS:
         x, y = PaintScene.where(name)
         picks.chosen = name
-        assert picks.pick("left", x, y, 0.0, 0.0), picks.problem
+        assert picks.pick(picks.masked["left"].picture, x, y, 0.0, 0.0), picks.problem
     bounds = BoundsStep(picks)
     bounds.enter()
     task = bounds.task()

@@ -88,7 +88,7 @@ def click_at(hands, camera, x, y, to=None):
 def pick(picks, name, place=None, camera="left"):
     """Choose a marker and click the paint of `place`, by default its own; the next line is chosen after it."""
     picks.chosen = name
-    assert picks.pick(camera, *(place or PaintScene.where(name)), 0.0, 0.0), picks.problem
+    assert picks.pick(picks.masked[camera].picture, *(place or PaintScene.where(name)), 0.0, 0.0), picks.problem
 
 
 def pick_all(picks):
@@ -313,6 +313,16 @@ def test_two_markers_of_one_colour_are_refused_and_undo_mends_it(picks):
     assert blue < 90 < green < red and picks.chosen == "index"
 
 
+def test_a_click_is_read_in_the_picture_that_was_clicked(picks, scene):
+    rotated = dict(zip(NAMES, [PAINTS[name] for name in (*NAMES[1:], NAMES[0])], strict=True))
+    late = picks.see(PaintScene(rotated).at_rest)
+    assert picks.capture()
+    picks.take(late)  # looked at while the pictures were held
+    assert picks.pick(picks.held["left"], *PaintScene.where("ring"), 0.0, 0.0), picks.problem
+    shown = picks.markers.markers[picks.base.ids.index(NAMES[0])].display_rgb
+    assert np.abs(np.subtract(shown, PAINTS["ring"])).max() < 40
+
+
 def test_a_camera_that_does_not_find_a_marker_is_named_with_the_test_that_refuses_it(picks, scene):
     other = PaintScene({name: rgb for name, rgb in PAINTS.items() if name != "ring"}, background=(60, 62, 66))
     seen = {"left": scene.at_rest["left"], "right": other.at_rest["right"]}
@@ -320,7 +330,7 @@ def test_a_camera_that_does_not_find_a_marker_is_named_with_the_test_that_refuse
     pick(picks, "ring")
     picks.chosen = SKIN
     x, y = on_skin("thumb")
-    assert picks.pick("left", x - 4.0, y, 8.0, 20.0), picks.problem
+    assert picks.pick(picks.masked["left"].picture, x - 4.0, y, 8.0, 20.0), picks.problem
     picks.take(picks.see(seen))
     hint = picks.view().hint
     assert all(word in hint for word in ("right", "ring", "not found")) and "left" not in hint

@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.calibration.verdict import Finding, Verdict
+from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.disposal import plot_widget
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.common.theme import CELL_PADDING_PX, app_font
@@ -63,8 +64,8 @@ class Page(QWidget):
     def show_view(self, view: StepView) -> None:
         """What the step says now; the sentence, bars, verdict and overlays are shown by the window."""
 
-    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
-        """A person has clicked or dragged in a picture; px of the frame, a click has no size."""
+    def pick(self, picture: Picture, x: float, y: float, width: float, height: float) -> None:
+        """A person has clicked or dragged in `picture`, which may not be the newest; px, a click has no size."""
 
 
 # -- Last page of every wizard: before and after -----------------------------------------------------------------------

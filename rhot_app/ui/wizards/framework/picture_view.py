@@ -28,11 +28,11 @@ _ANY_PX = 16777215  # Qt's QWIDGETSIZE_MAX
 
 
 class PictureView(QWidget):
-    """`picked` gives camera and rectangle (x, y, width, height) in px of the frame when a person has clicked or
-    dragged over the picture; a click is a rectangle without size. Only while `pickable`. A click on a `small` one only
-    gives `chosen`."""
+    """`picked` gives the picture shown and a rectangle (x, y, width, height) in its px when a person has clicked or
+    dragged over it; a click is a rectangle without size. Only while `pickable`. A click on a `small` one only gives
+    `chosen`."""
 
-    picked = Signal(str, float, float, float, float)
+    picked = Signal(Picture, float, float, float, float)
     chosen = Signal(str)
 
     def __init__(self, name: str, scheme: Scheme, parent: QWidget | None = None) -> None:
@@ -161,19 +161,19 @@ class PictureView(QWidget):
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802
         """The other corner."""
-        if self._drag is None:
+        if self._drag is None or self._picture is None:
             return
         place = self._place()
         (x0, y0), (x1, y1) = place.to_frame(self._drag[0]), place.to_frame(event.position())
         self._drag = None
         self.update()
-        self.picked.emit(self.name, min(x0, x1), min(y0, y1), abs(x1 - x0), abs(y1 - y0))
+        self.picked.emit(self._picture, min(x0, x1), min(y0, y1), abs(x1 - x0), abs(y1 - y0))
 
 
 class PictureGrid(QWidget):
     """The pictures of some cameras, beside or above each other, whichever makes them larger."""
 
-    picked = Signal(str, float, float, float, float)
+    picked = Signal(Picture, float, float, float, float)
 
     def __init__(self, cameras: tuple[str, ...], scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -9,7 +9,7 @@ from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMessageBox, QWidget
 
-from rhot_app.ui.backend.feed import LiveFeed
+from rhot_app.ui.backend.feed import LiveFeed, Picture
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.keys import bind_space
@@ -191,8 +191,8 @@ class WizardWindow(QDialog):
         self.work.halted = False
         self.refresh()
 
-    def _pick(self, camera: str, x: float, y: float, width: float, height: float) -> None:
-        self.definition.pages[self.current].pick(camera, x, y, width, height)
+    def _pick(self, picture: Picture, x: float, y: float, width: float, height: float) -> None:
+        self.definition.pages[self.current].pick(picture, x, y, width, height)
         self.refresh()
 
     # -- keys ------------------------------------------------------------------------------------------------------

@@ -190,15 +190,12 @@ class PickStep(Step):
         self.held = {} if self.held else dict(self._live)
         return bool(self.held)
 
-    def pick(self, camera: str, x: float, y: float, width: float, height: float) -> bool:
-        """The chosen marker's paint is there, px of the frame; whether it could be taken. The next one is chosen."""
-        picture = self._masked.get(camera)
-        if picture is None:
-            return False
+    def pick(self, picture: Picture, x: float, y: float, width: float, height: float) -> bool:
+        """The chosen marker's paint is there in `picture`, px; whether it could be taken. The next one is chosen."""
         click = max(width, height) < _CLICK_PX
         where = (x, y) if click else (round(x), round(y), round(x + width) + 1, round(y + height) + 1)
         try:
-            self.gathering.pick(self.chosen, camera, picture.image, where)
+            self.gathering.pick(self.chosen, picture.camera, from_bgr(picture.bgr), where)
         except CalibrationError as exc:
             self.problem = str(exc)
             return False
