@@ -16,6 +16,7 @@ import zmq
 
 from rhot_app.engine.directory import EngineDirectory, default_directory
 from rhot_app.engine.status import (
+    SLOW_S,
     TOPIC_CONTOUR,
     TOPIC_PREVIEW,
     TOPIC_STATE,
@@ -36,6 +37,7 @@ VANISHED_S = 1.0
 ABSENT_S = 2.0
 """An engine that starts makes its sockets sooner."""
 
+_ALIVE_S = 5.0  # so often an engine that is at a slow command is asked whether it is still there
 _RECEIVE_QUEUE = 2000  # messages a slow client may fall behind before the oldest are dropped
 
 
@@ -96,14 +98,20 @@ class EngineClient:
         """Give one command and wait for its answer; docs/engine.md lists them.
 
         Returns the answer's fields. Raises EngineError with the engine's own sentence when it refuses, or when it
-        does not answer within `timeout_s`.
+        does not answer within `timeout_s`. A command of `SLOW_S` is waited for longer, while the engine answers others.
         """
+        begun_s = time.monotonic()
         socket = self._context.socket(zmq.REQ)
         try:
             socket.connect(self.directory.commands)
             socket.send(msgspec.json.encode({"command": name, **arguments}))
             absent = not Path(self.directory.commands.removeprefix("ipc://")).exists()
-            if not socket.poll(round(1e3 * (min(timeout_s, ABSENT_S) if absent else timeout_s))):
+            answered = socket.poll(round(1e3 * (min(timeout_s, ABSENT_S) if absent else timeout_s)))
+            timeout_s = max(timeout_s, SLOW_S.get(name, 0.0))
+            while not (answered or absent) and time.monotonic() < begun_s + timeout_s:
+                self.command("hello")
+                answered = socket.poll(round(1e3 * _ALIVE_S))
+            if not answered:
                 if absent:
                     raise EngineError(f"There is no engine in {self.directory.path}. Start it with "
                                       "`rhot engine --rig FILE`.")

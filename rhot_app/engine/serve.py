@@ -24,6 +24,7 @@ from rhot_app.engine.directory import EngineDirectory, EngineLock, open_director
 from rhot_app.engine.node_control import NodeControl
 from rhot_app.engine.output_process import OutputProcess
 from rhot_app.engine.status import (
+    SLOW_S,
     TOPIC_CONTOUR,
     TOPIC_PREVIEW,
     TOPIC_STATE,
@@ -126,9 +127,6 @@ STATUS_NS = 100_000_000
 UNUSED_S = 30.0
 """An engine in the background ends after this long without recording, clients and commands: a window that crashed is
 opened again within it, and finds the rig as it was."""
-
-SLOW = frozenset({"set_rig"})
-"""Commands that may compile for a minute."""
 
 _COMMAND_MAX = 2 * JSON_BYTES_MAX  # a longer one is cut off, with its client's connection
 _SEND_QUEUE = 1000  # messages kept for a slow client before it misses some
@@ -269,7 +267,7 @@ class Server:
         except EngineError as exc:
             self._send(client, refusal(exc))
             return
-        if name in SLOW:
+        if name in SLOW_S:
             self._slow.append((client, name, arguments))
             return
         self._send(client, *self._commands.answer(name, arguments))

@@ -18,6 +18,10 @@ Level = Literal["info", "warning", "error"]
 Subject = Literal["recording", "tracking", "sight", "equipment", "calibration", "information"]
 """What a sentence is about, most urgent first: data are lost; nothing can be tracked; a camera does not see what it
 should; a machine or a connection works badly; a calibration is missing or in doubt; there is nothing to do."""
+SLOW_S = {"set_rig": 600.0}
+"""s, by command that another thread of the engine carries out: a tracker is compiled and loaded first, a minute's work
+where nothing else runs. A client waits so long."""
+
 NodeWord = Literal["silent", "starting", "ready", "streaming", "fault"]
 
 

@@ -81,7 +81,7 @@ class TrackedObjects(QObject):
         def work(client: Asker) -> Rig:
             answer = client.command("rig")
             rig = change(parse_rig(msgspec.json.encode(answer["document"]), "the engine's rig"))
-            client.command("set_rig", document=msgspec.to_builtins(rig), timeout_s=60.0)
+            client.command("set_rig", document=msgspec.to_builtins(rig))
             if answer.get("path"):
                 client.command("save_rig")
             return rig

@@ -221,7 +221,7 @@ def test_status_and_commands_go_on_while_a_rigs_tracker_is_compiled(
     try:
         with EngineClient(tmp_path / "slow") as client, EngineClient(tmp_path / "slow") as changer:
             slow = msgspec.to_builtins(msgspec.structs.replace(rig, name="slow"))
-            change = threading.Thread(target=lambda: changer.command("set_rig", timeout_s=PATIENCE_S, document=slow))
+            change = threading.Thread(target=lambda: changer.command("set_rig", timeout_s=0.1, document=slow))
             change.start()
             eventually(lambda: any("prepared" in one.text for one in client.status.advice) if client.poll(0.05)
                        and client.status else False)

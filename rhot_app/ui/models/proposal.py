@@ -25,9 +25,6 @@ Rgb = tuple[int, int, int]
 RESTORING = "restoring"
 """First word of the reason of every restore in a rig's history (`rhot_app.rig_history.restore` begins so too)."""
 
-_SET_RIG_S = 30.0
-"""A rig with other markers may have to be compiled for before the engine takes it."""
-
 
 @dataclass(frozen=True, slots=True)
 class Row:
@@ -175,7 +172,7 @@ def set_rig(command: Command, rig: Rig) -> None:
     """Have the engine go on with `rig`, whose tracker is compiled first: the engine tracks meanwhile. Raises
     EngineError."""
     compile_part(part_of(rig), lambda text, fraction: None)
-    command("set_rig", timeout_s=_SET_RIG_S, document=msgspec.to_builtins(rig))
+    command("set_rig", document=msgspec.to_builtins(rig))
 
 
 def _set_node(command: Command, node_id: int, settings: dict[str, Any]) -> None:
