@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.calibration.verdict import Finding, Verdict
+from rhot_app.charts import Chart, Curve
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.disposal import plot_widget
 from rhot_app.ui.common.shapes import ShapeMark
@@ -31,7 +32,7 @@ from rhot_app.ui.models.palette import Scheme, visible_on
 from rhot_app.ui.models.proposal import Row
 from rhot_app.ui.models.words import GRADES
 from rhot_app.ui.wizards.framework.colour_list import swatch
-from rhot_app.ui.wizards.models.step import AcceptStep, Chart, ChartedStep, Curve, Step, StepView
+from rhot_app.ui.wizards.models.step import AcceptStep, ChartedStep, Step, StepView
 
 
 class Page(QWidget):

@@ -10,10 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rhot_app.calibration.verdict import Verdict
+from rhot_app.charts import Chart
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.proposal import Command, Proposal
 from rhot_app.ui.wizards.models.drawing import Overlay
@@ -134,37 +132,6 @@ class Step:
 
     def take_failure(self, sentence: str) -> None:
         """Why the task failed."""
-
-
-# -- What a chart of a result shows, without its widget ----------------------------------------------------------------
-
-Array = NDArray[np.float64]
-Style = Literal["line", "dashes", "dots", "faint dots", "band"]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Curve:
-    """One curve: `x` and `y` (N,). A band reaches from `y` to `high` (N,). `colour` ``#rrggbb``: its own, if it has
-    one; a curve without a `name` stays out of the legend."""
-
-    name: str
-    x: Array
-    y: Array
-    style: Style = "line"
-    high: Array | None = None
-    colour: str = ""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Chart:
-    """Curves over one pair of axes with their units; `log_x`, `log_y`: a logarithmic axis, all values above 0."""
-
-    title: str
-    x_label: str
-    y_label: str
-    curves: tuple[Curve, ...]
-    log_x: bool = False
-    log_y: bool = False
 
 
 class ChartedStep(Step):

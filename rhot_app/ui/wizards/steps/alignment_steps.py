@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.registry import ALIGNMENT
+from rhot_app.charts import Chart, Curve
 from rhot_app.errors import CalibrationError
 from rhot_app.objects.alignment.alignment_file import (
     Alignment,
@@ -38,7 +39,7 @@ from rhot_app.progress import Progress
 from rhot_app.state import HandState
 from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.models.proposal import Command, Proposal, Row
-from rhot_app.ui.wizards.models.step import Bar, Chart, Curve, Step, StepView, Task
+from rhot_app.ui.wizards.models.step import Bar, Step, StepView, Task
 
 Array = NDArray[np.float64]
 

@@ -23,11 +23,12 @@ from rhot_app.certificate.recordings import (
     RulerStep,
     StaticStep,
 )
+from rhot_app.charts import Chart, Curve
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_app.ui.models.proposal import Command, Proposal, Row
 from rhot_app.ui.wizards.models.movement import MovementStep, Request
-from rhot_app.ui.wizards.models.step import AcceptStep, Chart, Curve, StepView, Task
+from rhot_app.ui.wizards.models.step import AcceptStep, StepView, Task
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,11 +14,12 @@ from rhot_app.calibration.colour.colours import ColourReport, solve_colours
 from rhot_app.calibration.colour.surroundings import HUE_STEP_DEG
 from rhot_app.calibration.registry import COLOURS
 from rhot_app.calibration.verdict import Finding, with_findings
+from rhot_app.charts import Chart, Curve
 from rhot_app.project import Rig
 from rhot_app.ui.models.palette import hex_of
 from rhot_app.ui.models.proposal import Change, NodeChange, Proposal, RigChange, Row
 from rhot_app.ui.models.rows import rig_rows
-from rhot_app.ui.wizards.models.step import Chart, ChartedStep, Curve, Pictures, Step, StepView, Task
+from rhot_app.ui.wizards.models.step import ChartedStep, Pictures, Step, StepView, Task
 from rhot_app.ui.wizards.steps.camera_steps import Control
 from rhot_app.ui.wizards.steps.colour_pick import (
     MaskedPictures,

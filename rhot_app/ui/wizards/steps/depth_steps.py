@@ -13,13 +13,14 @@ from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthReport, fit_depth, g
 from rhot_app.calibration.depth.table import DepthRow, DepthTable
 from rhot_app.calibration.registry import DEPTH
 from rhot_app.calibration.verdict import Verdict, with_findings
+from rhot_app.charts import Chart, Curve
 from rhot_app.errors import CalibrationError
 from rhot_app.project import DepthSettings, Rig
 from rhot_app.state import HandState
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.wizards.models.drawing import Callout, Dots
-from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Chart, ChartedStep, Curve, Pictures, Step, StepView
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, ChartedStep, Pictures, Step, StepView
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
 from rhot_node.wire.messages import MarkerObservation

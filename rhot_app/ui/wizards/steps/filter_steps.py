@@ -11,13 +11,14 @@ import numpy as np
 
 from rhot_app.calibration.filters.meters import BRISK_M_S, MOVING_M_S, FilterMeter, FilterTargets, MeterReading
 from rhot_app.calibration.registry import FILTERS
+from rhot_app.charts import Chart, Curve
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.models.palette import hex_of
 from rhot_app.ui.models.proposal import Proposal, RigChange, Row
 from rhot_app.ui.models.rows import rig_rows
-from rhot_app.ui.wizards.models.step import Bar, Chart, Curve, SolveStep, Task
+from rhot_app.ui.wizards.models.step import Bar, SolveStep, Task
 
 if TYPE_CHECKING:
     from rhot_app.calibration.filters.tuning import FilterCurves, FilterReport

@@ -10,12 +10,13 @@ import msgspec
 import numpy as np
 
 from rhot_app.calibration.registry import TIME
+from rhot_app.charts import Chart, Curve
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.models.proposal import Change, NodeChange, Proposal, RigChange, Row
 from rhot_app.ui.models.rows import rig_rows
-from rhot_app.ui.wizards.models.step import Bar, Chart, Curve
+from rhot_app.ui.wizards.models.step import Bar
 
 if TYPE_CHECKING:
     from rhot_app.calibration.time.offset import TimeReport
