@@ -29,8 +29,8 @@ class Actions(QObject):
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self.start = self._make("Start", "", "Tell the nodes to stream, or to stop (Space).")
-        self.record = self._make("Record", "R", "Write the raw log of all datagrams, or end it (R).")
-        self.bookmark = self._make("Bookmark", "B", "Write a few words about this moment into the recording (B).")
+        self.record = self._make("Record", "R", "Write the raw log of all datagrams, or end it.")
+        self.bookmark = self._make("Bookmark", "B", "Write a few words about this moment into the recording.")
         self.video = self._make("Record video, too", "", "Each camera writes its own frames as long as the next "
                                 "recording lasts. Rig, Recordings fetches them afterwards.", checkable=True)
         self.twin = self._make("Simulated rig", "", "Start two simulated cameras that look at a simulated hand.")
@@ -43,7 +43,7 @@ class Actions(QObject):
         self.nodes = self._make("Connect nodes …", "", "Enter the addresses of two nodes, see whether they answer, and "
                                 "write a rig file for them.")
         self.export = self._make("Export recording …", "Ctrl+E", "Write a recording's hand as a file for other "
-                                 "programs: tables, motion capture, animation (Ctrl+E).")
+                                 "programs: tables, motion capture, animation.")
         self.open_recording = self._make("Open recording …", "Ctrl+Shift+O", "Track a recording and play it, in a "
                                          "window of its own.")
         self.recordings = self._make("Recordings …", "", "All recordings: how long and how well tracked; open, rename, "
@@ -61,6 +61,7 @@ class Actions(QObject):
         self.save_rig = self._make("Save rig", "Ctrl+S", "Write the rig as it is now to its file; what stood there is "
                                    "kept beside it.")
         self.close_rig = self._make("Close rig", "Ctrl+W", "End what the app started and go back to the first page.")
+        self.settings = self._make("Settings …", "Ctrl+,", "Look, folders, what opens at the start, and keys.")
         self.quit = self._make("Quit", "Ctrl+Q", "End what the app started and close it.")
         self.next_steps = self._make("What to do next …", "", "Say what you have, and see the steps that are missing.")
         self.wizards = [self._make(f"{wizard.title} …", "", wizard.meaning) for wizard in WIZARDS]
@@ -79,14 +80,14 @@ class Actions(QObject):
         self.properties.menuAction().setToolTip("What the rig file says, to read.")
         self.properties.addActions([self.cameras, self.markers, self.hand])
         self.files = self._make("How to calibrate", "", "Opens the guide.")
-        self.frame = self._make("Frame the hand", "F", "Bring the hand into the middle of the scene (F).")
-        self.home = self._make("Reset the view", "Home", "Back to the view from behind the cameras (Home).")
+        self.frame = self._make("Frame the hand", "F", "Bring the hand into the middle of the scene.")
+        self.home = self._make("Reset the view", "Home", "Back to the view from behind the cameras.")
         self.names = self._make("Marker names", "", "Names beside the markers in the scene.", checkable=True)
         self.now = self._make("Hand as of now", "N", "Draw the hand where it is when you see it, not where it was in "
-                              "the newest pictures, 10 to 40 ms before. The estimator predicts it (N).",
+                              "the newest pictures, 10 to 40 ms before. The estimator predicts it.",
                               checkable=True)
         self.clouds = self._make("Uncertainty", "U", "How well places are known, as ellipsoids: the true place lies "
-                                 "inside in 97 of 100 cases (three sigma) (U).", checkable=True)
+                                 "inside in 97 of 100 cases (three sigma).", checkable=True)
         self.cloud_kinds = [self._make(f"of {kind}", "", meaning, checkable=True) for kind, meaning in CLOUD_KINDS]
         self.cloud_sizes = [
             self._make("1 ×", "", "Ellipsoids in true size.", checkable=True),
@@ -94,12 +95,18 @@ class Actions(QObject):
                        "millimetre.", checkable=True)]
         self.layers = self._make("Layers of the hand …", "", "Which link of the tracked hand hides which before a "
                                  "camera, as masks over its picture.")
-        self.alone = self._make("Scene alone", "6", "Hide every panel, to look from afar; again brings them back (6).",
+        self.alone = self._make("Scene alone", "6", "Hide every panel, to look from afar; again brings them back.",
                                 checkable=True)
         self.dark = self._make("Dark", "", "Light text on dark ground.", checkable=True)
         self.light = self._make("Light", "", "Dark text on light ground.", checkable=True)
         self.reset = self._make("Reset layout and settings", "", "Forget layout, last rig and switches.")
-        self.guide = self._make("Guide", "F1", "The page of the guide that explains the panel in use (F1).")
+        self.guide = self._make("Guide", "F1", "The page of the guide that explains the panel in use.")
+        self.keys = self._make("Keys", "", "The guide's page about keys.")
+        self.about = self._make("About RHOT …", "", "Versions for a report of a fault, and licences.")
+        for action, role in ((self.settings, QAction.MenuRole.PreferencesRole), (self.quit, QAction.MenuRole.QuitRole),
+                             (self.about, QAction.MenuRole.AboutRole)):
+            action.setMenuRole(role)
+        self._name()
         for alternatives in ([self.dark, self.light], self.cloud_sizes):
             group = QActionGroup(self)
             for action in alternatives:
@@ -112,6 +119,17 @@ class Actions(QObject):
         if key:
             action.setShortcut(QKeySequence(key))
         return action
+
+    def _name(self) -> None:
+        """Names by which settings know the actions."""
+        for name, action in vars(self).items():
+            if isinstance(action, QAction):
+                action.setObjectName(name)
+        for prefix, actions, names in (("wizard", self.wizards, [wizard.name for wizard in WIZARDS]),
+                                       ("cloud", self.cloud_kinds, [kind for kind, _ in CLOUD_KINDS]),
+                                       ("cloud", self.cloud_sizes, ["in true size", "larger"])):
+            for action, name in zip(actions, names, strict=True):
+                action.setObjectName(f"{prefix} {name}")
 
     def all(self) -> list[QAction]:
         """Every action, so that the window knows their keys."""
@@ -140,7 +158,7 @@ class _ElidingLabel(QLabel):
 
 
 class MainToolBar(QToolBar):
-    """Start, Record, Rig, Calibrate, View, Guide; at the right the rig's name and the state.
+    """Start, Record, Rig, Calibrate, View, Help; at the right the rig's name and the state.
 
     In a narrow window the controls that do not fit stand behind an arrow; the state stays in sight.
     """
@@ -169,13 +187,13 @@ class MainToolBar(QToolBar):
             a.twin, a.own_cameras, a.open, a.nodes, None, a.open_recording, a.recordings, a.films, a.video, a.bookmark,
             a.export, None, a.add_object, a.objects.menuAction(), None,
             a.outputs, a.mouse, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig,
-            a.close_rig, None, a.quit])
+            a.close_rig, None, a.settings, a.quit])
         self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [
             a.next_steps, None, *a.wizards, a.fit, None, a.earlier, None, a.tracker, a.networks, None, a.files])
         self.view_button, self.view_menu = self._add_menu("View", [
             *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, a.layers, None,
             a.dark, a.light, None, a.reset])
-        self.controls.addAction(actions.guide)
+        self.help_button, self.help_menu = self._add_menu("Help", [a.guide, a.keys, None, a.about])
         self.source_label = QToolButton()
         self.source_label.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.source_label.clicked.connect(actions.bookmark.trigger)

@@ -71,7 +71,7 @@ def _require_settings_file(path: Path) -> None:
 
 
 def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice | None) -> int:
-    """Run the app: on `rig`, on the simulated rig `twin`, on the engine that runs already, or on the first page.
+    """Run the app: on `rig`, on the simulated rig `twin`, on the engine that runs already, or on what the settings say.
 
     Returns 0 when the window was closed. Everything that the app started has ended then.
     """
@@ -121,6 +121,8 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
         window.open_rig(rig)
     elif session.found():
         controller.attach()
+    else:
+        window.open_as_chosen()
     code = app.exec()
     compilation.close()
     left_running = controller.shut_down()

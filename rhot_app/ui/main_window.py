@@ -23,7 +23,7 @@ from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.guide import page_of
-from rhot_app.ui.common.keys import bind_space
+from rhot_app.ui.common.keys import ActionKeys, bind_space
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import show_overflow
 from rhot_app.ui.common.theme import scheme_named
@@ -65,7 +65,7 @@ class MainWindow(QMainWindow):
         self._offered = ""  # the rig whose steps were shown by themselves
         self.passing = TransientNotices()
         self.dialogs = Dialogs(self)
-        self.recordings = Recordings(controller, self.tell)
+        self.recordings = Recordings(controller, settings, self.tell)
         self.rig_watch = RigFileWatch(controller)
         self.wizards = Launcher(controller.backend.asker, controller.backend.client,
                                 lambda: self.appearance.scheme, settings, self, make_solver)
@@ -94,6 +94,7 @@ class MainWindow(QMainWindow):
         self.next_steps = NextSteps(scheme, lambda: controller.rig, self._in_force, settings)
         self.docks = Docks(self)
         self._add_docks()
+        self.keys = ActionKeys([*self.actions_.all(), *self.docks.actions], settings)
         self.toolbar = MainToolBar(self.actions_, self.docks.actions, scheme, self)
         self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.toolbar)
         self.addToolBar(Qt.ToolBarArea.BottomToolBarArea, toolbar_of(self.advice, self))
@@ -123,8 +124,7 @@ class MainWindow(QMainWindow):
 
     def _connect_actions(self) -> None:
         a, c = self.actions_, self.controller
-        self.addActions(a.all())
-        self.addActions(self.docks.actions)
+        self.addActions(self.keys.actions)
         a.start.triggered.connect(c.start_or_stop)
         bind_space(self, c.start_or_stop)
         a.record.triggered.connect(lambda: self.recordings.begin_or_end(video=a.video.isChecked()))
@@ -133,7 +133,7 @@ class MainWindow(QMainWindow):
         a.open.triggered.connect(self.choose_rig)
         a.nodes.triggered.connect(self.connect_nodes)
         a.own_cameras.triggered.connect(self.choose_cameras)
-        a.export.triggered.connect(lambda: self.dialogs.export_recording())
+        a.export.triggered.connect(lambda: self.dialogs.export_recording(self.settings))
         a.open_recording.triggered.connect(self.replays.choose)
         a.recordings.triggered.connect(self.replays.list)
         a.films.triggered.connect(self.replays.track_films)
@@ -142,6 +142,7 @@ class MainWindow(QMainWindow):
         a.mouse.triggered.connect(lambda: self.dialogs.show_mouse(c, self.appearance.scheme))
         a.save_rig.triggered.connect(lambda: self.rig_watch.save(self.tell))
         a.close_rig.triggered.connect(c.close_rig)
+        a.settings.triggered.connect(lambda: self.dialogs.show_settings(self.settings, self.keys))
         a.quit.triggered.connect(self.close)
         for action, page in ((a.cameras, "cameras"), (a.markers, "markers"), (a.hand, "hand")):
             action.triggered.connect(lambda checked=False, page=page: self.show_rig_file(page))
@@ -155,6 +156,8 @@ class MainWindow(QMainWindow):
         a.alone.toggled.connect(lambda on: self.docks.put_away("scene alone", on))
         a.reset.triggered.connect(self.reset_settings)
         a.guide.triggered.connect(lambda: self.open_guide(page_of(QApplication.focusWidget())))
+        a.keys.triggered.connect(lambda: self.open_guide("keys"))
+        a.about.triggered.connect(self.dialogs.show_about)
         w = self.welcome
         w.twin_asked.connect(self.open_twin)
         w.file_asked.connect(self.choose_rig)
@@ -206,6 +209,13 @@ class MainWindow(QMainWindow):
             self.docks.arrange()
 
     # -- what the actions do ---------------------------------------------------------------------------------------
+
+    def open_as_chosen(self) -> None:
+        """What the settings say of the start: a rig, or the first page."""
+        if self.settings.start == "twin":
+            self.open_twin(TwinChoice(motion=self.welcome.motion))
+        elif self.settings.start == "last" and Path(self.settings.last_rig).is_file():
+            self.open_rig(Path(self.settings.last_rig))
 
     def open_twin(self, choice: TwinChoice) -> None:
         """Start the simulated rig and the tracking."""
@@ -313,8 +323,9 @@ class MainWindow(QMainWindow):
             self.controller.press(key)
 
     def reset_settings(self) -> None:
-        """As on the first start: layout, switches, last rig."""
+        """As on the first start: layout, switches, last rig, folders, keys."""
         self.settings.reset()
+        self.keys.restore()
         self.actions_.alone.setChecked(False)
         self.appearance.set_scheme(self.settings.scheme)
         self._restore()

@@ -185,7 +185,8 @@ class Docks:
         key = str(len(self.docks))
         action = dock.toggleViewAction()
         action.setShortcut(QKeySequence(key))
-        action.setToolTip(f"Show or hide the panel ({key}).")
+        action.setObjectName(f"panel {name}")
+        action.setToolTip("Show or hide the panel.")
         self._window.addDockWidget(_AREAS[area], dock)
         return dock
 

@@ -104,7 +104,9 @@ OPENERS = (
     Opener("recordings", lambda window: window.replays.list(), lambda window: window.replays.library),
     Opener("replay", lambda window: window.replays.open(Path("none.rhotlog")), lambda window: window.replays.window),
     Opener("rig", lambda window: window.show_rig_file("hand"), at_top(dialogs.RigDialog)),
-    dialog("export", lambda window: window.dialogs.export_recording()))
+    dialog("settings", lambda window: window.actions_.settings.trigger()),
+    dialog("about", lambda window: window.actions_.about.trigger()),
+    dialog("export", lambda window: window.dialogs.export_recording(window.settings)))
 
 
 # -- rounds ------------------------------------------------------------------------------------------------------------

@@ -62,7 +62,7 @@ class Report:
     def add_versions(self) -> None:
         """Programs, packages and machine."""
         self._add_json("versions.json", {
-            "packages": {name: _version(name) for name in _PACKAGES}, "python": sys.version,
+            "packages": package_versions(), "python": sys.version,
             "system": platform.platform(), "machine": platform.machine(), "processors": os.cpu_count(),
             "load": os.getloadavg()})
 
@@ -165,6 +165,11 @@ def _tail(path: Path) -> str:
         size = file.seek(0, 2)
         file.seek(max(0, size - LOG_BYTES_MAX))
         return file.read(LOG_BYTES_MAX).decode(errors="replace")
+
+
+def package_versions() -> dict[str, str]:
+    """RHOT and the packages whose versions explain faults."""
+    return {name: _version(name) for name in _PACKAGES}
 
 
 def _version(name: str) -> str:

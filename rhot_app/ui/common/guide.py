@@ -17,7 +17,8 @@ PAGES: tuple[tuple[str, str], ...] = (
     ("calibration", "Calibration"), ("fitting", "Fitting the hand to pictures"),
     ("tracker", "The tracker"), ("outputs", "Streams to other programs"),
     ("mouse", "The 3-D mouse"),
-    ("recording", "Recording and replay"), ("troubles", "When something is wrong"), ("keys", "Keys"),
+    ("recording", "Recording and replay"), ("settings", "Settings"),
+    ("troubles", "When something is wrong"), ("keys", "Keys"),
 )
 """Name of each page's file and its title, in reading order."""
 

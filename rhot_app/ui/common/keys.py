@@ -1,12 +1,76 @@
-"""The space bar of a window with one action that people give while they look elsewhere."""
+"""Keys of windows: the space bar for what people do while they look elsewhere, and keys that a person can change."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtGui import QAction, QKeySequence, QShortcut
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QPushButton, QToolButton, QWidget
+
+from rhot_app.ui.common.settings import Settings
+
+_FIXED: Final = {"Space": "Start and Stop", "Alt+Down": "opening menus", "Alt+M": "the list of sentences"}
+"""Keys that no action can have, and what they serve."""
+
+
+class ActionKeys:
+    """The keys of a window's actions, which are known by their object names: those that they were made with, or those
+    that the person chose. An action's tooltip ends with its key."""
+
+    def __init__(self, actions: Iterable[QAction], settings: Settings) -> None:
+        self._settings = settings
+        self.actions = list(actions)
+        self._own = {action.objectName(): action.shortcut() for action in self.actions}
+        self._meanings = {action.objectName(): action.toolTip() for action in self.actions}
+        self.restore()
+
+    def named(self, name: str) -> QAction:
+        """The action of that object name."""
+        return next(action for action in self.actions if action.objectName() == name)
+
+    def restore(self) -> None:
+        """The keys as the settings have them."""
+        for action in self.actions:
+            chosen = self._settings.key(action.objectName())
+            self._set(action, self._own[action.objectName()] if chosen is None else QKeySequence(chosen))
+
+    def is_own(self, action: QAction) -> bool:
+        """Whether the action has the key that it was made with."""
+        return action.shortcut() == self._own[action.objectName()]
+
+    def choose(self, action: QAction, key: QKeySequence) -> str:
+        """Give an action another key, or none. The sentence that says why it cannot have it, else ""."""
+        text = key.toString()
+        holder = _FIXED.get(text) or next((title_of(one) for one in self.actions
+                                           if one is not action and text and one.shortcut() == key), "")
+        if holder:
+            return f"{text} is the key of {holder}. Choose another, or take it from there first."
+        own = key == self._own[action.objectName()]
+        self._settings.set_key(action.objectName(), None if own else text)
+        self._set(action, key)
+        return ""
+
+    def choose_own(self, action: QAction) -> str:
+        """Give an action the key that it was made with; what `choose` says."""
+        return self.choose(action, self._own[action.objectName()])
+
+    def forget(self) -> None:
+        """All keys as they were made."""
+        for action in self.actions:
+            self._settings.set_key(action.objectName(), None)
+        self.restore()
+
+    def _set(self, action: QAction, key: QKeySequence) -> None:
+        action.setShortcut(key)
+        meaning, text = self._meanings[action.objectName()], key.toString(QKeySequence.SequenceFormat.NativeText)
+        action.setToolTip(f"{meaning.removesuffix('.')} ({text})." if text else meaning)
+
+
+def title_of(action: QAction) -> str:
+    """What an action is called, without the sign of its dialog and what a menu says behind a tab."""
+    return action.text().partition("\t")[0].removesuffix(" …")
 
 
 def bind_space(window: QWidget, action: Callable[[], object]) -> None:

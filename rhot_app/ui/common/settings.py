@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
-from platformdirs import user_config_path
-from PySide6.QtCore import QByteArray, QSettings
+from platformdirs import user_config_path, user_documents_path
+from PySide6.QtCore import QByteArray, QObject, QSettings, Signal
 
 _FILE = "app.ini"
+STARTS: Final = (("page", "the first page"), ("last", "the rig that was opened last"), ("twin", "the simulated rig"))
+"""What can be opened at the start, with its words."""
 
 
-class Settings:
-    """Remembered values with their defaults. `reset` forgets them all."""
+class Settings(QObject):
+    """Remembered values with their defaults. `reset` forgets them all. `flag_changed` gives a switch's name."""
+
+    flag_changed = Signal(str)
 
     def __init__(self, path: Path | None = None) -> None:
+        super().__init__()
         self.path = path or user_config_path("rhot", appauthor=False) / _FILE
         self._store = QSettings(str(self.path), QSettings.Format.IniFormat)
 
@@ -49,6 +55,43 @@ class Settings:
         self._store.setValue("look/scheme", name)
 
     @property
+    def start(self) -> str:
+        """What is opened when the app starts, one of `STARTS`."""
+        name = self._text("start/open", "page")
+        return name if name in dict(STARTS) else "page"
+
+    @start.setter
+    def start(self, name: str) -> None:
+        self._store.setValue("start/open", name)
+
+    @property
+    def recordings_folder(self) -> Path:
+        """Where recordings are made; it may not exist yet."""
+        chosen = self._text("folders/recordings", "")
+        return Path(chosen) if chosen else user_documents_path() / "RHOT"
+
+    @property
+    def exports_folder(self) -> Path | None:
+        """Where exported files are offered to be written; None: beside their recording."""
+        chosen = self._text("folders/exports", "")
+        return Path(chosen) if chosen else None
+
+    def choose_folder(self, name: str, path: Path | None) -> None:
+        """Another folder of "recordings" or "exports"; None: as on the first start."""
+        self._store.setValue(f"folders/{name}", "" if path is None else str(path))
+
+    def key(self, action: str) -> str | None:
+        """The key that the person chose for an action, "" for no key; None: the one that it was made with."""
+        return self._text(f"keys/{action}", "") if self._store.contains(f"keys/{action}") else None
+
+    def set_key(self, action: str, key: str | None) -> None:
+        """Remember the key of an action; None forgets it."""
+        if key is None:
+            self._store.remove(f"keys/{action}")
+        else:
+            self._store.setValue(f"keys/{action}", key)
+
+    @property
     def motion(self) -> str:
         """Motion of the simulated hand chosen last."""
         return self._text("twin/motion", "grasp")
@@ -73,6 +116,7 @@ class Settings:
     def set_flag(self, name: str, value: bool) -> None:
         """Remember a switch of the View menu."""
         self._store.setValue(f"view/{name}", "yes" if value else "no")
+        self.flag_changed.emit(name)
 
     def remembered(self, name: str) -> str:
         """What a wizard remembers by this name, "" for nothing."""

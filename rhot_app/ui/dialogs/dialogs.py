@@ -29,12 +29,15 @@ from rhot_app.sources.cameras.camera_set import Prepared
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.disposal import dispose, release_style
 from rhot_app.ui.common.guide import GuideViewer
+from rhot_app.ui.common.keys import ActionKeys
+from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.dialogs.about_dialog import AboutDialog
 from rhot_app.ui.dialogs.cameras_dialog import CamerasDialog
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
 from rhot_app.ui.dialogs.networks_dialog import NetworksDialog
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
 from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
-from rhot_app.ui.dialogs.recordings import recordings_folder
+from rhot_app.ui.dialogs.settings_dialog import SettingsDialog
 from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
 from rhot_app.ui.models.palette import Scheme, hex_of
 from rhot_app.ui.mouse.window import MouseWindow
@@ -55,6 +58,8 @@ class Dialogs:
         self.mouse: MouseWindow | None = None
         self.layers: LayersDialog | None = None
         self.export: ExportDialog | None = None
+        self.settings: SettingsDialog | None = None
+        self.about: AboutDialog | None = None
 
     def _hold(self, name: str, dialog: QDialog) -> None:
         """Hold a dialog until it is closed, then let go of it."""
@@ -87,9 +92,9 @@ class Dialogs:
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         return dialog.prepared if dialog.exec() else None
 
-    def export_recording(self, log: Path | None = None) -> None:
+    def export_recording(self, settings: Settings, log: Path | None = None) -> None:
         """What to write of a recording, beside the window; `log` None is asked for."""
-        dialog = ExportDialog(log, recordings_folder(), self._parent)
+        dialog = ExportDialog(log, settings.recordings_folder, self._parent, out_folder=settings.exports_folder)
         self._hold("export", dialog)
         dialog.open()
 
@@ -131,6 +136,18 @@ class Dialogs:
             dialog.rig_used.connect(lambda rig: rig_used())
             self._hold("outputs", dialog)
         _bring_forward(self.outputs)
+
+    def show_settings(self, settings: Settings, actions: ActionKeys) -> None:
+        """What the app remembers, to be changed."""
+        if self.settings is None:
+            self._hold("settings", SettingsDialog(settings, actions, self._parent))
+        _bring_forward(self.settings)
+
+    def show_about(self) -> None:
+        """Versions and licences."""
+        if self.about is None:
+            self._hold("about", AboutDialog(self._parent))
+        _bring_forward(self.about)
 
     def follow_rig(self, controller: Controller) -> None:
         """Another rig is open, or none."""
@@ -183,7 +200,8 @@ class Dialogs:
 
     def close(self) -> None:
         """Close what stands beside the window."""
-        for window in (self.guide, self.tracker, self.networks, self.outputs, self.mouse, self.layers, self.export):
+        for window in (self.guide, self.tracker, self.networks, self.outputs, self.mouse, self.layers, self.export,
+                       self.settings, self.about):
             if window is not None:
                 window.close()
 

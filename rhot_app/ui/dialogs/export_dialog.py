@@ -53,8 +53,9 @@ class ExportDialog(QDialog):
     """`log` is the recording, the newest one in `folder` unless another is given; None while there is none."""
 
     def __init__(self, log: Path | None, folder: Path, parent: QWidget | None = None, *, rig: Rig | None = None,
-                 smooth: bool = False) -> None:
-        """`rig`: what `log` is tracked with; None: as it was recorded. `smooth`: begin with that."""
+                 smooth: bool = False, out_folder: Path | None = None) -> None:
+        """`rig`: what `log` is tracked with; None: as it was recorded. `smooth`: begin with that. `out_folder`: where
+        the file is offered to be written, None: beside the recording."""
         super().__init__(parent)
         self.setWindowTitle("Export recording")
         self.setProperty("guide", "recording")
@@ -62,6 +63,7 @@ class ExportDialog(QDialog):
         self.log = log
         self._rig = rig
         self._folder = folder
+        self._out_folder = out_folder
         self._job: Job | None = None
         self._look: Job | None = None
         self.log_label = QLabel()
@@ -229,7 +231,9 @@ class ExportDialog(QDialog):
         if self.log is None:
             return
         ending = FORMATS[self.format].endings[0]
-        name, _ = QFileDialog.getSaveFileName(self, "Export to", str(self.log.with_suffix(ending)),
+        beside = self.log.with_suffix(ending)
+        start = beside if self._out_folder is None else self._out_folder / beside.name
+        name, _ = QFileDialog.getSaveFileName(self, "Export to", str(start),
                                               f"{self.format} (*{ending});;All files (*)")
         if name:
             out = Path(name)

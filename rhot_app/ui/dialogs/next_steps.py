@@ -69,6 +69,7 @@ class NextSteps(QWidget):
         self.never.setToolTip("Do not show these steps by themselves. Calibrate, What to do next shows them.")
         self.never.setChecked(not settings.flag(NEXT_STEPS))
         self.never.toggled.connect(lambda never: settings.set_flag(NEXT_STEPS, not never))
+        settings.flag_changed.connect(self._follow_settings)
         self.close_button = QPushButton("Close")
         self.close_button.clicked.connect(self.closed)
         self._lay_out()
@@ -84,6 +85,10 @@ class NextSteps(QWidget):
             self.wears[answers.wear].setChecked(True)
             self.counts[answers.cameras].setChecked(True)
             self.look()
+
+    def _follow_settings(self, flag: str) -> None:
+        if flag == NEXT_STEPS:
+            self.never.setChecked(not self._settings.flag(NEXT_STEPS))
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours."""

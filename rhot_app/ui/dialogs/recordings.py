@@ -7,7 +7,6 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from platformdirs import user_documents_path
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QInputDialog, QWidget
@@ -15,6 +14,7 @@ from PySide6.QtWidgets import QInputDialog, QWidget
 from rhot_app.engine.status import Level
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.disposal import dispose
+from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
 
@@ -42,11 +42,6 @@ LOG_FILTER = f"Recordings (*{LOG_SUFFIX});;All files (*)"
 SHOW_FOLDER = "show the recording's folder"
 
 
-def recordings_folder() -> Path:
-    """Where recordings are made; it may not exist yet."""
-    return user_documents_path() / "RHOT"
-
-
 def newest_recording(folder: Path) -> Path | None:
     """The recording in a folder that was written last; None when there is none."""
     written = []
@@ -59,8 +54,9 @@ def newest_recording(folder: Path) -> Path | None:
 class Recordings:
     """`tell` takes the sentences that are to be shown for a while."""
 
-    def __init__(self, controller: Controller, tell: Callable[[Notice], None]) -> None:
+    def __init__(self, controller: Controller, settings: Settings, tell: Callable[[Notice], None]) -> None:
         self._controller = controller
+        self._settings = settings
         self._tell = tell
         self._log_path = ""
         self._finished = Path()
@@ -68,13 +64,15 @@ class Recordings:
         self.dialog: BookmarkDialog | None = None
 
     def begin_or_end(self, *, video: bool = False) -> None:
-        """Begin a log in the documents folder, named by date and time; or end the one that is being written. `video`:
-        the nodes record their frames, too."""
+        """Begin a log in the folder of recordings, named by date and time; or end the one that is being written.
+
+        `video`: the nodes record their frames, too.
+        """
         if self._controller.recording:
             self._controller.stop_recording()
             return
         self._video = video
-        folder = recordings_folder()
+        folder = self._settings.recordings_folder
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as exc:

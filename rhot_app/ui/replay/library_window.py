@@ -22,7 +22,6 @@ from rhot_app.recording.video import Collected, collect_videos
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.job import Job, Progress
 from rhot_app.ui.common.sentence import Sentence
-from rhot_app.ui.dialogs.recordings import recordings_folder
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import Remaining
 from rhot_app.ui.panels.empty_state import EmptyState
@@ -40,12 +39,13 @@ def summaries_folder() -> Path:
 
 
 class LibraryWindow(QDialog):
-    """`open_asked` gives a recording's path; `renamed` its path before and after. `rig`: the one that is open."""
+    """`open_asked` gives a recording's path; `renamed` its path before and after. `folder` holds the
+    recordings; `rig`: the one that is open."""
 
     open_asked = Signal(object)
     renamed = Signal(object, object)
 
-    def __init__(self, scheme: Scheme, folder: Path | None = None, cache: Path | None = None,
+    def __init__(self, scheme: Scheme, folder: Path, cache: Path | None = None,
                  parent: QWidget | None = None, rig: Callable[[], Rig | None] = lambda: None,
                  make_solver: Callable[[], Solver] = Solver) -> None:
         super().__init__(parent)
@@ -53,7 +53,7 @@ class LibraryWindow(QDialog):
         self.setProperty("guide", "recording")
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
         self.resize(*_SIZE)
-        self.library = Library(folder or recordings_folder(), cache or summaries_folder())
+        self.library = Library(folder, cache or summaries_folder())
         self.summaries = Summaries(self.library, make_solver(), self)
         self._listing: Job | None = None
         self._collecting: Job | None = None

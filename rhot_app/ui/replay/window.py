@@ -26,7 +26,7 @@ from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.keys import bind_space
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
-from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording, recordings_folder
+from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording
 from rhot_app.ui.models.notice import Notice, TransientNotices
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import Look, condition_look
@@ -143,7 +143,7 @@ class ReplayWindow(QMainWindow):
 
     def choose(self) -> None:
         """Ask for a recording and open it."""
-        folder = self.replay.path.parent if self.replay is not None else recordings_folder()
+        folder = self.replay.path.parent if self.replay is not None else self._settings.recordings_folder
         start = newest_recording(folder) or folder
         name, _ = QFileDialog.getOpenFileName(self, "Open a recording", str(start), LOG_FILTER)
         if name:
@@ -218,7 +218,8 @@ class ReplayWindow(QMainWindow):
             return
         replay = self.replay
         rig = None if replay.choice == TrackerChoice() else replay.run.rig
-        self.exporting = ExportDialog(replay.path, replay.path.parent, self, rig=rig, smooth=replay.choice.smooth)
+        self.exporting = ExportDialog(replay.path, replay.path.parent, self, rig=rig, smooth=replay.choice.smooth,
+                                      out_folder=self._settings.exports_folder)
         self.exporting.finished.connect(self._forget_export)
         self.exporting.open()
 

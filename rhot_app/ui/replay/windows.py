@@ -11,7 +11,7 @@ from rhot_app.project import Rig
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.settings import Settings
-from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording, recordings_folder
+from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.replay.films_dialog import FilmsDialog
 from rhot_app.ui.replay.library_window import LibraryWindow
@@ -32,7 +32,8 @@ class ReplayWindows:
 
     def choose(self) -> None:
         """Ask for a recording and replay it."""
-        start = newest_recording(recordings_folder()) or recordings_folder()
+        folder = self._settings.recordings_folder
+        start = newest_recording(folder) or folder
         name, _ = QFileDialog.getOpenFileName(self._parent, "Open a recording", str(start), LOG_FILTER)
         if name:
             self.open(Path(name))
@@ -48,8 +49,8 @@ class ReplayWindows:
     def list(self) -> None:
         """The page with all recordings."""
         if self.library is None:
-            self.library = LibraryWindow(self._scheme(), parent=self._parent, rig=self._rig,
-                                         make_solver=self._make_solver)
+            self.library = LibraryWindow(self._scheme(), self._settings.recordings_folder, parent=self._parent,
+                                         rig=self._rig, make_solver=self._make_solver)
             self.library.open_asked.connect(self.open)
             self.library.renamed.connect(self._follow)
             self.library.finished.connect(self._forget_library)
