@@ -2,7 +2,7 @@
 
     python benchmarks/marker_errors.py [--seeds 3] [--motions rest,wave,grasp,pinch,fast] [--sketched]
 
-The takes of `rhot evaluate --compare`, observations without flags only. `common` is what both cameras see alike: half
+The takes of `rhot evaluate compare`, observations without flags only. `common` is what both cameras see alike: half
 the sum of two observations nearest in time; `own` is each camera's alone: half their difference, rms of one camera.
 `share` is own squared in parts of the stated variance; constants of `tracking/markers/marker_model.py` and
 `tracking/markers/marker_residual.py` rest on it. `lasts`: correlation of own errors 0.1 s apart, 0 for noise.

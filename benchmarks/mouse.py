@@ -1,4 +1,4 @@
-"""The measures of the 3-D mouse (`rhot mouse --measure --pictures`), as tables.
+"""The measures of the 3-D mouse (`rhot mouse measure --pictures`), as tables.
 
     python benchmarks/mouse.py [--seed 1] [--places 20] [--sketched] [--json FILE]
 

@@ -10,7 +10,7 @@ where these are there. `compare` prints a row for each value that is lacking, ne
 1e-9 of themselves. Times, durations and versions are left out by name (`LEFT_OUT`). Exit code 1: there is such a row.
 `--only WORD` takes the commands that have this word, and all simulations; what they read must be of these.
 
-Left out are: `rhot evaluate` of a live run, `certify` on a rig, `mouse --measure` and `--simulated`, which take minutes
+Left out are: `rhot evaluate live`, `certify` on a rig, `mouse measure` and `mouse run --simulated`, which take minutes
 or depend on the machine's time; `engine`, `pair` and `video`, which need a live rig. Of `cameras`, `rhot-node doctor`
 and the latency of `certify` the keys alone are compared, because the values say what this machine has.
 """

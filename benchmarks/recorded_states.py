@@ -6,7 +6,7 @@
 FOLDER has raw logs (`*.rhotlog`), of any motions, markers, landmarks, objects, contours, one hand or two. `keep` writes
 beside each what the rig's own tracker, the classic one, the estimator and the smoother make of it, as far as its rig
 allows. `compare` tracks them again and prints by how much places differ. Exit code 1: by more than 1e-6 m, or a state's
-condition differs. Truth is not asked: where states differ, `rhot evaluate --compare` says which are better.
+condition differs. Truth is not asked: where states differ, `rhot evaluate compare` says which are better.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ all cameras at once or from each by itself), `mixed` (index and middle taken for
 (fingers crossing for ten minutes), `wrist` (only the wrist's marker left), `still`, `ramp` and `fast` (spread and lag),
 `curve` (jitter against lag for several filters), `scale` (a hand file 10 % wrong, the size floating), `start` (from
 nothing) and `compute` (time per datagram, memory over ten minutes). Logs are kept and found again, as by
-`rhot evaluate --compare`.
+`rhot evaluate compare`.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from importlib.metadata import version
 from types import ModuleType
 
 from rhot_app.errors import RhotError, take_losses
+from rhot_app.former_spellings import present_spelling
 from rhot_node.errors import NodeError, nearest, system_sentence
 from rhot_node.terminal import printable_output
 
@@ -55,7 +56,7 @@ SUBCOMMANDS = {
     "history": Subcommand("rhot_app.calibration.commands.history", "list or bring back earlier versions of a rig file"),
     "report": Subcommand("rhot_app.engine.offline.report_command", "collect what somebody needs who looks for a fault"),
     "mouse": Subcommand("rhot_app.mouse.mouse_command", "work a 3-D cursor and two buttons with the hand"),
-    "evaluate": Subcommand("rhot_app.evaluation.evaluate_command", "play a simulated run and compare with its truth"),
+    "evaluate": Subcommand("rhot_app.evaluation.evaluate_command", "compare runs and trackers with the truth"),
 }
 
 
@@ -87,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def parse(arguments: list[str]) -> tuple[ModuleType, argparse.Namespace]:
     """The module that runs a command, and its arguments; what is strange among them ends the program."""
-    arguments = _command_first(arguments)
+    arguments = present_spelling(_command_first(arguments))
     name = next((argument for argument in arguments if not argument.startswith("-")), None)
     chosen = SUBCOMMANDS.get(name or "")
     parser = argparse.ArgumentParser(
@@ -106,7 +107,7 @@ def parse(arguments: list[str]) -> tuple[ModuleType, argparse.Namespace]:
         module.add_arguments(parser)
     if chosen is None and arguments and arguments[0] == name:
         parser.error(f"there is no command {name!r}{_meant(name, SUBCOMMANDS)}")
-    asked = rooms["" if chosen is None or name is None else name]
+    asked = _inner(rooms["" if chosen is None or name is None else name], arguments[1:])
     options = _options(asked)
     strange = [word for word in arguments if word.startswith("--")
                and not any(option.startswith(word.split("=")[0]) for option in options)]
@@ -133,6 +134,15 @@ def _command_first(arguments: list[str]) -> list[str]:
     if not rest or rest[0] not in SUBCOMMANDS:
         return arguments
     return [rest[0], *arguments[:len(arguments) - len(rest)], *rest[1:]]
+
+
+def _inner(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> argparse.ArgumentParser:
+    """The parser that the first of some arguments choose: that of `rhot calibrate depth`, not of all calibrations."""
+    for action in parser._actions if arguments else ():
+        if isinstance(action, argparse._SubParsersAction) and arguments[0] in action.choices:
+            inner: argparse.ArgumentParser = action.choices[arguments[0]]
+            return _inner(inner, arguments[1:])
+    return parser
 
 
 def _options(parser: argparse.ArgumentParser) -> list[str]:

@@ -114,12 +114,6 @@ def whole(text: str) -> int:
     return value
 
 
-def add_force_argument(parser: argparse.ArgumentParser, meaning: str = "write over a file that exists") -> None:
-    """``--force``, the same everywhere; scripts from before it may say ``--again``."""
-    parser.add_argument("--force", action="store_true", help=meaning)
-    parser.add_argument("--again", action="store_true", dest="force", help=argparse.SUPPRESS)
-
-
 def refuse_existing(path: Path, error: type[RhotError], option: str = "--out", *, force: bool) -> None:
     """Raise `error` when something stands at `path`, which `option` named, unless it is to be written over."""
     if path.exists() and not force:

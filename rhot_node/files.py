@@ -87,7 +87,7 @@ def decode_document(data: bytes, kind: type[T], *, format_name: str, version: in
     try:
         return msgspec.json.decode(data, type=kind)
     except msgspec.ValidationError as exc:
-        raise error(f"{where}: {printable(_in_words(str(exc), kind))}") from exc
+        raise error(f"{where}: {printable(in_words(str(exc), kind))}") from exc
     except msgspec.DecodeError as exc:
         raise error(f"{where}: {_not_strict(exc)}") from exc
 
@@ -158,7 +158,7 @@ def _not_strict(exc: msgspec.DecodeError) -> str:
     return f"not valid JSON ({exc}). NaN and Infinity are no numbers there."
 
 
-def _in_words(message: str, kind: type) -> str:
+def in_words(message: str, kind: type) -> str:
     """What msgspec found wrong, field first, for people who edit the file; a message that is not its own stays."""
     match = _PLACE.fullmatch(message)
     what, place = (match["what"], match["place"]) if match else (message, "")

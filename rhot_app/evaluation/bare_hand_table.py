@@ -1,4 +1,4 @@
-"""The table of `rhot evaluate --bare-hand`, with published figures of other trackers beside it."""
+"""The table of `rhot evaluate bare-hand`, with published figures of other trackers beside it."""
 
 from __future__ import annotations
 

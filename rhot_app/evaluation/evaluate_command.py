@@ -1,4 +1,5 @@
-"""``rhot evaluate``: the whole system against the truth it never saw, or trackers side by side on the same logs."""
+"""``rhot evaluate live|compare|bare-hand``: the whole system against the truth it never saw, trackers side by side on
+the same logs, and a tracker without markers on bare hands."""
 
 from __future__ import annotations
 
@@ -8,89 +9,128 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rhot_app.errors import not_negative, positive_count, positive_number
-from rhot_app.simulator.scene.scene_arguments import SECONDS_MAX, add_scene_arguments, scene_of
+from rhot_app.options import add_json_argument, add_seed_argument
+from rhot_app.simulator.scene.scene_arguments import MOTION, SECONDS_MAX, add_scene_arguments, fields_of
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
 
-_OF_COMPARE = ("motions", "recording", "seeds", "trackers", "sketched", "logs", "baseline")
+if TYPE_CHECKING:
+    from rhot_app.simulator.scene.scene_file import SceneFields
+
 _JUDGED_S = 0.1  # shorter is no run
-_OF_PICTURES = ("background", "worn", "uneven", "glove", "lamp", "kelvin", "mains")
+_OF_PICTURES = ("background", "worn_paint", "uneven_paint", "glove_rgb", "lamp")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``rhot evaluate``."""
+    """Arguments of ``rhot evaluate`` and of its three commands."""
+    commands = parser.add_subparsers(dest="evaluation", metavar="COMMAND", title="commands", required=True)
+    for name, add, summary in (
+            ("live", _add_live, "play a simulated run in real time to nodes and engine, and compare with its truth"),
+            ("compare", _add_compare, "put the same raw logs through several trackers, without real time"),
+            ("bare-hand", _add_bare_hand, "put a tracker without markers through the cases of a bare hand")):
+        add(commands.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}."))
+    add_examples(parser, "rhot evaluate live --motion pinch --seconds 10",
+                 "rhot evaluate compare --motions rest,pinch --sketched")
+
+
+def _add_live(parser: argparse.ArgumentParser) -> None:
     add_scene_arguments(parser)
-    parser.set_defaults(motion=None)  # so that one that --compare would pass over is seen
-    parser.add_argument("--seconds", type=positive_number, default=None, metavar="S",
-                        help="length of a run; its first second is not judged (default 20, with --compare 8)")
-    parser.add_argument("--loss", type=not_negative, default=0.0, metavar="P",
-                        help="probability 0..1 that a datagram of observations is lost (default 0)")
+    _add_run(parser, 20, "length of the run; its first second is not judged")
     parser.add_argument("--detector", default="fast", choices=("fast", "reference"),
                         help="the nodes' detector: fast, or reference, the thesis's pipeline")
     parser.add_argument("--frames", type=Path, metavar="DIR",
                         help="play this folder of `rhot simulate` instead of rendering; the scene is what it says")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
-    group = parser.add_argument_group("comparing trackers on the same raw logs, without real time (docs/comparison.md)")
-    group.add_argument("--compare", action="store_true", help="put the same logs through every tracker")
-    group.add_argument("--motions", metavar="M,M,...", default=None,
-                       help="motions to compare on (default rest,wave,grasp,pinch,fast)")
-    group.add_argument("--recording", metavar="FILE", default=None,
-                       help="compare on this recording as well (Qualisys .tsv, Leap Motion .csv)")
-    group.add_argument("--seeds", type=positive_count, default=None, metavar="N",
-                       help="how many seeds, beginning with --seed (default 5)")
-    group.add_argument("--trackers", metavar="T,T,...", default=None,
-                       help="which trackers (default classic,estimator); the ratio is the last one's to the first's")
-    group.add_argument("--sketched", action="store_true", default=None,
-                       help="logs without pictures: exact outlines, noise and bias put on, hidden parts counted; fast")
-    group.add_argument("--baseline", type=Path, metavar="FILE", default=None,
-                       help="print the last tracker's ratios to the figures kept in FILE (benchmarks/baselines)")
-    group.add_argument("--logs", type=Path, metavar="DIR", default=None,
-                       help="where logs are kept and found again (default ~/.cache/rhot/takes)")
-    bare = parser.add_argument_group("a tracker without markers on a bare hand, without real time (docs/twin.md)")
-    bare.add_argument("--bare-hand", action="store_true",
-                      help="matched and mismatched hands, lost cameras, random starts, live; takes --seeds (default "
-                           "10), --seconds (from 2.5, default 3), --seed, --logs and --json")
-    bare.add_argument("--cases", metavar="TEXT", default=None, help="only the cases whose names begin with TEXT")
-    add_examples(parser, "rhot evaluate --motion pinch --seconds 10",
-                 "rhot evaluate --compare --motions rest,pinch --sketched")
+    add_examples(parser, "rhot evaluate live --motion pinch --seconds 10",
+                 "rhot evaluate live --scene clutter.json --loss 0.1 --json")
+
+
+def _add_compare(parser: argparse.ArgumentParser) -> None:
+    add_scene_arguments(parser, motion=False)
+    _add_run(parser, 8, "length of each run; its first second is not judged")
+    _add_seeds(parser, 5)
+    parser.add_argument("--motions", action="append", metavar="M,M,...", default=None,
+                        help="motions to compare on, also files and recordings (Qualisys .tsv, Leap Motion .csv); "
+                             "repeatable (default: the scene file's, or rest,wave,grasp,pinch,fast)")
+    parser.add_argument("--trackers", metavar="T,T,...", default="classic,estimator",
+                        help="which trackers (default classic,estimator); the ratio is the last one's to the first's")
+    parser.add_argument("--sketched", action="store_true",
+                        help="logs without pictures: exact outlines, noise and bias put on, hidden parts counted; fast")
+    parser.add_argument("--baseline", type=Path, metavar="FILE", default=None,
+                        help="print the last tracker's ratios to the figures kept in FILE (benchmarks/baselines)")
+    add_examples(parser, "rhot evaluate compare --sketched --motions rest,pinch",
+                 "rhot evaluate compare --trackers classic,estimator --seeds 3 --json")
+
+
+def _add_bare_hand(parser: argparse.ArgumentParser) -> None:
+    add_seed_argument(parser, "the first run")
+    _add_seconds(parser, 3, "length of each run, from 2.5")
+    add_json_argument(parser)
+    _add_seeds(parser, 10)
+    parser.add_argument("--cases", metavar="TEXT", default=None, help="only the cases whose names begin with TEXT")
+    add_examples(parser, "rhot evaluate bare-hand --cases matched --seeds 2", "rhot evaluate bare-hand --json")
+
+
+def _add_run(parser: argparse.ArgumentParser, seconds: float, what: str) -> None:
+    """What a run on observations has."""
+    _add_seconds(parser, seconds, what)
+    parser.add_argument("--loss", type=not_negative, default=0.0, metavar="P",
+                        help="probability 0..1 that a datagram of observations is lost (default 0)")
+    add_json_argument(parser)
+
+
+def _add_seconds(parser: argparse.ArgumentParser, seconds: float, what: str) -> None:
+    parser.add_argument("--seconds", type=positive_number, default=seconds, metavar="S",
+                        help=f"{what} (default {seconds:g})")
+
+
+def _add_seeds(parser: argparse.ArgumentParser, seeds: int) -> None:
+    """What several runs have, whose logs are kept."""
+    parser.add_argument("--seeds", type=positive_count, default=seeds, metavar="N",
+                        help=f"how many seeds, beginning with --seed (default {seeds})")
+    parser.add_argument("--logs", type=Path, metavar="DIR", default=None,
+                        help="where logs are kept and found again (default ~/.cache/rhot/takes)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Render (or take) the frames, play them, compare, print."""
-    if args.bare_hand:
-        return _bare_hand(args)
-    if args.compare:
-        return _compare(args)
-    if args.cases is not None:
-        from rhot_app.errors import SimulatorError
-
-        raise SimulatorError("--cases is of --bare-hand, which is not there; add it, or leave --cases out.")
-    stray = next((name for name in _OF_COMPARE if getattr(args, name) is not None), None)
-    if stray is not None:
-        from rhot_app.errors import SimulatorError
-
-        raise SimulatorError(f"--{stray} is of --compare, which is not there; add it, or leave --{stray} out.")
-    return _evaluate(args)
+    """Render (or take) the frames, play them, compare, print. Raises RhotError."""
+    return {"live": _live, "compare": _compare, "bare-hand": _bare_hand}[args.evaluation](args)
 
 
-def _evaluate(args: argparse.Namespace) -> int:
+def _require(*rules: tuple[bool, str]) -> None:
+    """Raises SimulatorError with the first rule that does not hold."""
     from rhot_app.errors import SimulatorError
+
+    for holds, rule in rules:
+        if not holds:
+            raise SimulatorError(f"{rule}.")
+
+
+def _scene_of_hand(args: argparse.Namespace) -> SceneFields:
+    """The scene, of a hand with markers and nothing else. Raises SimulatorError, RigError."""
+    fields = fields_of(args)
+    shown = "a cube, too" if fields.show.get("cube") else fields.show.get("show", "hand").replace("_", "-")
+    _require((shown == "hand", f"what is evaluated is a hand with markers alone, and the scene shows {shown}; choose "
+              "another --scene, or `rhot evaluate bare-hand`"))
+    return fields
+
+
+def _live(args: argparse.Namespace) -> int:
     from rhot_app.evaluation.run import SETTLE_S, details, evaluate, evaluate_frames, table
 
-    seconds = 20.0 if args.seconds is None else args.seconds
-    if not SETTLE_S + _JUDGED_S <= seconds <= SECONDS_MAX and args.frames is None:
-        raise SimulatorError(f"a run of {seconds:g} s cannot be judged: the first {SETTLE_S:g} s are not, and it must "
-                             f"end within {SECONDS_MAX:.0f} s.")
-    if not 0.0 <= args.loss < 1.0:
-        raise SimulatorError(f"--loss is a probability from 0 to below 1, not {args.loss:g}.")
+    _require((SETTLE_S + _JUDGED_S <= args.seconds <= SECONDS_MAX or args.frames is not None,
+              f"--seconds {args.seconds:g}: a run of so long cannot be judged: the first {SETTLE_S:g} s are not, and "
+              f"it must end within {SECONDS_MAX:.0f} s"),
+             (0.0 <= args.loss < 1.0, f"--loss is a probability from 0 to below 1, not {args.loss:g}"))
+    fields = _scene_of_hand(args)
     with tempfile.TemporaryDirectory(prefix="rhot-") as work:
         options = {"loss": args.loss, "detector": args.detector}
         if args.frames is not None:
             figures = evaluate_frames(args.frames.absolute(), Path(work), **options)
         else:
-            figures = evaluate(scene_of(args), args.motion or "grasp", seconds, Path(work), **options)
+            figures = evaluate(fields.scene(), fields.show.get("motion", MOTION), args.seconds, Path(work), **options)
     if args.json:
         print(json.dumps(figures))
     else:
@@ -99,7 +139,6 @@ def _evaluate(args: argparse.Namespace) -> int:
 
 
 def _bare_hand(args: argparse.Namespace) -> int:
-    from rhot_app.errors import SimulatorError
     from rhot_app.evaluation.bare_hand import CASES, LOSS_S, SETTLE_S, Case, EvaluatedTracker, evaluate_bare_hand
     from rhot_app.evaluation.bare_hand_table import bare_hand_fields, bare_hand_table
     from rhot_app.evaluation.contour_tracker import ContourTracker, LiveContourTracker
@@ -113,37 +152,29 @@ def _bare_hand(args: argparse.Namespace) -> int:
         return ContourTracker(rig, known_size=case.known_size, waits=case.start == "shown")
 
     cases = [case for case in CASES if args.cases is None or case.name.startswith(args.cases)]
-    seeds, seconds = 10 if args.seeds is None else args.seeds, 3.0 if args.seconds is None else args.seconds
-    for good, rule in ((not args.compare, "--bare-hand and --compare exclude each other"),
-                       (cases, f"--cases: none of {', '.join(case.name for case in CASES)} begins with {args.cases!r}"),
-                       (seeds >= 1, "--seeds is 1 or more"),
-                       (LOSS_S[1] + SETTLE_S <= seconds <= SECONDS_MAX,
-                        f"--seconds is from {LOSS_S[1] + SETTLE_S:g} to {SECONDS_MAX:.0f} with --bare-hand")):
-        if not good:
-            raise SimulatorError(f"{rule}.")
+    least_s = LOSS_S[1] + SETTLE_S
+    _require((bool(cases), f"--cases: none of {', '.join(case.name for case in CASES)} begins with {args.cases!r}"),
+             (least_s <= args.seconds <= SECONDS_MAX, f"--seconds is from {least_s:g} to {SECONDS_MAX:.0f} here"))
     announce_compilation()
     line = ProgressLine("")
-    found = list(evaluate_bare_hand(tracker, range(args.seed, args.seed + seeds), seconds,
+    found = list(evaluate_bare_hand(tracker, range(args.seed, args.seed + args.seeds), args.seconds,
                                     args.logs or data_sets_folder(), cases, line.report))
     line.report("evaluating", 1.0)
     line.finish()
-    print(json.dumps(bare_hand_fields(found, seconds)) if args.json else bare_hand_table(found))
+    print(json.dumps(bare_hand_fields(found, args.seconds)) if args.json else bare_hand_table(found))
     return 0
 
 
 def _motions_of(args: argparse.Namespace, usual: Sequence[str]) -> list[str]:
-    """What is compared on. Raises SimulatorError for what is not there, or would be passed over."""
-    from rhot_app.errors import SimulatorError
-
-    if args.motion is not None:
-        raise SimulatorError(f"--compare takes --motions, a list: write --motions {args.motion} instead of --motion.")
-    named = [] if args.motions is None else [name.strip() for name in args.motions.split(",")]
-    motions = list(usual) if args.motions is None else list(dict.fromkeys(named))
-    if not all(motions):
-        raise SimulatorError(f"--motions {args.motions!r}: put commas between names of motions only.")
-    if args.recording is not None and not Path(args.recording).is_file():
-        raise SimulatorError(f"--recording {args.recording}: there is no such file; name a recorded motion.")
-    return motions if args.recording is None else [*motions, args.recording]
+    """What is compared on. Raises SimulatorError for what is not there."""
+    if args.motions is None:
+        return list(usual)
+    motions = [name.strip() for given in args.motions
+               for name in ([given] if Path(given).is_file() else given.split(","))]
+    _require((all(motions), f"--motions {','.join(args.motions)!r}: put commas between names of motions only"))
+    lacking = next((name for name in motions if Path(name).suffix and not Path(name).is_file()), None)
+    _require((lacking is None, f"--motions {lacking}: there is no such file; name a motion, or a recorded one's file"))
+    return list(dict.fromkeys(motions))
 
 
 def _compare(args: argparse.Namespace) -> int:
@@ -164,28 +195,23 @@ def _compare(args: argparse.Namespace) -> int:
     from rhot_app.evaluation.run import SETTLE_S
     from rhot_app.progress import ProgressLine
     from rhot_app.simulator.film.node_log import Network
+    from rhot_app.simulator.scene.scene import twin_defaults
 
-    unseen = [name for name in _OF_PICTURES if getattr(args, name) is not None]
-    if args.sketched and unseen:
-        raise SimulatorError(f"--sketched goes without pictures, in which --{unseen[0]} would show: leave out one of "
-                             "them.")
-    if args.frames is not None or args.detector != "fast":
-        raise SimulatorError("--compare films its own logs with the fast detector: leave out --frames and --detector.")
-    names = [name.strip() for name in ("classic,estimator" if args.trackers is None else args.trackers).split(",")]
-    seeds = 5 if args.seeds is None else args.seeds
-    unknown = [name for name in names if name not in TRACKERS]
-    if unknown:
-        raise SimulatorError(f"--trackers: there is no tracker {unknown[0]!r}; it takes some of {', '.join(TRACKERS)}.")
-    seconds = 8.0 if args.seconds is None else args.seconds
+    names = [name.strip() for name in args.trackers.split(",")]
+    unknown = next((name for name in names if name not in TRACKERS), None)
     least_s = SETTLE_S + _JUDGED_S
-    for good, rule in ((least_s <= seconds <= SECONDS_MAX, f"--seconds is from {least_s:g} to {SECONDS_MAX:.0f}"),
-                       (seeds >= 1, "--seeds is 1 or more"),
-                       (0.0 <= args.loss < 1.0, "--loss is from 0 to below 1")):
-        if not good:
-            raise SimulatorError(f"{rule}.")
-    motions = _motions_of(args, MOTIONS)
-    wanted = orders(scene_of(args), motions, range(args.seed, args.seed + seeds), seconds,
-                    network=Network(loss=args.loss), sketched=bool(args.sketched))
+    _require((unknown is None, f"--trackers: there is no tracker {unknown!r}; it takes some of {', '.join(TRACKERS)}"),
+             (least_s <= args.seconds <= SECONDS_MAX, f"--seconds is from {least_s:g} to {SECONDS_MAX:.0f}"),
+             (0.0 <= args.loss < 1.0, "--loss is from 0 to below 1"))
+    fields = _scene_of_hand(args)
+    scene = fields.scene()
+    unseen = next((name for name in _OF_PICTURES
+                   if getattr(scene.settings, name) != getattr(twin_defaults(), name)), None)
+    _require((not args.sketched or unseen is None,
+              f"--sketched goes without pictures, in which the scene's {unseen} would show: leave out one of them"))
+    motions = _motions_of(args, [fields.show["motion"]] if "motion" in fields.show else MOTIONS)
+    wanted = orders(scene, motions, range(scene.seed, scene.seed + args.seeds), args.seconds,
+                    network=Network(loss=args.loss), sketched=args.sketched)
     baseline = None if args.baseline is None else read_baseline(args.baseline)
     folder = args.logs or data_sets_folder()
     try:

@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import RecordingError, add_force_argument, input_file, positive_number
+from rhot_app.errors import RecordingError, input_file, positive_number
+from rhot_app.options import add_force_argument
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig

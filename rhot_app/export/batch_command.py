@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import add_force_argument, positive_count
+from rhot_app.errors import positive_count
 from rhot_app.export.export_command import READ_WITH_LOSSES, add_export_arguments, options_of
+from rhot_app.options import add_force_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import add_force_argument, input_file, positive_number
+from rhot_app.errors import input_file, positive_number
+from rhot_app.options import add_force_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import RigError, add_force_argument, input_file, refuse_existing
+from rhot_app.errors import RigError, input_file, refuse_existing
+from rhot_app.options import add_force_argument
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
 

@@ -7,8 +7,9 @@ import math
 import sys
 from pathlib import Path
 
-from rhot_app.errors import RecordingError, add_force_argument, finite, input_file
+from rhot_app.errors import RecordingError, finite, input_file
 from rhot_app.export.export_command import READ_WITH_LOSSES
+from rhot_app.options import add_force_argument
 from rhot_node.terminal import add_examples
 
 

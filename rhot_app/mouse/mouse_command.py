@@ -1,5 +1,5 @@
-"""``rhot mouse``: a 3-D cursor and two buttons controlled by the tracked hand, live, of a recording, on the twin, or
-measured there."""
+"""``rhot mouse run|measure``: a 3-D cursor and two buttons controlled by the tracked hand, live, of a recording or on
+the twin; and its accuracy, measured there."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from rhot_app.errors import (
     positive_number,
     whole,
 )
+from rhot_app.options import add_directory_argument, add_json_argument, add_rig_argument, add_seed_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -65,50 +66,63 @@ machine."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``rhot mouse``."""
-    parser.add_argument("--directory", type=Path, metavar="DIR", help="private directory of the engine's sockets")
-    parser.add_argument("--simulated", action="store_true",
+    """Arguments of ``rhot mouse`` and of its two commands."""
+    commands = parser.add_subparsers(dest="mouse", metavar="COMMAND", title="commands", required=True)
+    _add_run(commands.add_parser("run", help="work the mouse by the running engine, a recording or a simulated rig",
+                                 description="Work the mouse: print its cursor and buttons, and send them on."))
+    _add_measure(commands.add_parser("measure", help="measure the mouse on the twin",
+                                     description="Print speed, coupling, resolution, buttons, latency, target test and "
+                                                 "pick-and-place on the twin. Takes minutes, a bare hand an hour."))
+    add_examples(parser, "rhot mouse run --pointer", "rhot mouse measure --pictures")
+
+
+def _add_run(parser: argparse.ArgumentParser) -> None:
+    source = parser.add_mutually_exclusive_group()
+    add_directory_argument(source)
+    source.add_argument("--simulated", action="store_true",
                         help="start a simulated rig whose hand works the mouse, and end it afterwards")
-    parser.add_argument("--log", type=input_file, metavar="LOG",
+    source.add_argument("--log", type=input_file, metavar="LOG",
                         help="print the mouse's states of this raw log, and end; of a bare hand with its "
                              "recorded slices")
-    parser.add_argument("--rig", type=Path, metavar="FILE",
-                        help="track the --log with this rig instead of the one it was recorded with")
-    parser.add_argument("--bare", action="store_true",
-                        help="with --simulated or --measure: a hand without markers, tracked by its contours")
-    parser.add_argument("--cameras", type=whole, choices=(1, 2), default=2, metavar="N",
-                        help="with --simulated or --measure: 1 leaves one camera, and the palm on a known plane "
-                             "(default 2)")
-    parser.add_argument("--seed", type=count, default=1, metavar="N", help="of the simulated rig (default 1)")
+    add_rig_argument(parser, "track the --log with this rig instead of the one it was recorded with", exists=False)
+    _add_simulated(parser, "with --simulated: ")
     parser.add_argument("--seconds", type=positive_number, default=None, metavar="S", help="end after so long")
-    parser.add_argument("--gain", type=positive_number, default=None, metavar="G",
-                        help="metres of the cursor per metre of the palm (default 3)")
-    parser.add_argument("--height-gain", type=positive_number, default=None, metavar="G",
-                        help="metres of the cursor's height per metre of the finger (default 6)")
-    parser.add_argument("--height-from", choices=("index", "palm"), default="index",
-                        help="what sets the height: the index fingertip above the palm (default), or the palm itself")
-    parser.add_argument("--on-table", action="store_true",
-                        help="the palm slides on the plane: a camera that is covered costs less")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE",
+                        help="gain=G: metres of the cursor per metre of the palm (3); height_gain=G: of its height per "
+                             "metre of the finger (6); height_from=palm: the palm sets the height instead of the index "
+                             "fingertip above it; on_table=true: the palm slides on the plane, and a camera that is "
+                             "covered costs less; repeatable")
     parser.add_argument("--osc", metavar="HOST:PORT", help="send cursor and buttons there as OSC messages, too")
     parser.add_argument("--pointer", action="store_true",
                         help="move the system's pointer, too (Linux; needs write permission on /dev/uinput)")
-    parser.add_argument("--measure", action="store_true",
-                        help="print speed, coupling, resolution, buttons, latency, target test and pick-and-place on "
-                             "the twin, of --bare or --cameras 1 beside those of markers with two cameras; takes "
-                             "minutes, a bare hand an hour")
-    parser.add_argument("--places", type=count, default=None, metavar="N",
-                        help=f"how often --measure picks and places (default {PLACES})")
+    add_json_argument(parser, "one JSON object for each state")
+    add_examples(parser, "rhot mouse run --pointer",
+                 "rhot mouse run --simulated --seconds 20 --osc 127.0.0.1:9000")
+
+
+def _add_measure(parser: argparse.ArgumentParser) -> None:
+    _add_simulated(parser, "beside markers and two cameras: ")
+    parser.add_argument("--places", type=count, default=PLACES, metavar="N",
+                        help=f"how often it picks and places (default {PLACES})")
     parser.add_argument("--pictures", action="store_true",
-                        help="let --measure render all images of markers; else only those of the speeds are rendered")
-    parser.add_argument("--json", action="store_true", help="print JSON: a line per state, or all measures")
-    add_examples(parser, "rhot mouse --pointer", "rhot mouse --simulated --seconds 20 --osc 127.0.0.1:9000")
+                        help="render all images of markers; else only those of the speeds are rendered")
+    add_json_argument(parser)
+    add_examples(parser, "rhot mouse measure --pictures", "rhot mouse measure --bare --json")
+
+
+def _add_simulated(parser: argparse.ArgumentParser, when: str) -> None:
+    """The simulated rig: its hand, its cameras, its seed."""
+    parser.add_argument("--bare", action="store_true", help=f"{when}a hand without markers, tracked by its contours")
+    parser.add_argument("--cameras", type=whole, choices=(1, 2), default=2, metavar="N",
+                        help=f"{when}1 leaves one camera, and the palm on a known plane (default 2)")
+    add_seed_argument(parser, "the simulated rig")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run until interrupted, or for --seconds. Raises RhotError."""
-    _check(args)
-    if args.measure:
+    """Measure, or run until interrupted, or for --seconds. Raises RhotError."""
+    if args.mouse == "measure":
         return _measure(args)
+    _check(args)
     from rhot_app.engine.client import EngineClient
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -130,19 +144,16 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace) -> None:
     """Raises OutputError when options contradict each other."""
-    if args.measure and (args.simulated or args.log is not None or args.osc is not None or args.pointer):
-        raise OutputError("--measure runs on the twin by itself; leave --simulated, --log, --osc and --pointer out.")
-    if not args.measure and (args.places is not None or args.pictures):
-        raise OutputError("--places and --pictures are for --measure, which is not there; add it, or leave them out.")
-    if args.log is not None and (args.simulated or args.directory is not None or args.seconds is not None):
-        raise OutputError("--log reads a recording to its end; leave --simulated, --directory and --seconds out.")
+    if args.log is not None and args.seconds is not None:
+        raise OutputError("--log reads a recording to its end; leave --seconds out.")
     if args.log is not None and (args.pointer or args.osc is not None):
         raise OutputError("--log is read as fast as it can be, too fast for --pointer and --osc; leave them out.")
     if args.rig is not None and args.log is None:
         raise OutputError("--rig is for a --log; a running engine has its own rig.")
-    if (args.bare or args.cameras == 1) and not (args.measure or args.simulated):
-        raise OutputError("--bare and --cameras are for --simulated and --measure. A rig's tracker says itself what it "
-                          "observes and where the palm slides (Calibrate, Tracker).")
+    if (args.bare or args.cameras == 1) and not args.simulated:
+        raise OutputError("--bare and --cameras are for --simulated and `rhot mouse measure`. A rig's tracker says "
+                          "itself what it observes and where the palm slides (Calibrate, Tracker).")
+    _settings(args)
 
 
 def _replay(args: argparse.Namespace, outputs: _Outputs) -> None:
@@ -169,14 +180,34 @@ def _replay(args: argparse.Namespace, outputs: _Outputs) -> None:
 
 
 def _settings(args: argparse.Namespace) -> MouseSettings:
+    """The settings that `--set` chooses. Raises OutputError."""
     from rhot_app.mouse.pointer import MouseSettings
 
-    chosen: dict[str, Any] = {"height_from": args.height_from, "on_table": args.on_table}
-    if args.gain is not None:
-        chosen["gain"] = args.gain
-    if args.height_gain is not None:
-        chosen["height_gain"] = args.height_gain
+    chosen: dict[str, Any] = {}
+    for text in args.set:
+        name, _, value = text.partition("=")
+        read = _SETTINGS.get(name)
+        if read is None:
+            raise OutputError(f"--set {text}: write NAME=VALUE; the names are {', '.join(_SETTINGS)}.")
+        try:
+            chosen[name] = read(value)
+        except (ValueError, argparse.ArgumentTypeError) as exc:
+            raise OutputError(f"--set {text}: {exc}.") from exc
     return MouseSettings(**chosen)
+
+
+def _one_of(*words: str) -> Callable[[str], str]:
+    def read(text: str) -> str:
+        if text not in words:
+            raise ValueError(f"it is {' or '.join(words)}, not {text!r}")
+        return text
+    return read
+
+
+_SETTINGS: dict[str, Callable[[str], Any]] = {
+    "gain": positive_number, "height_gain": positive_number, "height_from": _one_of("index", "palm"),
+    "on_table": lambda text: _one_of("true", "false")(text) == "true"}
+"""The settings of the mouse that `--set` chooses, and what reads each."""
 
 
 def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs,
@@ -194,7 +225,7 @@ def _live(args: argparse.Namespace, client: EngineClient, outputs: _Outputs,
         message_s = now if messages else message_s
         if now - message_s > PATIENCE_S:
             raise EngineError(f"no engine is heard in {client.directory.path}. Start it with `rhot engine --rig FILE "
-                              "--start`, or let `rhot mouse --simulated` start a simulated one.")
+                              "--start`, or let `rhot mouse run --simulated` start a simulated one.")
         if mouse is None and messages:
             mouse = Mouse(_settings(args), up_of(client.rig()))
             end = now + (args.seconds or float("inf"))
@@ -303,9 +334,10 @@ def simulated_hand(seed: int, *, bare: bool = False, cameras: int = 2) -> Iterat
         place = Path(name)
         rig, rest, scene = place / "rig.json", place / "rest.json", twin_scene(set_up, seed)
         write_document(rest, motion_file(resting(REST_S), scene.hand, MouseSettings(), Sway(), facing=set_up.facing))
-        twin = subprocess.Popen([sys.executable, "-m", "rhot_app.simulator.nodes.live", "--motion", str(rest),
-                                 *(["--bare", "--back"] if bare else []), "--seed", str(seed), "--directory",
-                                 str(place), "--rig", str(rig)], stdout=subprocess.PIPE)
+        shown = ["--show", "bare-hand", "--set", "facing=back"] if bare else []
+        twin = subprocess.Popen([sys.executable, "-m", "rhot_app.simulator.nodes.live", "--motion", str(rest), *shown,
+                                 "--seed", str(seed), "--directory", str(place), "--rig", str(rig)],
+                                stdout=subprocess.PIPE)
         stack.callback(twin.wait)
         stack.callback(twin.terminate)
         assert twin.stdout is not None
@@ -374,8 +406,7 @@ def _measure(args: argparse.Namespace) -> int:
 
     chosen = SetUp("contours", args.cameras, args.pictures, "back") if args.bare else SetUp(
         "markers", args.cameras, args.pictures)
-    places = PLACES if args.places is None else args.places
-    figures = [measures(args.seed, places, set_up=one, watch=lambda title: ProgressLine(f"rendering {title}"))
+    figures = [measures(args.seed, args.places, set_up=one, watch=lambda title: ProgressLine(f"rendering {title}"))
                for one in dict.fromkeys((SetUp(pictures=args.pictures), chosen))]
     print(json.dumps(figures) if args.json else report(figures))
     return 0

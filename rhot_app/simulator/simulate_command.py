@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.errors import not_negative, positive_count, positive_number
+from rhot_app.options import add_json_argument
 from rhot_app.simulator.scene.scene_arguments import (
     SECONDS_MAX,
     add_scene_arguments,
-    add_show_arguments,
+    add_show_argument,
+    fields_of,
     scene_of,
-    show_of,
 )
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
@@ -30,12 +31,13 @@ POINT_SIGMA_PX = 0.12
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot simulate``."""
     add_scene_arguments(parser)
-    add_show_arguments(parser)
+    add_show_argument(parser)
     parser.add_argument("--seconds", type=positive_number, default=10.0, metavar="S",
                         help="length of the recording (default 10)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR",
                         help="new folder for the frames (DIR/left, DIR/right), truth.npz and shot.json; to play it to "
-                             "two nodes on this machine, their settings (left.json, right.json) and rig.json")
+                             "two nodes on this machine, their settings (left.json, right.json) and rig.json. A name "
+                             "that ends in .json: write the scene alone, for --scene")
     parser.add_argument("--pictures", type=positive_count, default=None, metavar="N",
                         help="N pictures per camera (DIR/left/000.png ...) instead of a recording: of a board, one at "
                              "each place where it is held still")
@@ -46,9 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="no pictures: a table (DIR/table.csv) of disparities of a marker held at these distances")
     parser.add_argument("--hide", action="append", default=[], metavar="ID",
                         help="leave a marker of the hand unpainted; repeatable")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_json_argument(parser)
     add_examples(parser, "rhot simulate --motion pinch --seconds 5 --out pinch",
-                 "rhot simulate --show board --pictures 20 --out board")
+                 "rhot simulate --show board --set show.pattern=charuco --pictures 20 --out board")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -57,11 +59,14 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.simulator.film.shot import make_shot
 
     _check(args)
+    if args.out.suffix == ".json":
+        return _write_scene(args)
     announce_compilation()
     if args.depth_table is not None:
         return _write_depth_table(args)
     began = time.monotonic()
-    shot = make_shot(scene_of(args), show_of(args), args.seconds, frozenset(args.hide))
+    fields = fields_of(args)
+    shot = make_shot(fields.scene(), fields.shown(), args.seconds, frozenset(args.hide))
     line = ProgressLine(f"simulating {shot.scene_object.name}" if args.pictures else
                         f"simulating {args.seconds:g} s of {shot.scene_object.name}")
     _write(shot, args, line)
@@ -70,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
               for k, name in enumerate(shot.scene.names)}
     if args.json:
         print(json.dumps({"out": str(args.out.absolute()), "motion": shot.scene_object.name, "seconds": args.seconds,
-                          "seed": args.seed, "preset": shot.scene.settings.preset,
+                          "seed": shot.scene.seed, "preset": shot.scene.settings.preset,
                           "distance_m": shot.scene.settings.distance_m, "frames": frames,
                           "elapsed_s": round(time.monotonic() - began, 3)}))
     else:
@@ -93,6 +98,17 @@ def _check(args: argparse.Namespace) -> None:
         raise SimulatorError(f"--pictures is a number from 1 to {MOST_PICTURES}, not {args.pictures}.")
     if args.points is not None and not args.points >= 0.0:
         raise SimulatorError(f"--points is a noise of 0 px or more, not {args.points:g}.")
+
+
+def _write_scene(args: argparse.Namespace) -> int:
+    from rhot_app.errors import SimulatorError
+    from rhot_app.simulator.scene.scene_file import write_scene
+
+    if args.out.exists():
+        raise SimulatorError(f"{args.out} exists already; choose another name or remove it.")
+    write_scene(args.out, fields_of(args))
+    print(json.dumps({"out": str(args.out.absolute())}) if args.json else f"{args.out}: the scene")
+    return 0
 
 
 def _write_depth_table(args: argparse.Namespace) -> int:

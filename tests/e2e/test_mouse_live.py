@@ -15,7 +15,7 @@ import pytest
 from pythonosc.osc_bundle import OscBundle
 
 ROOT = Path(__file__).parents[2]
-MOUSE = sys.executable, "-m", "rhot_app", "mouse", "--simulated", "--json"
+MOUSE = sys.executable, "-m", "rhot_app", "mouse", "run", "--simulated", "--json"
 
 BARE_S = 400.0
 """After so long a hand that does not work the mouse fails the test; the command itself looks for it for 360 s."""

@@ -1,4 +1,4 @@
-"""`rhot evaluate --compare` on takes without pictures, and what it refuses."""
+"""`rhot evaluate compare` on takes without pictures, and what it refuses."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from rhot_app.evaluation.data_sets import Order
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 
 RAMP = Path(__file__).resolve().parents[2] / "benchmarks" / "motions" / "ramp.json"
-QUICK = ("evaluate", "--compare", "--sketched", "--trackers", "classic", "--motions", "rest, pinch", "--seeds", "2",
-         "--seconds", "1.6")
+SHORT = ("evaluate", "compare", "--sketched", "--trackers", "classic", "--seeds", "2", "--seconds", "1.6")
+QUICK = (*SHORT, "--motions", "rest, pinch")
 
 
 @pytest.fixture(scope="module")
@@ -64,27 +64,51 @@ def test_a_recording_of_a_motions_name_is_another_motion(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("wrong", [("--trackers", "magic"), ("--trackers", ""), ("--seconds", "0.5"),
                                    ("--loss", "1"), ("--seconds", "1.01"),
-                                   ("--frames", "somewhere"), ("--detector", "reference"), ("--motions", "flight"),
-                                   ("--motions", "rest,"), ("--motion", "rest"), ("--recording", "nowhere.tsv"),
-                                   ("--lamp", "0.1"), ("--background", "clutter"),
+                                   ("--motions", "flight"), ("--motions", "rest,"), ("--motions", "nowhere.tsv"),
+                                   ("--set", "lamp.brightness=0.1"), ("--set", "background=clutter"),
+                                   ("--set", "show.cube=true"), ("--set", "show.show=board"),
+                                   ("--recording", "nowhere.tsv"), ("--lamp", "0.1"), ("--background", "clutter"),
                                    ("--distance", "0.1"), ("--logs", __file__), ("--logs", f"{__file__}/logs")])
 def test_what_cannot_be_compared_is_said(wrong: tuple[str, str], tmp_path: Path,
                                          capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*QUICK, "--logs", str(tmp_path), *wrong]) == 2
+    assert main([*SHORT, "--logs", str(tmp_path), *wrong]) == 2
     assert capsys.readouterr().err.startswith("rhot: ") and list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("option", "value", "said"), [("--distance", "0.1", "expected a number >= 0.15"),
-                                                       ("--kelvin", "9", "expected a number >= 1700")])
+@pytest.mark.parametrize(("option", "value", "said"), [
+    ("--distance", "0.1", "--distance 0.1: expected a number >= 0.15"),
+    ("--set", "lamp.kelvin=9", "--set lamp.kelvin=9: expected a number >= 1700"),
+    ("--kelvin", "9", "--set lamp.kelvin=9: expected a number >= 1700")])
 def test_a_scene_that_cannot_be_is_said_of_the_option(option: str, value: str, said: str,
                                                       capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["evaluate", option, value]) == 2
-    assert capsys.readouterr().err.startswith(f"rhot: {option} {float(value)}: {said}")
+    assert main(["evaluate", "live", option, value]) == 2
+    assert said in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("stray", [("--sketched",), ("--seeds", "3"), ("--motions", "rest"),
-                                   ("--trackers", "estimator")])
-def test_what_belongs_to_a_comparison_is_not_passed_over_without_one(stray: tuple[str, ...],
-                                                                    capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["evaluate", *stray]) == 2
-    assert capsys.readouterr().err.startswith(f"rhot: {stray[0]} is of --compare")
+@pytest.mark.parametrize(("command", "stray"), [
+    ("live", "--sketched"), ("live", "--seeds"), ("live", "--motions"), ("live", "--trackers"), ("live", "--cases"),
+    ("compare", "--frames"), ("compare", "--detector"), ("compare", "--cases"), ("bare-hand", "--sketched"),
+    ("bare-hand", "--loss"), ("bare-hand", "--scene")])
+def test_each_evaluation_has_its_own_options(command: str, stray: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["evaluate", command, stray, "3"])
+    assert end.value.code == 2 and f"there is no option '{stray}' here" in capsys.readouterr().err
+
+
+def test_evaluate_and_mouse_alone_are_their_former_selves(capsys: pytest.CaptureFixture[str]) -> None:
+    for former, now in ((["evaluate", "--seconds", "0.5"], "rhot evaluate live --seconds 0.5"),
+                        (["evaluate", "--compare", "--seconds=0.5"], "rhot evaluate compare --seconds=0.5"),
+                        (["evaluate", "--bare-hand", "--seconds", "0.5"], "rhot evaluate bare-hand --seconds 0.5"),
+                        (["mouse", "--rig", "a.json"], "rhot mouse run --rig a.json")):
+        assert main(former) == 2
+        note, refusal = capsys.readouterr().err.splitlines()
+        assert note == f"rhot: this is the former spelling, read for one release. Now: {now}"
+        assert "--seconds" in refusal or "--rig" in refusal
+
+
+def test_a_scene_file_says_on_what_is_compared(logs: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = tmp_path / "scene.json"
+    assert main(["simulate", "--motion", "pinch", "--seed", "1", "--out", str(scene)]) == 0
+    capsys.readouterr()
+    assert main([*SHORT, "--scene", str(scene), "--logs", logs, "--json"]) == 0
+    assert list(json.loads(capsys.readouterr().out)["motions"]) == ["pinch"]

@@ -11,7 +11,8 @@ from pathlib import Path
 # name decides, so a row for one file (rhot_node.markers) overrides the row of its package.
 NODE_BASE = ("rhot_node.errors", "rhot_node.files", "rhot_node.clock", "rhot_node.markers", "resources")
 APP_BASE = ("rhot_node", "resources", "rhot_app.diagnostics", "rhot_app.errors", "rhot_app.progress",
-            "rhot_app.project", "rhot_app.rig_history", "rhot_app.keys", "rhot_app.charts", "rhot_app.vector_graphics")
+            "rhot_app.project", "rhot_app.rig_history", "rhot_app.keys", "rhot_app.options", "rhot_app.charts",
+            "rhot_app.vector_graphics")
 MODELS = ("rhot_app.geometry", "rhot_app.filters", "rhot_app.estimation")
 SOLVERS = ("rhot_app.calibration", "rhot_app.hand", "rhot_app.objects")
 ENGINE_SIDE = ("rhot_app.recording", "rhot_app.sources", "rhot_app.outputs", "rhot_app.simulator")
@@ -30,6 +31,8 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     # the app, from the bottom up
     "rhot_app.errors": ("rhot_node.files",),
     "rhot_app.diagnostics": (),
+    "rhot_app.options": ("rhot_app.errors",),
+    "rhot_app.former_spellings": (),
     "rhot_app.progress": ("rhot_node.errors",),
     "rhot_app.charts": (),
     "rhot_app.vector_graphics": (),

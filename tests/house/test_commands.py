@@ -47,10 +47,14 @@ OPTIONS: dict[str, tuple[str, ...]] = {
                     "--smooth", "--force"),
     "rhot trim": ("LOG", "--from", "--to", "--out", "--force"),
     "rhot batch": ("LOG", "--do", "--out", "--workers", "--scheduler", "--force", "--format", "--rig", "--tracker"),
-    "rhot simulate": ("--motion", "--seconds", "--out", "--show", "--pictures", "--points", "--markers", "--lamp",
-                      "--kelvin"),
-    "rhot evaluate": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json",
-                      "--compare", "--motions", "--recording", "--seeds", "--trackers", "--sketched", "--logs"),
+    "rhot simulate": ("--motion", "--seconds", "--out", "--show", "--pictures", "--points", "--markers", "--scene",
+                      "--set"),
+    "rhot evaluate": ("live", "compare", "bare-hand"),
+    "rhot evaluate live": ("--motion", "--seconds", "--seed", "--loss", "--preset", "--distance", "--json", "--scene",
+                           "--set", "--detector", "--frames"),
+    "rhot evaluate compare": ("--motions", "--seeds", "--trackers", "--sketched", "--logs", "--scene", "--set",
+                              "--baseline"),
+    "rhot evaluate bare-hand": ("--cases", "--seeds", "--seconds", "--logs", "--json"),
     "rhot calibrate alignment": ("--foreign", "--rig-points", "--search", "--out", "--check", "--json"),
     "rhot calibrate bones": ("--log", "--tsv", "--rig", "--roles", "--hand", "--side", "--set", "--name", "--out",
                              "--json"),
@@ -79,8 +83,10 @@ OPTIONS: dict[str, tuple[str, ...]] = {
                   "--json"),
     "rhot object": ("FILE", "--images", "--rig", "--json"),
     "rhot poses": ("--source", "--tracker", "--seconds", "--out", "--json", "openvr", "libsurvive"),
-    "rhot mouse": ("--directory", "--simulated", "--seed", "--gain", "--height-gain", "--height-from", "--on-table",
-                   "--osc", "--pointer", "--seconds", "--measure", "--pictures", "--json"),
+    "rhot mouse": ("run", "measure"),
+    "rhot mouse run": ("--directory", "--simulated", "--log", "--rig", "--bare", "--cameras", "--seed", "--set",
+                       "--osc", "--pointer", "--seconds", "--json"),
+    "rhot mouse measure": ("--bare", "--cameras", "--seed", "--places", "--pictures", "--json"),
     "rhot nodes": ("--seconds", "--json"),
     "rhot cameras": ("--json",),
     "rhot pair": ("NODE", "--rig", "--port", "--code"),
@@ -152,6 +158,8 @@ def test_a_program_starts_as_a_module(module: str) -> None:
 
 EVERY_COMMAND = ("rhot", *(f"rhot {name}" for name in SUBCOMMANDS),
                  *(f"rhot calibrate {kind}" for kind in (command.word for command in (*CALIBRATING, *FILES))),
+                 *(f"rhot evaluate {name}" for name in ("live", "compare", "bare-hand")),
+                 *(f"rhot mouse {name}" for name in ("run", "measure")),
                  "rhot-node", *(f"rhot-node {name}" for name in COMMANDS))
 
 
@@ -172,7 +180,8 @@ def test_help_ends_with_two_examples_that_are_valid(command: str, tmp_path: Path
         for word in arguments:
             if "." in word and "*" not in word and "/" not in word:
                 Path(word.partition("=")[2] or word).touch()
-        assert words[:len(command.split())] == command.split() or command == "rhot calibrate"
+        assert words[:len(command.split())] == command.split() or command in (
+            "rhot calibrate", "rhot evaluate", "rhot mouse")
         if program == "rhot":
             parse(arguments)
         elif arguments[0] in COMMANDS:

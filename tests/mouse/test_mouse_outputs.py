@@ -124,11 +124,17 @@ def test_the_last_line_says_whether_enough_states_came(every_s: float, slow: boo
     assert ("too slow or too busy" in said) == slow
 
 
+FORMER = ("--measure", "--gain")
+
+
 @pytest.mark.parametrize(("arguments", "words"), [
-    (("--osc", "nowhere"), "HOST:PORT"), (("--measure", "--pointer"), "leave --simulated"),
-    (("--bare",), "--simulated and --measure"), (("--rig", "rig.json"), "for a --log"),
-    (("--places", "3"), "for --measure"), (("--pictures", "--simulated"), "for --measure"),
-    (("--seconds", "abc"), "abc is not a finite number"), (("--gain", "-1"), "-1 is not a number above 0"),
+    (("--osc", "nowhere"), "HOST:PORT"), (("--measure", "--pointer"), "no option '--pointer'"),
+    (("--bare",), "--simulated and `rhot mouse measure`"), (("--rig", "rig.json"), "for a --log"),
+    (("--places", "3"), "no option '--places'"), (("--log", __file__, "--seconds", "3"), "leave --seconds out"),
+    (("--seconds", "abc"), "abc is not a finite number"), (("--set", "gain=-1"), "--set gain=-1: -1 is not a number"),
+    (("--gain", "-1"), "--set gain=-1: -1 is not"), (("--set", "speed=1"), "the names are gain, height_gain"),
+    (("--set", "height_from=wrist"), "it is index or palm"), (("--set", "on_table"), "it is true or false"),
+    (("--log", __file__, "--simulated"), "not allowed with"),
     (("--seed", "1.5"), "1.5 is not a whole number"), (("--log", "NONE"), "none"),
     (("--directory", "NONE"), "no engine is heard")])
 def test_contradictory_options_end_with_a_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path,
@@ -136,7 +142,8 @@ def test_contradictory_options_end_with_a_sentence(arguments: tuple[str, ...], w
                                                    capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(mouse_command, "PATIENCE_S", 0.2)
     try:
-        code = main(["mouse", *(str(tmp_path / "none") if one == "NONE" else one for one in arguments)])
+        code = main(["mouse", *([] if arguments[0] in FORMER else ["run"]),
+                     *(str(tmp_path / "none") if one == "NONE" else one for one in arguments)])
     except SystemExit as mistake:
         code = mistake.code
     said = capsys.readouterr()
@@ -153,7 +160,7 @@ def test_a_recording_controls_the_mouse_as_the_hand_did(tmp_path: Path, capsys: 
     save_rig(tmp_path / "rig.json", with_tracker(data.rig, "estimator"))
     parser = argparse.ArgumentParser()
     mouse_command.add_arguments(parser)
-    asked = ["--log", str(data.folder / LOG_NAME), "--rig", str(tmp_path / "rig.json"), "--json"]
+    asked = ["run", "--log", str(data.folder / LOG_NAME), "--rig", str(tmp_path / "rig.json"), "--json"]
     assert mouse_command.run(parser.parse_args(asked)) == 0
     states = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert states[-1]["cursor_m"] == pytest.approx([0.06, -0.03, 0.0], abs=0.01)

@@ -39,7 +39,7 @@ from rhot_app.simulator.film.points import PointNoise, write_points
 from rhot_app.simulator.film.shot import make_shot
 from rhot_app.simulator.film.truth import load_truth
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
-from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_arguments, show_of
+from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_argument, show_of
 from rhot_app.simulator.scene.scene_description import BareHandShow
 
 WIDTH = 160
@@ -264,10 +264,15 @@ def test_a_bare_hand_can_be_shown_and_is_filmed_with_its_truth(tmp_path: Path) -
 def test_the_command_line_asks_for_a_bare_hand() -> None:
     parser = argparse.ArgumentParser()
     add_scene_arguments(parser)
-    add_show_arguments(parser)
-    assert show_of(parser.parse_args(["--bare", "--tone", "7", "--motion", "wave"])) == BareHandShow("wave", tone=7.0)
-    for arguments, says in ((["--bare", "--tone", "70"], r"--tone: expected a number <= 10"),
-                            (["--bare", "--cube"], "no cube"), (["--sleeve"], "give --bare"),
-                            (["--cube", "--show", "board"], "--cube is of a hand")):
+    add_show_argument(parser)
+    bare = ["--show", "bare-hand"]
+    assert show_of(parser.parse_args([*bare, "--set", "show.tone=7", "--motion", "wave"])) == BareHandShow(
+        "wave", tone=7.0)
+    for arguments, says in (([*bare, "--set", "show.tone=70"], r"show.tone=70: expected a number <= 10"),
+                            ([*bare, "--set", "show.cube=true"], 'no field "cube"'),
+                            (["--set", "show.sleeve=true"], 'no field "sleeve"'),
+                            (["--set", "show.cube=true", "--show", "board"], 'no field "cube"'),
+                            ([*bare, "--set", "show.sleeve"], "write NAME=VALUE"),
+                            (["--show", "empty", "--motion", "wave"], "--motion is of a hand")):
         with pytest.raises(SimulatorError, match=says):
             show_of(parser.parse_args(arguments))

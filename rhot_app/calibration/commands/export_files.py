@@ -8,7 +8,8 @@ import re
 from pathlib import Path
 
 from rhot_app.calibration.commands.output import FORMAT_NAMES, add_length_arguments, require_folder, unit_of
-from rhot_app.errors import CalibrationError, add_force_argument, input_file, refuse_existing
+from rhot_app.errors import CalibrationError, input_file, refuse_existing
+from rhot_app.options import add_force_argument
 from rhot_node.terminal import add_examples
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.engine.directory import default_directory
-from rhot_app.errors import add_force_argument
+from rhot_app.options import add_force_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:

@@ -28,7 +28,7 @@ from rhot_app.simulator.nodes.live_cameras import FrameSocket, LiveCameras, Pace
 from rhot_app.simulator.nodes.live_scene import LiveScene
 from rhot_app.simulator.nodes.remote import SERVER_NAME, Request, decode_request, refusal, server_address
 from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
-from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_arguments, scene_of, show_of
+from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_argument, scene_of, show_of
 from rhot_app.simulator.scene.scene_description import Show
 from rhot_app.sources.local_nodes import NodeSupervisor, add_serve_arguments, serve
 from rhot_node.errors import NodeError
@@ -133,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The process; exit code 0 when ended by a signal, 2 after an error."""
     parser = argparse.ArgumentParser(prog="python -m rhot_app.simulator.nodes.live", description="Simulated rig, live.")
     add_scene_arguments(parser)
-    add_show_arguments(parser)
+    add_show_argument(parser)
     parser.add_argument("--directory", type=Path, required=True, help="folder for sockets, settings and logs")
     parser.add_argument("--rig", type=Path, required=True, help="rig file to write when the nodes are ready")
     add_serve_arguments(parser)

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import SourceError, add_force_argument, positive_number, refuse_existing
+from rhot_app.errors import SourceError, positive_number, refuse_existing
+from rhot_app.options import add_force_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:

@@ -1,0 +1,79 @@
+"""Command lines as they were spelt before: read for one release, each with a note that says how it is spelt now.
+
+docs/commands.md lists them for people. A row of `_OPTIONS` is an option that went; `{}` in what replaces it stands
+for its value.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Sequence
+
+_SCENE = {
+    "--background": "--set background={}", "--back": "--set facing=back", "--worn": "--set worn_paint={}",
+    "--uneven": "--set uneven_paint={}", "--glove": "--set glove_rgb={}", "--lamp": "--set lamp.brightness={}",
+    "--kelvin": "--set lamp.kelvin={}", "--mains": "--set lamp.mains_hz={}",
+}
+_SHOW = {
+    "--cube": "--set show.cube=true", "--bare": "--show bare-hand", "--tone": "--set show.tone={}",
+    "--sleeve": "--set show.sleeve=true", "--board": "--set show.size={}", "--square-mm": "--set show.square_mm={}",
+    "--charuco": "--set show.pattern=charuco", "--marker-mm": "--set show.marker_mm={}",
+    "--dictionary": "--set show.dictionary={}", "--legacy-pattern": "--set show.legacy=true",
+    "--legacy": "--set show.legacy=true", "--on-table": "--set show.on_table=true",
+    "--ruler-mm": "--set show.length_mm={}", "--marker": "--set show.marker={}", "--moving": "--set show.moving=true",
+}
+_OPTIONS: dict[str, dict[str, str]] = {
+    "simulate": _SCENE | _SHOW,
+    "evaluate live": _SCENE,
+    "evaluate compare": _SCENE | {"--recording": "--motions {}"},
+    "mouse run": {"--gain": "--set gain={}", "--height-gain": "--set height_gain={}",
+                  "--height-from": "--set height_from={}", "--on-table": "--set on_table=true"},
+}
+"""By command: the options that went, and what says the same now."""
+
+_EVALUATE = {"--compare": "compare", "--bare-hand": "bare-hand"}
+_MOUSE = {"--measure": "measure"}
+_COMPARED = "rest,wave,grasp,pinch,fast"
+
+
+def present_spelling(arguments: Sequence[str]) -> list[str]:
+    """The same command line as it is spelt now; a note on standard error says what has changed."""
+    present = _options_of(_with_subcommand(list(arguments)))
+    if present != list(arguments):
+        print(f"rhot: this is the former spelling, read for one release. Now: rhot {shlex.join(present)}",
+              file=sys.stderr)
+    return present
+
+
+def _with_subcommand(arguments: list[str]) -> list[str]:
+    """`evaluate` and `mouse` were one command each, and options chose what they did."""
+    if not arguments or arguments[0] not in ("evaluate", "mouse") or (
+            {"-h", "--help"} & set(arguments[1:])) or (len(arguments) > 1 and not arguments[1].startswith("-")):
+        return arguments
+    name, *rest = arguments
+    switches, usual = (_EVALUATE, "live") if name == "evaluate" else (_MOUSE, "run")
+    chosen = next((word for option, word in switches.items() if option in rest), usual)
+    kept = [word for word in rest if switches.get(word) != chosen]
+    return [name, chosen, *kept]
+
+
+def _options_of(arguments: list[str]) -> list[str]:
+    """Every option that went, replaced; a value may follow it or stand behind an equals sign."""
+    former = next((_OPTIONS[name] for count in (2, 1) if (name := " ".join(arguments[:count])) in _OPTIONS), {})
+    found, words = [], iter(arguments)
+    for word in words:
+        option, equals, value = word.partition("=")
+        new = former.get(option)
+        if new is None:
+            found.append(word)
+        elif "{}" not in new:
+            found += new.split()
+        else:
+            given = value if equals else next(words, None)
+            if given is None:
+                return arguments  # the parser says that its value is lacking
+            if option == "--recording" and not any(one.split("=")[0] == "--motions" for one in arguments):
+                found += ["--motions", _COMPARED]
+            found += [part.replace("{}", given) for part in new.split()]
+    return found

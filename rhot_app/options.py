@@ -1,0 +1,41 @@
+"""Options that several commands have: one spelling, one meaning, defined once. Types of numbers are in `errors`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rhot_app.errors import count, input_file
+
+
+def add_json_argument(parser: argparse._ActionsContainer, what: str = "one JSON object") -> None:
+    """``--json``, the same everywhere."""
+    parser.add_argument("--json", action="store_true", help=f"print {what} on standard output")
+
+
+def add_rig_argument(parser: argparse._ActionsContainer, what: str = "the rig file", *, required: bool = False,
+                     exists: bool = True) -> None:
+    """``--rig FILE``. `exists`: a file that is lacking is refused before anything is loaded."""
+    parser.add_argument("--rig", type=input_file if exists else Path, required=required, metavar="FILE", help=what)
+
+
+def add_out_argument(parser: argparse._ActionsContainer, what: str, *, required: bool = False,
+                     metavar: str = "FILE") -> None:
+    """``--out FILE``, or another place."""
+    parser.add_argument("--out", type=Path, required=required, metavar=metavar, help=what)
+
+
+def add_seed_argument(parser: argparse._ActionsContainer, what: str, default: int | None = 1) -> None:
+    """``--seed N``. A default of None: the scene file's, else 1."""
+    parser.add_argument("--seed", type=count, default=default, metavar="N", help=f"seed of {what} (default 1)")
+
+
+def add_force_argument(parser: argparse._ActionsContainer, what: str = "write over a file that exists") -> None:
+    """``--force``; scripts from before it may say ``--again``."""
+    parser.add_argument("--force", action="store_true", help=what)
+    parser.add_argument("--again", action="store_true", dest="force", help=argparse.SUPPRESS)
+
+
+def add_directory_argument(parser: argparse._ActionsContainer) -> None:
+    """``--directory DIR`` of an engine that is not the user's one."""
+    parser.add_argument("--directory", type=Path, metavar="DIR", help="private directory of the engine's sockets")

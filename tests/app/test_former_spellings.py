@@ -1,0 +1,66 @@
+"""Command lines as they were spelt before are read for one release, and the note says how they are spelt now."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from rhot_app import former_spellings
+from rhot_app.__main__ import parse
+from rhot_app.former_spellings import present_spelling
+from rhot_app.simulator.scene.scene_arguments import scene_of, show_of
+
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "commands.md").read_text()
+
+
+@pytest.mark.parametrize(("former", "now"), [
+    ("simulate --bare --tone 7 --sleeve --out a",
+     "simulate --show bare-hand --set show.tone=7 --set show.sleeve=true --out a"),
+    ("simulate --kelvin=3000 --back --out a", "simulate --set lamp.kelvin=3000 --set facing=back --out a"),
+    ("simulate --show board --charuco --board 8x5 --out a",
+     "simulate --show board --set show.pattern=charuco --set show.size=8x5 --out a"),
+    ("evaluate --lamp 0.5", "evaluate live --set lamp.brightness=0.5"),
+    ("evaluate --compare --recording walk.tsv --sketched",
+     "evaluate compare --motions rest,wave,grasp,pinch,fast --motions walk.tsv --sketched"),
+    ("evaluate --compare --motions rest --recording walk.tsv", "evaluate compare --motions rest --motions walk.tsv"),
+    ("evaluate --seeds 2 --bare-hand", "evaluate bare-hand --seeds 2"),
+    ("mouse", "mouse run"), ("mouse --measure --places 3", "mouse measure --places 3"),
+    ("mouse --gain 2 --on-table", "mouse run --set gain=2 --set on_table=true"),
+    ("--directory here mouse --pointer", "mouse run --directory here --pointer"),
+])
+def test_a_former_line_is_read_as_the_present_one(former: str, now: str, capsys: pytest.CaptureFixture[str]) -> None:
+    _, parsed = parse(shlex.split(former))
+    note = capsys.readouterr().err
+    assert note == f"rhot: this is the former spelling, read for one release. Now: rhot {now}\n"
+    assert vars(parse(shlex.split(now))[1]) == vars(parsed) and not capsys.readouterr().err
+
+
+@pytest.mark.parametrize("present", ["replay a.rhotlog --json", "evaluate --help", "mouse run --json", "export --back",
+                                     "evaluate compare --sketched", "simulate --set facing=back --out a"])
+def test_a_present_line_stays(present: str) -> None:
+    assert present_spelling(present.split()) == present.split()
+
+
+def test_an_option_without_its_value_is_left_to_the_parser(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parse(["simulate", "--out", "a", "--kelvin"])
+    assert "--kelvin" in capsys.readouterr().err
+
+
+def test_former_scenes_are_the_same_scenes() -> None:
+    parsed = parse(shlex.split("simulate --kelvin 3000 --mains 50 --worn 0.2 --glove 1,2,3 --back --seed 4 "
+                               "--background clutter --show marker --marker ring --distance 0.4 --moving --out a"))[1]
+    scene, show = scene_of(parsed), show_of(parsed)
+    settings = scene.settings
+    assert (settings.lamp.kelvin, settings.lamp.mains_hz, settings.worn_paint) == (3000, 50, 0.2)
+    assert (settings.glove_rgb, settings.facing, settings.background, scene.seed) == ((1, 2, 3), "back", "clutter", 4)
+    assert (show.marker, show.distance_m, show.moving) == ("ring", 0.4, True)  # type: ignore[union-attr]
+
+
+def test_every_former_option_is_in_the_document() -> None:
+    told = set(re.findall(r"--[a-z-]+", DOCUMENT.partition("## Former spellings")[2]))
+    gone = {option for options in former_spellings._OPTIONS.values() for option in options} - {"--legacy"}
+    assert gone <= told, gone - told
