@@ -25,7 +25,8 @@ PAGE, LOCK = ROOT / "THIRD_PARTY.md", ROOT / "requirements" / "app.lock"
 BEGIN, END = "<!-- packages -->", "<!-- end -->"
 
 STATED = {
-    "bvh": "MIT", "colorama": "BSD-3-Clause", "eclipse-zenoh": "EPL-2.0 OR Apache-2.0", "ezc3d": "MIT",
+    "bvh": "MIT", "colorama": "BSD-3-Clause", "defusedxml": "PSF-2.0", "eclipse-zenoh": "EPL-2.0 OR Apache-2.0",
+    "ezc3d": "MIT", "pypdfium2": "BSD-3-Clause AND Apache-2.0",
     "jinja2": "BSD-3-Clause", "lz4": "BSD-3-Clause", "numba": "BSD-2-Clause", "openvr": "BSD-3-Clause",
     "partd": "BSD-3-Clause", "pyopengl": "BSD-3-Clause", "python-osc": "Unlicense", "pyvirtualdisplay": "BSD-2-Clause",
     "scipy": "BSD-3-Clause", "tqdm": "MPL-2.0 AND MIT", "zict": "BSD-3-Clause"}

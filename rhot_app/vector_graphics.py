@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
+if TYPE_CHECKING:
+    from fpdf import FPDF
 
 _MM_PER_POINT = 25.4 / 72.0
-_FONT = "Helvetica"
+_MARGIN_MM, _FOOT_MM, _FOOT_POINTS = 18.0, 12.0, 7.4
+_FONT, _ENCODING = "Helvetica", "cp1252"  # of the fonts that every PDF reader has
 
 Ink = tuple[float, float, float]
 """Red, green and blue, 0..1."""
@@ -48,7 +51,7 @@ class Stroke:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A line of text from (x, y) on its base line; `height` of the letters' font, mm."""
+    """A line of text on the base line of (x, y), which is its start, middle or end; `height` of the font, mm."""
 
     x: float
     y: float
@@ -56,115 +59,105 @@ class Text:
     text: str
     bold: bool = False
     ink: Ink = BLACK
+    anchor: Literal["start", "middle", "end"] = "start"
+
+
+Mark = Box | Disc | Stroke | Text
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """One page of `width` x `height` mm; everything that is not a box, a disc, a stroke or text is white. Strokes lie
-    on the boxes, text on both."""
+    """One white page of `width` x `height` mm with `marks`, of which later ones lie on earlier ones."""
 
     width: float
     height: float
-    boxes: tuple[Box, ...]
-    texts: tuple[Text, ...]
+    marks: tuple[Mark, ...]
     title: str
-    strokes: tuple[Stroke, ...] = ()
-    discs: tuple[Disc, ...] = ()
 
     def to_svg(self) -> bytes:
         """The page as SVG; one user unit is one millimetre."""
-        lines = [
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{_number(self.width)}mm" '
-            f'height="{_number(self.height)}mm" viewBox="0 0 {_number(self.width)} {_number(self.height)}">',
-            f"<title>{_escaped(self.title)}</title>",
-            f'<rect width="{_number(self.width)}" height="{_number(self.height)}" fill="white"/>',
-            '<g fill="black" shape-rendering="crispEdges">',
-            *(f'<rect x="{_number(box.x)}" y="{_number(box.y)}" width="{_number(box.width)}" '
-              f'height="{_number(box.height)}"{_svg_ink("fill", box.ink)}/>' for box in self.boxes),
-            "</g>",
-            *(f'<circle cx="{_number(disc.x)}" cy="{_number(disc.y)}" r="{_number(disc.radius)}"/>'
-              for disc in self.discs),
-            *(f'<polyline fill="none"{_svg_ink("stroke", stroke.ink) or _BLACK_STROKE} '
-              f'stroke-width="{_number(stroke.width)}" '
-              f'points="{_svg_points(stroke)}"/>'
-              for stroke in self.strokes),
-            *(f'<text x="{_number(text.x)}" y="{_number(text.y)}" font-family="{_FONT}, Arial, sans-serif" '
-              f'font-size="{_number(text.height)}"{_BOLD if text.bold else ""}'
-              f'{_svg_ink("fill", text.ink)}>{_escaped(text.text)}</text>' for text in self.texts),
-            "</svg>", ""]
-        return "\n".join(lines).encode()
+        size = f'width="{_number(self.width)}{{0}}" height="{_number(self.height)}{{0}}"'
+        lines = [f'<svg xmlns="http://www.w3.org/2000/svg" {size.format("mm")} '
+                 f'viewBox="0 0 {_number(self.width)} {_number(self.height)}">',
+                 f"<title>{_escaped(self.title)}</title>", f'<rect {size.format("")} fill="white"/>']
+        for kind, marks in groupby(self.marks, type):
+            drawn = [_svg(mark) for mark in marks]
+            lines += ['<g shape-rendering="crispEdges">', *drawn, "</g>"] if kind is Box else drawn
+        return "\n".join([*lines, "</svg>", ""]).encode()
 
     def to_pdf(self) -> bytes:
-        """The page as PDF 1.4."""
-        return pdf_of((self,), self.title)
+        """The page as PDF, in true scale."""
+        pdf = new_pdf(self.title)
+        pdf.add_page(format=(self.width, self.height))
+        self.draw_on(pdf)
+        return bytes(pdf.output())
 
-    def pdf_content(self) -> bytes:
-        """The page's marks; PDF counts in points from the lower left corner."""
-        lines, ink = [], BLACK
-        for box in self.boxes:
-            if box.ink != ink:
-                lines += [b"f", _pdf_ink(box.ink, b"rg")]
-                ink = box.ink
-            lines.append(f"{_points(box.x)} {_points(self.height - box.y - box.height)} {_points(box.width)} "
-                         f"{_points(box.height)} re".encode())
-        lines.append(b"f")
-        if self.discs:
-            lines += [_pdf_ink(BLACK, b"rg"), *(self._pdf_disc(disc) for disc in self.discs)]
-            ink = BLACK
-        for stroke in self.strokes:
-            ends = [f"{_points(x)} {_points(self.height - y)} {'l' if k else 'm'}".encode()
-                    for k, (x, y) in enumerate(stroke.points)]
-            lines += [_pdf_ink(stroke.ink, b"RG"), f"{_points(stroke.width)} w".encode(), *ends, b"S"]
-        for text in self.texts:
-            if text.ink != ink:
-                lines.append(_pdf_ink(text.ink, b"rg"))
-                ink = text.ink
-            lines.append(b"BT /%s %s Tf %s %s Td (%s) Tj ET" % (
-                b"B" if text.bold else b"F", _points(text.height).encode(), _points(text.x).encode(),
-                _points(self.height - text.y).encode(), _pdf_text(text.text)))
-        return b"\n".join(lines)
-
-    def _pdf_disc(self, disc: Disc) -> bytes:
-        """Four curves, a quarter each; their round is good to 3e-4 of the radius."""
-        x, y, r = disc.x, self.height - disc.y, disc.radius
-        k = 4.0 / 3.0 * (np.sqrt(2.0) - 1.0) * r
-        curves = [(r, k, k, r, 0.0, r), (-k, r, -r, k, -r, 0.0), (-r, -k, -k, -r, 0.0, -r), (k, -r, r, -k, r, 0.0)]
-        lines = [f"{_points(x + r)} {_points(y)} m"]
-        lines += [" ".join(_points(start + step) for start, step in zip((x, y) * 3, curve, strict=True)) + " c"
-                  for curve in curves]
-        return "\n".join([*lines, "f"]).encode()
+    def draw_on(self, pdf: FPDF, left: float = 0.0, top: float = 0.0) -> None:
+        """Draw it on the last page of `pdf`, its upper left corner at (`left`, `top`) mm."""
+        for mark in self.marks:
+            match mark:
+                case Box():
+                    pdf.set_fill_color(*rgb_of(mark.ink))
+                    pdf.rect(left + mark.x, top + mark.y, mark.width, mark.height, style="F")
+                case Disc():
+                    pdf.set_fill_color(0, 0, 0)
+                    pdf.circle(left + mark.x, top + mark.y, mark.radius, style="F")
+                case Stroke():
+                    pdf.set_draw_color(*rgb_of(mark.ink))
+                    pdf.set_line_width(mark.width)
+                    pdf.polyline([(left + x, top + y) for x, y in mark.points])
+                case Text():
+                    pdf.set_font(_FONT, "B" if mark.bold else "", mark.height / _MM_PER_POINT)
+                    pdf.set_text_color(*rgb_of(mark.ink))
+                    text = printable(mark.text)
+                    pdf.text(left + mark.x - _SHARES[mark.anchor] * pdf.get_string_width(text), top + mark.y, text)
 
 
-def pdf_of(pages: Sequence[Drawing], title: str) -> bytes:
-    """Pages as one PDF 1.4, in true scale."""
-    first = 6  # object of the first page; each page is followed by its content
-    kids = " ".join(f"{first + 2 * k} 0 R" for k in range(len(pages)))
-    objects = [
-        b"<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
-        f"<< /Type /Pages /Kids [{kids}] /Count {len(pages)} >>".encode(),
-        f"<< /Type /Font /Subtype /Type1 /BaseFont /{_FONT} /Encoding /WinAnsiEncoding >>".encode(),
-        f"<< /Type /Font /Subtype /Type1 /BaseFont /{_FONT}-Bold /Encoding /WinAnsiEncoding >>".encode(),
-        b"<< /Title (" + _pdf_text(title) + b") >>",
-    ]
-    for k, page in enumerate(pages):
-        content = page.pdf_content()
-        objects += [
-            (f"<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {_points(page.width)} {_points(page.height)}] "
-             f"/Contents {first + 2 * k + 1} 0 R /Resources << /Font << /F 3 0 R /B 4 0 R >> >> >>").encode(),
-            b"<< /Length %d >>\nstream\n%s\nendstream" % (len(content), content)]
-    data, offsets = bytearray(b"%PDF-1.4\n"), []
-    for number, body in enumerate(objects, start=1):
-        offsets.append(len(data))
-        data += b"%d 0 obj\n%s\nendobj\n" % (number, body)
-    start = len(data)
-    data += b"xref\n0 %d\n0000000000 65535 f \n" % (len(objects) + 1)
-    data += b"".join(b"%010d 00000 n \n" % offset for offset in offsets)
-    data += b"trailer\n<< /Size %d /Root 1 0 R /Info 5 0 R >>\nstartxref\n%d\n%%%%EOF\n" % (len(objects) + 1, start)
-    return bytes(data)
+_SHARES = {"start": 0.0, "middle": 0.5, "end": 1.0}  # of a text that is left of its place
 
 
-def _svg_points(stroke: Stroke) -> str:
-    return " ".join(f"{_number(x)},{_number(y)}" for x, y in stroke.points)
+def _svg(mark: Mark) -> str:
+    match mark:
+        case Box(x, y, width, height, ink):
+            return (f'<rect x="{_number(x)}" y="{_number(y)}" width="{_number(width)}" height="{_number(height)}"'
+                    f'{_svg_ink("fill", ink)}/>')
+        case Disc(x, y, radius):
+            return f'<circle cx="{_number(x)}" cy="{_number(y)}" r="{_number(radius)}"/>'
+        case Stroke(points, width, ink):
+            return (f'<polyline fill="none"{_svg_ink("stroke", ink) or _BLACK_STROKE} stroke-width="{_number(width)}" '
+                    f'points="{" ".join(f"{_number(x)},{_number(y)}" for x, y in points)}"/>')
+    return (f'<text x="{_number(mark.x)}" y="{_number(mark.y)}" font-family="{_FONT}, Arial, sans-serif" '
+            f'font-size="{_number(mark.height)}" text-anchor="{mark.anchor}"{_BOLD if mark.bold else ""}'
+            f'{_svg_ink("fill", mark.ink)}>{_escaped(mark.text)}</text>')
+
+
+def new_pdf(title: str, foot: str = "") -> FPDF:
+    """A PDF in mm, which printers do not scale. With a `foot`, A4 pages that turn by themselves and have it and their
+    number below; without one, no pages yet."""
+    from fpdf import FPDF, ViewerPreferences
+
+    class Pdf(FPDF):
+        def footer(self) -> None:
+            if foot:
+                self.set_y(-_FOOT_MM)
+                self.set_font(_FONT, "", _FOOT_POINTS)
+                self.set_text_color(100, 100, 100)
+                self.cell(0.0, 4.0, f"{foot}, page {self.page_no()}")
+
+    pdf = Pdf(unit="mm")
+    pdf.core_fonts_encoding = _ENCODING
+    pdf.viewer_preferences = ViewerPreferences(print_scaling="None")
+    pdf.set_title(title)
+    pdf.set_margins(_MARGIN_MM, _MARGIN_MM)
+    pdf.set_auto_page_break(bool(foot), _MARGIN_MM)
+    if foot:
+        pdf.add_page()
+    return pdf
+
+
+def printable(text: str) -> str:
+    """The text as a PDF's own fonts can show it: "?" stands for what they lack."""
+    return text.encode(_ENCODING, "replace").decode(_ENCODING)
 
 
 def _svg_ink(attribute: str, ink: Ink) -> str:
@@ -173,12 +166,10 @@ def _svg_ink(attribute: str, ink: Ink) -> str:
     return "" if ink == BLACK else f' {attribute}="#{hexadecimal}"'
 
 
-def _pdf_ink(ink: Ink, operator: bytes) -> bytes:
-    return " ".join(_number(part) for part in ink).encode() + b" " + operator
-
-
-def _points(millimetres: float) -> str:
-    return _number(millimetres / _MM_PER_POINT)
+def rgb_of(ink: Ink) -> tuple[int, int, int]:
+    """The ink as 0..255."""
+    red, green, blue = (round(255 * part) for part in ink)
+    return red, green, blue
 
 
 def _number(value: float) -> str:
@@ -188,8 +179,3 @@ def _number(value: float) -> str:
 
 def _escaped(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-
-
-def _pdf_text(text: str) -> bytes:
-    escaped = text.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
-    return escaped.encode("cp1252", "replace")

@@ -6,24 +6,25 @@ All three or none appear: the folder is renamed into place when it is complete.
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rhot_app.certificate.charts import chart_of
 from rhot_app.certificate.document import Certificate, Figure, Line, Word, number
 from rhot_app.certificate.recordings import ProtocolFile, copy_protocol
 from rhot_app.errors import CertificateError
 from rhot_app.simulator.film.film import new_folder
-from rhot_app.vector_graphics import BLACK, Box, Drawing, Ink, Stroke, Text, pdf_of
+from rhot_app.vector_graphics import BLACK, Ink, new_pdf, printable, rgb_of
 from rhot_node.files import write_document
+
+if TYPE_CHECKING:
+    from fpdf import FPDF
 
 INKS: dict[Word, Ink] = {"agrees": (0.10, 0.45, 0.20), "differs": (0.75, 0.12, 0.10),
                          "not measured": (0.55, 0.40, 0.0)}
 """Of the verdicts; each also stands in words, because a colour alone says nothing to some readers."""
 
-_WIDTH, _HEIGHT, _MARGIN = 210.0, 297.0, 18.0  # mm, A4
-_LINE_MM, _TEXT_MM = 4.4, 3.1
 _GREY: Ink = (0.4, 0.4, 0.4)
 _MOST_FIGURES = 14  # of a line on paper; the HTML and the JSON have all
 
@@ -107,9 +108,9 @@ def _word(line: Line) -> str:
 def _section(line: Line) -> str:
     parts = [f"<h2 id=\"{line.code}\">{html.escape(line.title)}: {line.verdict}</h2>"]
     parts += [f"<p>{html.escape(text)}</p>" for text in (line.sentence, line.cause, line.remedy) if text]
-    drawing = chart_of(line)
-    if drawing is not None:
-        parts.append(drawing.to_svg().decode())
+    chart = chart_of(line)
+    if chart is not None:
+        parts.append(chart.draw().to_svg().decode())
     if line.figures:
         parts.append("<table><tr><th>Figure</th><th class=\"n\">Value</th><th class=\"n\">95 % interval</th>"
                      "<th>The thesis</th></tr>")
@@ -121,135 +122,72 @@ def _section(line: Line) -> str:
 
 # -- PDF ---------------------------------------------------------------------------------------------------------------
 
-@dataclass
-class _Paper:
-    """Pages that fill from the top."""
-
-    title: str
-    pages: list[Drawing] = field(default_factory=list)
-    y: float = _MARGIN
-    boxes: list[Box] = field(default_factory=list)
-    texts: list[Text] = field(default_factory=list)
-    strokes: list[Stroke] = field(default_factory=list)
-
-    def need(self, height: float) -> None:
-        """A new page unless so much is left of this one."""
-        if self.y + height > _HEIGHT - _MARGIN:
-            self.turn()
-
-    def turn(self) -> None:
-        """Finish this page."""
-        foot = Text(_MARGIN, _HEIGHT - 10.0, 2.6, f"{self.title}, page {len(self.pages) + 1}", ink=_GREY)
-        self.pages.append(Drawing(_WIDTH, _HEIGHT, tuple(self.boxes), (*self.texts, foot), self.title,
-                                  tuple(self.strokes)))
-        self.boxes, self.texts, self.strokes, self.y = [], [], [], _MARGIN
-
-    def write(self, text: str, size: float = _TEXT_MM, *, x: float = _MARGIN, right: float = _WIDTH - _MARGIN,
-              bold: bool = False, ink: Ink = BLACK) -> None:
-        """A paragraph from here on."""
-        for line in wrapped(text, size, right - x, bold=bold):
-            self.need(_LINE_MM)
-            self.y += size * 1.42
-            self.texts.append(Text(x, self.y - 0.35 * size, size, line, bold, ink))
-
-    def rule(self) -> None:
-        """A thin line across."""
-        self.strokes.append(Stroke(((_MARGIN, self.y), (_WIDTH - _MARGIN, self.y)), 0.15, _GREY))
-        self.y += 1.0
-
-    def cells(self, cells: Sequence[tuple[float, float, str]], *, bold: bool = False, word: Word | None = None) -> None:
-        """One row of a table: (left, right, text) each, wrapped."""
-        columns = [(left, wrapped(text, 2.8, right - left, bold=bold)) for left, right, text in cells]
-        height = 4.0 * max(len(lines) for _, lines in columns) + 0.6
-        self.need(height)
-        for left, lines in columns:
-            for k, text in enumerate(lines):
-                marked = word is not None and text == word
-                self.texts.append(Text(left, self.y + 3.1 + 4.0 * k, 2.8, text, bold or marked,
-                                       INKS[word] if word is not None and marked else BLACK))
-        self.y += height
-
-    def draw(self, drawing: Drawing) -> None:
-        """A chart, in true size."""
-        self.need(drawing.height)
-        x, y = _MARGIN, self.y
-        self.boxes += [Box(box.x + x, box.y + y, box.width, box.height, box.ink) for box in drawing.boxes]
-        self.strokes += [Stroke(tuple((a + x, b + y) for a, b in stroke.points), stroke.width, stroke.ink)
-                         for stroke in drawing.strokes]
-        self.texts += [Text(text.x + x, text.y + y, text.height, text.text, text.bold, text.ink)
-                       for text in drawing.texts]
-        self.y += drawing.height + 2.0
-
-
 def to_pdf(certificate: Certificate) -> bytes:
     """The same on A4: a table of verdicts, then a section for each line."""
-    paper = _Paper(f"Certificate of {certificate.rig}")
-    paper.write(paper.title, 6.5, bold=True)
-    paper.y += 1.0
-    paper.write(certificate.summary)
+    title = f"Certificate of {certificate.rig}"
+    pdf = new_pdf(title, foot=printable(title))
+    _write(pdf, title, 18.0, bold=True)
+    pdf.ln(1.0)
+    _write(pdf, certificate.summary)
     for text in _about(certificate):
-        paper.write(text, ink=_GREY)
-    paper.y += 3.0
-    edges = (_MARGIN, 55.0, 82.0, _WIDTH - _MARGIN)
-    paper.cells(_row(edges, ("Line", "Verdict", "In words")), bold=True)
-    paper.rule()
+        _write(pdf, text, ink=_GREY)
+    pdf.ln(3.0)
+    _table(pdf, (37.0, 27.0, 110.0), ("Line", "Verdict", "In words"),
+           [(line.title, line.verdict, _in_short(line)) for line in certificate.lines], INKS)
     for line in certificate.lines:
-        paper.cells(_row(edges, (line.title, line.verdict, _in_short(line))), word=line.verdict)
-    for line in certificate.lines:
-        _write_section(paper, line)
-    paper.turn()
-    return pdf_of(paper.pages, paper.title)
+        _write_section(pdf, line)
+    return bytes(pdf.output())
 
 
-def _row(edges: Sequence[float], texts: Sequence[str]) -> list[tuple[float, float, str]]:
-    return [(left, right - 2.0, text) for left, right, text in zip(edges[:-1], edges[1:], texts, strict=True)]
+def _write(pdf: FPDF, text: str, points: float = 8.8, *, bold: bool = False, ink: Ink = BLACK) -> None:
+    """A paragraph."""
+    pdf.set_font("Helvetica", "B" if bold else "", points)
+    pdf.set_text_color(*rgb_of(ink))
+    pdf.multi_cell(0.0, 0.5 * points, printable(text), align="L", new_x="LMARGIN", new_y="NEXT")
 
 
-def _write_section(paper: _Paper, line: Line) -> None:
-    drawing = chart_of(line)
-    paper.y += 5.0
-    paper.need(30.0 + (drawing.height if drawing is not None else 0.0))
-    paper.rule()
-    paper.write(f"{line.title}: {line.verdict}", 4.4, bold=True, ink=INKS[line.verdict])
+def _table(pdf: FPDF, widths: tuple[float, ...], heads: tuple[str, ...], rows: list[tuple[str, ...]],
+           inks: Mapping[Word, Ink] | None = None) -> None:
+    """Heads above a line, rows that break between pages; `inks`: of cells that say so."""
+    from fpdf.fonts import FontFace
+
+    styles: dict[str, FontFace] = {}
+    for word, ink in (inks or {}).items():
+        styles[word] = FontFace(emphasis="BOLD", color=rgb_of(ink))
+    pdf.set_font("Helvetica", "", 8.0)
+    pdf.set_text_color(0, 0, 0)
+    pdf.set_draw_color(*rgb_of(_GREY))
+    pdf.set_line_width(0.15)
+    with pdf.table(col_widths=widths, width=sum(widths), align="LEFT", text_align="LEFT", line_height=4.0,
+                   borders_layout="SINGLE_TOP_LINE", headings_style=FontFace(emphasis="BOLD")) as table:
+        for cells in (heads, *rows):
+            row = table.row()
+            for text in cells:
+                row.cell(printable(text), style=styles.get(text))
+
+
+def _write_section(pdf: FPDF, line: Line) -> None:
+    chart = chart_of(line)
+    drawing = None if chart is None else chart.draw()
+    pdf.ln(5.0)
+    if pdf.will_page_break(30.0 + (drawing.height if drawing is not None else 0.0)):
+        pdf.add_page()
+    pdf.set_draw_color(*rgb_of(_GREY))
+    pdf.line(pdf.l_margin, pdf.get_y(), pdf.w - pdf.r_margin, pdf.get_y())
+    pdf.ln(1.0)
+    _write(pdf, f"{line.title}: {line.verdict}", 12.5, bold=True, ink=INKS[line.verdict])
     for text in (line.sentence, line.cause, line.remedy):
         if text:
-            paper.write(text)
-    paper.y += 1.5
+            _write(pdf, text)
+    pdf.ln(1.5)
     if drawing is not None:
-        paper.draw(drawing)
+        drawing.draw_on(pdf, pdf.l_margin, pdf.get_y())
+        pdf.ln(drawing.height + 2.0)
     if not line.figures:
         return
-    edges = (_MARGIN, 85.0, 108.0, 143.0, _WIDTH - _MARGIN)
-    paper.cells(_row(edges, ("Figure", "Value", "95 % interval", "The thesis")), bold=True)
-    paper.rule()
-    for one in line.figures[:_MOST_FIGURES]:
-        paper.cells(_row(edges, (one.name, _value(one), _range(one), one.thesis)))
-    if len(line.figures) > _MOST_FIGURES:
-        paper.write(f"{len(line.figures) - _MOST_FIGURES} more figures are in certificate.html and certificate.json.",
-                    ink=_GREY)
-
-
-_WIDTHS = {**dict.fromkeys("ijl'|", 0.222), **dict.fromkeys("ftI.,:;/!()[] ", 0.278), "r": 0.333, "-": 0.333,
-           "m": 0.833, "M": 0.833, "w": 0.722, "W": 0.944, **dict.fromkeys("ckszxvyJ", 0.5), "%": 0.889, "–": 0.556,
-           **dict.fromkeys("ABEKPSVXY", 0.667), **dict.fromkeys("CDHNRU", 0.722), **dict.fromkeys("GOQ", 0.778)}
-"""Of Helvetica's letters, ems (Adobe's font metrics); all others are 0.556 or narrower."""
-
-
-def text_width(text: str, size: float, *, bold: bool = False) -> float:
-    """mm that a text of that size takes in Helvetica; bold letters are at most a tenth wider."""
-    return size * sum(_WIDTHS.get(letter, 0.556) for letter in text) * (1.1 if bold else 1.0)
-
-
-def wrapped(text: str, size: float, width: float, *, bold: bool = False) -> list[str]:
-    """The text in lines that fit into `width` mm; a word that does not fit stands alone."""
-    lines, line = list[str](), ""
-    for word in text.split():
-        longer = f"{line} {word}" if line else word
-        if line and text_width(longer, size, bold=bold) > width:
-            lines.append(line)
-            line = word
-        else:
-            line = longer
-    return [*lines, line] if line or not lines else lines
-
-
+    shown = line.figures[:_MOST_FIGURES]
+    _table(pdf, (67.0, 23.0, 35.0, 49.0), ("Figure", "Value", "95 % interval", "The thesis"),
+           [(one.name, _value(one), _range(one), one.thesis) for one in shown])
+    if len(line.figures) > len(shown):
+        _write(pdf, f"{len(line.figures) - len(shown)} more figures are in certificate.html and certificate.json.",
+               ink=_GREY)

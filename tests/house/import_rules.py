@@ -34,7 +34,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.options": ("rhot_app.errors",),
     "rhot_app.former_spellings": (),
     "rhot_app.progress": ("rhot_node.errors",),
-    "rhot_app.charts": (),
+    "rhot_app.charts": ("rhot_app.vector_graphics",),
     "rhot_app.vector_graphics": (),
     "rhot_app.keys": ("rhot_node",),
     "rhot_app.rig_history": ("rhot_node", "rhot_app.errors", "rhot_app.project", "rhot_app.hand.anatomy"),

@@ -55,8 +55,7 @@ def draw_target(board: Board, paper: str = "A4") -> Drawing:
              Text(text_x, foot + 10.0, _TEXT_MM,
                   f"Print at 100 % on {paper}, glue it flat, measure the ruler: {RULER_MM:g} mm"),
              *_ruler_numbers(foot)]
-    return Drawing(page_width, page_height, boxes + tuple(_ruler_boxes(foot)), tuple(texts), board.text,
-                   discs=discs)
+    return Drawing(page_width, page_height, (*boxes, *_ruler_boxes(foot), *discs, *texts), board.text)
 
 
 def write_target(out: Path, board: Board, paper: str = "A4") -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt, Signal
@@ -23,7 +25,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.calibration.verdict import Finding, Verdict
-from rhot_app.charts import Chart, Curve
+from rhot_app.charts import Chart, Curve, Span, ticks
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.disposal import plot_widget
 from rhot_app.ui.common.shapes import ShapeMark
@@ -164,10 +166,9 @@ _DOT_PX = 7
 _FAINT_PX = 3
 _WIDTH_PX = 2.0
 _TEXT_PT = 11.0
-_LEGEND_ROWS, _LEGEND_COLUMNS = 5, 4
-_LEGEND_ROOM = 0.35  # of the chart's height, above what a large legend would cover
+_LEGEND_COLUMNS = 4
+_ROOM, _LEGEND_ROOM = 0.05, 0.14  # of the height of what is shown: below and above it, and for a row of the legend
 _BAND_ALPHA, _OWN_ALPHA = 40, 90
-_FEW_DECADES = 2.5
 
 
 class ChartView(QWidget):
@@ -207,29 +208,49 @@ class ChartView(QWidget):
             axis.setPen(scheme.border)
             axis.setTextPen(scheme.muted)
         plot.setLogMode(x=chart.log_x, y=chart.log_y)
-        columns = _LEGEND_COLUMNS if len(chart.curves) > _LEGEND_ROWS else 1
+        named = sum(bool(curve.name) for curve in chart.curves)
+        columns = min(max(named, 1), _LEGEND_COLUMNS)
         plot.addLegend(offset=(-10, 1), labelTextColor=scheme.text, brush=pg.mkBrush(scheme.panel), colCount=columns)
         tones = iter((scheme.accent, scheme.caution, scheme.good, scheme.bad, scheme.muted) * 4)
         for curve in chart.curves:
-            self._add(plot, curve, QColor(visible_on(curve.colour, scheme.panel) if curve.colour else next(tones)))
-        for side, logarithmic in (("bottom", chart.log_x), ("left", chart.log_y)):
-            if logarithmic:
-                plot.getAxis(side).setTicks([_log_ticks(chart, side)])
-        if columns > 1:
-            low, high = _reach(chart)
-            plot.setYRange(low, high + _LEGEND_ROOM * (high - low))
+            tone = QColor(visible_on(curve.colour, scheme.panel) if curve.colour else next(tones))
+            self._add(plot, chart, curve, tone)
+        for side, log, span in zip(("bottom", "left"), (chart.log_x, chart.log_y), chart.reach(), strict=True):
+            if log:
+                plot.getAxis(side).setTicks([[(float(np.log10(value)), f"{value:g}")
+                                              for value in ticks(span, log=True)]])
+        if chart.names:
+            plot.getAxis("bottom").setTicks([list(enumerate(chart.names))])
+        if chart.x_span is not None:
+            plot.setXRange(*_shown(chart.x_span, log=chart.log_x), padding=0.0)
+        low, high = _shown(chart.reach()[1], log=chart.log_y)
+        below = 0.0 if chart.y_span is not None else _ROOM
+        above = _ROOM + _LEGEND_ROOM * math.ceil(named / columns)
+        plot.setYRange(low - below * (high - low), high + above * (high - low), padding=0.0)
         return plot
 
-    def _add(self, plot: pg.PlotWidget, curve: Curve, tone: QColor) -> None:
+    def _add(self, plot: pg.PlotWidget, chart: Chart, curve: Curve, tone: QColor) -> None:
         if curve.style == "band":
             self._add_band(plot, curve, tone)
         elif curve.style in ("dots", "faint dots"):
             size = _DOT_PX if curve.style == "dots" else _FAINT_PX
             plot.plot(curve.x, curve.y, pen=None, symbol="o", symbolSize=size, symbolBrush=tone, symbolPen=None,
-                      name=curve.name)
+                      name=curve.name or None)
+        elif curve.style == "bars":
+            low, _ = _shown(chart.reach()[1], log=chart.log_y)
+            heights = np.log10(curve.y) if chart.log_y else curve.y
+            foot = low if chart.log_y else 0.0
+            bars = pg.BarGraphItem(x=curve.x, y0=foot, y1=heights, width=curve.width, brush=tone, pen=None)
+            plot.addItem(bars)
+            if curve.name:
+                plot.getPlotItem().legend.addItem(bars, curve.name)
+        elif curve.style == "whiskers":
+            high = curve.y if curve.high is None else curve.high
+            plot.plot(np.repeat(curve.x, 2), np.stack([curve.y, high], axis=1).ravel(), connect="pairs",
+                      pen=pg.mkPen(tone, width=_WIDTH_PX), name=curve.name or None)
         else:
             style = Qt.PenStyle.DashLine if curve.style == "dashes" else Qt.PenStyle.SolidLine
-            plot.plot(curve.x, curve.y, pen=pg.mkPen(tone, width=_WIDTH_PX, style=style), name=curve.name)
+            plot.plot(curve.x, curve.y, pen=pg.mkPen(tone, width=_WIDTH_PX, style=style), name=curve.name or None)
 
     def _add_band(self, plot: pg.PlotWidget, curve: Curve, tone: QColor) -> None:
         edge = pg.mkPen(tone, width=1.0)
@@ -240,22 +261,9 @@ class ChartView(QWidget):
         plot.addItem(pg.FillBetweenItem(low, high, brush=fill))
 
 
-def _reach(chart: Chart) -> tuple[float, float]:
-    """Lowest and highest y of all curves, in the axis's own units."""
-    values = np.concatenate([np.asarray(part, dtype=np.float64) for curve in chart.curves
-                             for part in (curve.y, curve.high) if part is not None])
-    values = np.log10(values) if chart.log_y else values
-    values = values[np.isfinite(values)]
-    return (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
-
-
-def _log_ticks(chart: Chart, side: str) -> list[tuple[float, str]]:
-    """1, 2, 5, 10, ...; powers of ten alone where there are many of them."""
-    values = np.concatenate([curve.x if side == "bottom" else curve.y for curve in chart.curves])
-    low, high = np.log10(values[values > 0.0].min()), np.log10(values[values > 0.0].max())
-    steps = (1.0, 2.0, 5.0) if high - low < _FEW_DECADES else (1.0,)
-    ticks = [step * 10.0**decade for decade in range(int(np.floor(low)), int(np.ceil(high)) + 1) for step in steps]
-    return [(float(np.log10(tick)), f"{tick:g}") for tick in ticks]
+def _shown(span: Span, *, log: bool) -> Span:
+    """The span in the plot's own units."""
+    return (float(np.log10(span[0])), float(np.log10(span[1]))) if log else span
 
 
 # -- The page of a result: its charts in the middle --------------------------------------------------------------------

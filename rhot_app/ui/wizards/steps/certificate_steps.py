@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
 from rhot_app.calibration.registry import CERTIFICATE
 from rhot_app.calibration.verdict import Finding, Grade, Verdict
 from rhot_app.certificate.collect import SECONDS
@@ -23,7 +21,7 @@ from rhot_app.certificate.recordings import (
     RulerStep,
     StaticStep,
 )
-from rhot_app.charts import Chart, Curve
+from rhot_app.charts import Chart
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
 from rhot_app.ui.models.proposal import Command, Proposal, Row
@@ -41,6 +39,7 @@ _SENTENCES: dict[str, str] = {
     "flash": "Turn the cameras to this screen, darken the room, press Record: the patch flashes for 20 seconds.",
     "plumb": "Hang the rod from a string. When it is still, press Record.",
 }
+_CHARTED = ("depth", "rod")
 TITLES: dict[str, str] = {"static": "Still", "ruler": "Ruler", "rod": "Rod", "flash": "Flash", "plumb": "Plumb line"}
 
 
@@ -152,28 +151,11 @@ def verdict_of(report: tuple[ProtocolFile, Certificate]) -> Verdict:
 
 
 def charts_of(report: tuple[ProtocolFile, Certificate]) -> tuple[Chart, ...]:
-    """Deviation from the ruler beside the thesis's, and the rod's length."""
-    charts: list[Chart] = []
-    for line in report[1].lines:
-        if line.code == "depth" and line.curves:
-            charts.append(_ruler_chart(line))
-        if line.code == "rod" and line.curves:
-            depth, length = (np.array(line.curves[name], dtype=np.float64) for name in ("depth_m", "length_mm"))
-            stated = np.full(2, line.curves["stated_mm"][0])
-            charts.append(Chart("Length of the rod", "distance, cm", "mm", (
-                Curve("as seen", 100.0 * depth, length, "faint dots"),
-                Curve("as stated", 100.0 * np.array([depth.min(), depth.max()]), stated, "dashes"))))
-    return tuple(charts)
+    """The certificate's own charts of what was moved through the volume."""
+    from rhot_app.certificate.charts import chart_of
 
-
-def _ruler_chart(line: Line) -> Chart:
-    from rhot_app.certificate import thesis
-
-    ruler, seen = (np.array(line.curves[name], dtype=np.float64) for name in ("ruler_m", "seen_m"))
-    corrected = thesis.POWER_K_M * thesis.DISPARITY_PX**thesis.POWER_Z
-    return Chart("Deviation from the ruler", "ruler, cm", "deviation, %", (
-        Curve("this rig", 100.0 * ruler, 100.0 * (seen / ruler - 1.0), "dots"),
-        Curve("the thesis, corrected", 100.0 * thesis.REAL_M, 100.0 * (corrected / thesis.REAL_M - 1.0), "faint dots")))
+    charts = (chart_of(line) for line in report[1].lines if line.code in _CHARTED)
+    return tuple(chart for chart in charts if chart is not None)
 
 
 # -- keeping it --------------------------------------------------------------------------------------------------------
