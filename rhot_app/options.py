@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rhot_app.errors import count, input_file
+from rhot_app.errors import count, input_file, positive_number
 
 
-def add_json_argument(parser: argparse._ActionsContainer, what: str = "one JSON object") -> None:
+def add_json_argument(parser: argparse._ActionsContainer,
+                      what: str = "print one JSON object on standard output") -> None:
     """``--json``, the same everywhere."""
-    parser.add_argument("--json", action="store_true", help=f"print {what} on standard output")
+    parser.add_argument("--json", action="store_true", help=what)
 
 
 def add_rig_argument(parser: argparse._ActionsContainer, what: str = "the rig file", *, required: bool = False,
@@ -30,12 +31,30 @@ def add_seed_argument(parser: argparse._ActionsContainer, what: str, default: in
     parser.add_argument("--seed", type=count, default=default, metavar="N", help=f"seed of {what} (default 1)")
 
 
+def add_seconds_argument(parser: argparse._ActionsContainer, what: str, default: float | None) -> None:
+    """``--seconds S``; `what` may name the default, a number's is named for it."""
+    parser.add_argument("--seconds", type=positive_number, default=default, metavar="S",
+                        help=what if default is None else f"{what} (default {default:g})")
+
+
+def add_tracker_argument(parser: argparse._ActionsContainer, what: str, default: str | None = None) -> None:
+    """``--tracker``: what makes a hand of the observations."""
+    parser.add_argument("--tracker", choices=("classic", "estimator"), default=default, help=what)
+
+
+def add_settings_argument(parser: argparse._ActionsContainer, what: str) -> None:
+    """``--settings FILE`` of a window."""
+    parser.add_argument("--settings", type=Path, metavar="FILE",
+                        help=f"remember {what} in this file instead of the user's configuration folder")
+
+
 def add_force_argument(parser: argparse._ActionsContainer, what: str = "write over a file that exists") -> None:
     """``--force``; scripts from before it may say ``--again``."""
     parser.add_argument("--force", action="store_true", help=what)
     parser.add_argument("--again", action="store_true", dest="force", help=argparse.SUPPRESS)
 
 
-def add_directory_argument(parser: argparse._ActionsContainer) -> None:
+def add_directory_argument(parser: argparse._ActionsContainer,
+                           what: str = "private directory of the engine's sockets") -> None:
     """``--directory DIR`` of an engine that is not the user's one."""
-    parser.add_argument("--directory", type=Path, metavar="DIR", help="private directory of the engine's sockets")
+    parser.add_argument("--directory", type=Path, metavar="DIR", help=what)

@@ -11,7 +11,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import CertificateError, count, input_file, positive_number
+from rhot_app.errors import CertificateError, positive_number
+from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument, add_seed_argument
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
 
@@ -27,7 +28,7 @@ DIFFERS = 1
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot certify``."""
-    parser.add_argument("--rig", type=input_file, default=None, metavar="FILE", help="the rig file that is certified")
+    add_rig_argument(parser, "the rig file that is certified")
     parser.add_argument("--recordings", type=Path, default=None, metavar="DIR",
                         help="recordings made before, with protocol.json; without it, and without --step and "
                              "--simulated, the running engine records now, step by step in this terminal")
@@ -43,13 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--simulated", action="store_true",
                         help="the whole protocol on the simulated rig, unattended; --rig is then optional")
     parser.add_argument("--sketched", action="store_true", help="the simulated rig without pictures, much faster")
-    parser.add_argument("--seed", type=count, default=1, metavar="N", help="seed of the simulated rig (default 1)")
+    add_seed_argument(parser, "the simulated rig")
     parser.add_argument("--keep", type=Path, default=None, metavar="DIR", help="new folder that keeps the recordings")
-    parser.add_argument("--out", type=Path, default=None, metavar="DIR",
-                        help="new folder for certificate.html, .pdf and .json (default: certificate-DATE-TIME)")
+    add_out_argument(parser, "new folder for certificate.html, .pdf and .json (default: certificate-DATE-TIME)",
+                     metavar="DIR")
     parser.add_argument("--compare", type=Path, nargs=2, default=None, metavar=("OLD", "NEW"),
                         help="two certificates (their folders or JSON files): what changed beyond the intervals")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_json_argument(parser)
     add_examples(parser, "rhot certify --rig desk.json --facing palm --keep recordings",
                  "rhot certify --simulated --sketched --out certificate")
 
@@ -88,8 +89,6 @@ def _check(args: argparse.Namespace, out: Path) -> None:
         raise CertificateError("--simulated makes its own recordings: leave out --recordings and --step, or it.")
     if args.sketched and not args.simulated:
         raise CertificateError("--sketched is of the simulated rig: give --simulated too.")
-    if args.seed < 0:
-        raise CertificateError(f"--seed is 0 or more, not {args.seed}.")
     for folder in (out, args.keep, Path(f"{out}-recordings") if _guided(args) else None):
         if folder is not None and folder.exists():
             raise CertificateError(f"{folder} exists already; choose another folder or remove it.")

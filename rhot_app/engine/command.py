@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.engine.directory import default_directory, open_directory
-from rhot_app.errors import EngineError, RigError, input_file
+from rhot_app.errors import EngineError, RigError
+from rhot_app.options import add_directory_argument, add_json_argument, add_rig_argument
 from rhot_app.outputs.spec import HELP, WEB_PORT, parse_output, web_settings
 from rhot_node.terminal import add_examples
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot engine``."""
-    parser.add_argument("--rig", type=input_file, required=True, metavar="FILE", help="the rig file (rhot-rig, JSON)")
+    add_rig_argument(parser, "the rig file (rhot-rig, JSON)", required=True)
     parser.add_argument("--record", "--log", type=Path, dest="log", metavar="FILE",
                         help="write the raw log of all datagrams to this new file")
     parser.add_argument("--video", action="store_true",
@@ -42,8 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="end when for half a minute nothing was recorded and no client was connected; the app "
                              "starts its engine so")
     add_serving_arguments(parser)
-    parser.add_argument("--json", action="store_true",
-                        help="print one JSON object on standard output when ready: pid, directory, rig")
+    add_json_argument(parser, "print one JSON object on standard output when ready: pid, directory, rig")
     add_examples(parser, "rhot engine --rig desk.json --start --record wave.rhotlog",
                  "rhot engine --rig desk.json --start --output osc:127.0.0.1:9000 --web")
 
@@ -61,8 +61,7 @@ def _require_acceptable(rig: Rig, path: Path) -> None:
 
 def add_serving_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of every command that serves states to clients."""
-    parser.add_argument("--directory", type=Path, metavar="DIR",
-                        help=f"private directory of the engine's sockets (default {default_directory()})")
+    add_directory_argument(parser, f"private directory of the engine's sockets (default {default_directory()})")
     parser.add_argument("--output", action="append", default=[], dest="outputs", metavar="SPEC",
                         help="send every state to other programs, see below; may be given more than once")
     parser.add_argument("--web", nargs="?", const="", metavar="[HOST:]PORT",

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import not_negative, positive_count, positive_number
-from rhot_app.options import add_json_argument, add_seed_argument
+from rhot_app.errors import not_negative, positive_count
+from rhot_app.options import add_json_argument, add_seconds_argument, add_seed_argument
 from rhot_app.simulator.scene.scene_arguments import MOTION, SECONDS_MAX, add_scene_arguments, fields_of
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
@@ -66,7 +66,7 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
 
 def _add_bare_hand(parser: argparse.ArgumentParser) -> None:
     add_seed_argument(parser, "the first run")
-    _add_seconds(parser, 3, "length of each run, from 2.5")
+    add_seconds_argument(parser, "length of each run, from 2.5", 3.0)
     add_json_argument(parser)
     _add_seeds(parser, 10)
     parser.add_argument("--cases", metavar="TEXT", default=None, help="only the cases whose names begin with TEXT")
@@ -75,15 +75,10 @@ def _add_bare_hand(parser: argparse.ArgumentParser) -> None:
 
 def _add_run(parser: argparse.ArgumentParser, seconds: float, what: str) -> None:
     """What a run on observations has."""
-    _add_seconds(parser, seconds, what)
+    add_seconds_argument(parser, what, seconds)
     parser.add_argument("--loss", type=not_negative, default=0.0, metavar="P",
                         help="probability 0..1 that a datagram of observations is lost (default 0)")
     add_json_argument(parser)
-
-
-def _add_seconds(parser: argparse.ArgumentParser, seconds: float, what: str) -> None:
-    parser.add_argument("--seconds", type=positive_number, default=seconds, metavar="S",
-                        help=f"{what} (default {seconds:g})")
 
 
 def _add_seeds(parser: argparse.ArgumentParser, seeds: int) -> None:

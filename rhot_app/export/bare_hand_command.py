@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.errors import RecordingError, input_file, positive_number
-from rhot_app.options import add_force_argument
+from rhot_app.options import add_force_argument, add_json_argument, add_out_argument, add_rig_argument
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments that landmarks and contours share."""
-    parser.add_argument("--rig", type=input_file, metavar="FILE",
-                        help="the calibrated rig, with the hand's side")
+    add_rig_argument(parser, "the calibrated rig, with the hand's side")
     parser.add_argument("--video", action="append", metavar="NAME=FILE",
                         help="a camera of the rig and its video; once for each camera, also for one alone")
     background = parser.add_mutually_exclusive_group()
@@ -41,14 +40,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                        help="seconds to add to a camera's times, where the videos did not begin together")
     parser.add_argument("--unknown-size", action="store_true",
                         help="estimate the hand's size, too, unless all its bones are measured")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the states as .csv, .parquet or .npz")
+    add_out_argument(parser, "write the states as .csv, .parquet or .npz")
     parser.add_argument("--overlay", type=Path, metavar="PLACE",
                         help="draw what was found: a film (.avi, .mp4), or a new folder for PNG files")
     parser.add_argument("--adapt", type=Path, metavar="FILE",
                         help="write the hand in the videos, measured or adapted, as a hand file; what FILE was "
                              "before is kept in FILE.history")
     add_force_argument(parser, "write over files that exist")
-    parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
+    add_json_argument(parser, "print the summary as one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rhot_app.errors import positive_count
 from rhot_app.export.export_command import READ_WITH_LOSSES, add_export_arguments, options_of
-from rhot_app.options import add_force_argument
+from rhot_app.options import add_force_argument, add_out_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -23,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--do", choices=("track", "export", "certify"), required=True,
                         help="track: a JSON summary of each log; export: a file of --format; certify: a certificate of "
                              "each folder of recordings that rhot certify or the app made")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR",
-                        help="folder of the results, named after their logs; batch.json in it lists what is done")
+    add_out_argument(parser, "folder of the results, named after their logs; batch.json in it lists what is done",
+                     required=True, metavar="DIR")
     parser.add_argument("--workers", type=positive_count, default=None, metavar="N",
                         help="processes (default: one per processor)")
     parser.add_argument("--scheduler", default=None, metavar="ADDRESS",

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.errors import input_file, positive_number
-from rhot_app.options import add_force_argument
+from rhot_app.options import add_force_argument, add_out_argument, add_rig_argument, add_tracker_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -22,8 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot export``."""
     parser.add_argument("path", type=input_file, metavar="LOG",
                         help="a raw log written by rhot engine --log or the app")
-    parser.add_argument("--out", type=Path, metavar="FILE",
-                        help="file to write (default: named as the log, beside it)")
+    add_out_argument(parser, "file to write (default: named as the log, beside it)")
     add_export_arguments(parser, "default: by the ending of --out")
     add_force_argument(parser)
     add_examples(parser, "rhot export wave.rhotlog --out wave.csv",
@@ -34,10 +32,8 @@ def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -
     """What ``rhot export`` and ``rhot batch`` have in common; `without_format` says what holds without --format."""
     parser.add_argument("--format", default=None, metavar="F",
                         help=f"csv, trc, c3d, bvh, gltf (or glb), npz, parquet, mcap or ros2 ({without_format})")
-    parser.add_argument("--rig", type=input_file, metavar="FILE",
-                        help="track with this rig instead of the one the log was recorded with")
-    parser.add_argument("--tracker", choices=("classic", "estimator"), default=None,
-                        help="track with this tracker instead of the one that the rig asks for")
+    add_rig_argument(parser, "track with this rig instead of the one the log was recorded with")
+    add_tracker_argument(parser, "track with this tracker instead of the one that the rig asks for")
     parser.add_argument("--rate", type=positive_number, default=None, metavar="HZ",
                         help="states at equal intervals (default: each at its own time; trc, c3d and bvh: the cameras' "
                              "rate)")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rhot_app.errors import RecordingError, input_file, positive_number
+from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_app.progress import ProgressLine
 from rhot_node.landmarks.install import LICENCE, PACKAGE, add_wheel, install
 from rhot_node.terminal import add_examples
@@ -22,14 +23,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("tables", type=_table_or_install, nargs="+", metavar="CSV",
                         help="a landmark table for each camera, in the rig's order (docs/landmarks.md); or the word "
                              f"install: place the hand networks on this machine (of {PACKAGE}, {LICENCE})")
-    parser.add_argument("--rig", type=input_file, metavar="FILE",
-                        help="the calibrated rig, with the marker set landmarks21")
-    parser.add_argument("--out", type=Path, metavar="LOG", help="the raw log to write; a new file")
+    add_rig_argument(parser, "the calibrated rig, with the marker set landmarks21")
+    add_out_argument(parser, "the raw log to write; a new file", metavar="LOG")
     parser.add_argument("--fps", type=positive_number, default=None, metavar="N",
                         help="frames per second of tables without times")
     parser.add_argument("--bones", choices=("measured", "rig"), default="measured",
                         help="the hand's bones: measured from the landmarks (default), or as the rig has them")
-    parser.add_argument("--json", action="store_true", help="print the summary as one JSON object")
+    add_json_argument(parser, "print the summary as one JSON object")
     add_examples(parser, "rhot landmarks left.csv right.csv --rig desk.json --fps 30 --out hand.rhotlog",
                  "rhot landmarks install")
     add_wheel(parser)

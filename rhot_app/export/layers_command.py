@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.errors import RigError, input_file, refuse_existing
-from rhot_app.options import add_force_argument
+from rhot_app.options import add_force_argument, add_json_argument, add_out_argument
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
 
@@ -40,10 +40,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="set an angle; the others rest. Give it once for every angle")
     parser.add_argument("--from", dest="eye", default="60,50", metavar="AZIMUTH,ELEVATION",
                         help="where the camera stands, degrees about the vertical and above the object (60,50)")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE",
-                        help="the picture (.png, .jpg), or a film of one turn about the object (.avi, .mp4)")
+    add_out_argument(parser, "the picture (.png, .jpg), or a film of one turn about the object (.avi, .mp4)",
+                     required=True)
     add_force_argument(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_json_argument(parser)
     add_examples(parser, "rhot layers --out layers.png", "rhot layers mine.json --from 0,20 --out turn.mp4")
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from pathlib import Path
 
 from rhot_app.errors import RecordingError, finite, input_file
 from rhot_app.export.export_command import READ_WITH_LOSSES
-from rhot_app.options import add_force_argument
+from rhot_app.options import add_force_argument, add_out_argument
 from rhot_node.terminal import add_examples
 
 
@@ -20,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="first moment, s since the first state, as in the replay and in exports (default 0)")
     parser.add_argument("--to", dest="end", type=finite, default=math.inf, metavar="S",
                         help="last moment (default: the end)")
-    parser.add_argument("--out", type=Path, required=True, metavar="PART", help="the log to write")
+    add_out_argument(parser, "the log to write", required=True, metavar="PART")
     add_force_argument(parser)
     add_examples(parser, "rhot trim wave.rhotlog --from 2.5 --to 7 --out wave-part.rhotlog",
                  "rhot trim wave.rhotlog --from 60 --out wave-rest.rhotlog")

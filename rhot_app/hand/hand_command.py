@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.errors import RigError, input_file, positive_number
+from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -26,10 +27,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--side", choices=("right", "left"), help="which hand; the file's own without it")
     parser.add_argument("--name", help="what the file is to call it")
     parser.add_argument("--rows", action="store_true", help="make it a rhot-articulated file: Denavit-Hartenberg rows")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the hand here")
-    parser.add_argument("--rig", type=Path, help="put the hand into this rig file, which keeps its former version")
+    add_out_argument(parser, "write the hand here")
+    add_rig_argument(parser, "put the hand into this rig file, which keeps its former version", exists=False)
     parser.add_argument("--draw", type=Path, metavar="FILE.png", help="draw it from two sides")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_json_argument(parser)
     add_examples(parser, "rhot hand --length 185 --out mine.json", "rhot hand mine.json --draw mine.png")
 
 

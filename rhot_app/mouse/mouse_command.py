@@ -25,7 +25,13 @@ from rhot_app.errors import (
     positive_number,
     whole,
 )
-from rhot_app.options import add_directory_argument, add_json_argument, add_rig_argument, add_seed_argument
+from rhot_app.options import (
+    add_directory_argument,
+    add_json_argument,
+    add_rig_argument,
+    add_seconds_argument,
+    add_seed_argument,
+)
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -86,7 +92,7 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
                              "recorded slices")
     add_rig_argument(parser, "track the --log with this rig instead of the one it was recorded with", exists=False)
     _add_simulated(parser, "with --simulated: ")
-    parser.add_argument("--seconds", type=positive_number, default=None, metavar="S", help="end after so long")
+    add_seconds_argument(parser, "end after so long", None)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE",
                         help="gain=G: metres of the cursor per metre of the palm (3); height_gain=G: of its height per "
                              "metre of the finger (6); height_from=palm: the palm sets the height instead of the index "
@@ -95,7 +101,7 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--osc", metavar="HOST:PORT", help="send cursor and buttons there as OSC messages, too")
     parser.add_argument("--pointer", action="store_true",
                         help="move the system's pointer, too (Linux; needs write permission on /dev/uinput)")
-    add_json_argument(parser, "one JSON object for each state")
+    add_json_argument(parser, "print one JSON object for each state")
     add_examples(parser, "rhot mouse run --pointer",
                  "rhot mouse run --simulated --seconds 20 --osc 127.0.0.1:9000")
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rhot_app.options import add_json_argument, add_rig_argument
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
 
@@ -23,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="a rhot-object file")
     parser.add_argument("--images", nargs="+", default=[], metavar="CAMERA=IMAGE",
                         help="one image of each camera, by the camera's name in the rig, taken at the same instant")
-    parser.add_argument("--rig", type=Path, metavar="RIG", help="the rig file, for lenses and poses of the cameras")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_rig_argument(parser, "the rig file, for lenses and poses of the cameras", exists=False)
+    add_json_argument(parser)
     add_examples(parser, "rhot object cube.json",
                  "rhot object cube.json --rig desk.json --images left=left.png right=right.png")
 

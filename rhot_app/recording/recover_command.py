@@ -7,6 +7,7 @@ import contextlib
 from pathlib import Path
 
 from rhot_app.errors import RecordingError
+from rhot_app.options import add_out_argument, add_rig_argument
 from rhot_app.project import load_rig
 from rhot_app.recording.raw_log import END, LogReader, encode_header
 from rhot_node.files import replacing
@@ -16,9 +17,8 @@ from rhot_node.terminal import add_examples
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot recover``."""
     parser.add_argument("path", type=Path, metavar="LOG", help="the damaged log")
-    parser.add_argument("--out", type=Path, required=True, metavar="CLEAN", help="the log to write; a new file")
-    parser.add_argument("--rig", type=Path, metavar="FILE",
-                        help="the rig that it was recorded with, where the header cannot be read")
+    add_out_argument(parser, "the log to write; a new file", required=True, metavar="CLEAN")
+    add_rig_argument(parser, "the rig that it was recorded with, where the header cannot be read", exists=False)
     add_examples(parser, "rhot recover damaged.rhotlog --out clean.rhotlog",
                  "rhot recover damaged.rhotlog --rig desk.json --out clean.rhotlog")
 

@@ -6,6 +6,7 @@ import argparse
 import contextlib
 from pathlib import Path
 
+from rhot_app.options import add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 
@@ -13,9 +14,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot video``."""
     parser.add_argument("what", choices=("collect",), help="collect: fetch the videos of a log from the nodes")
     parser.add_argument("log", type=Path, metavar="LOG", help="the log that `rhot engine --log LOG --video` wrote")
-    parser.add_argument("--rig", type=Path, metavar="FILE",
-                        help="the rig file that says where the nodes are now (default: the log's own rig)")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where the videos go (default: beside the log)")
+    add_rig_argument(parser, "the rig file that says where the nodes are now (default: the log's own rig)",
+                     exists=False)
+    add_out_argument(parser, "where the videos go (default: beside the log)", metavar="DIR")
     parser.add_argument("--keep", action="store_true", help="leave the videos on the nodes as well")
     add_examples(parser, "rhot video collect wave.rhotlog",
                  "rhot video collect wave.rhotlog --rig desk.json --out videos --keep")

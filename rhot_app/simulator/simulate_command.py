@@ -5,11 +5,10 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import not_negative, positive_count, positive_number
-from rhot_app.options import add_json_argument
+from rhot_app.errors import not_negative, positive_count
+from rhot_app.options import add_json_argument, add_out_argument, add_seconds_argument
 from rhot_app.simulator.scene.scene_arguments import (
     SECONDS_MAX,
     add_scene_arguments,
@@ -32,12 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot simulate``."""
     add_scene_arguments(parser)
     add_show_argument(parser)
-    parser.add_argument("--seconds", type=positive_number, default=10.0, metavar="S",
-                        help="length of the recording (default 10)")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR",
-                        help="new folder for the frames (DIR/left, DIR/right), truth.npz and shot.json; to play it to "
-                             "two nodes on this machine, their settings (left.json, right.json) and rig.json. A name "
-                             "that ends in .json: write the scene alone, for --scene")
+    add_seconds_argument(parser, "length of the recording", 10.0)
+    add_out_argument(parser, "new folder for the frames (DIR/left, DIR/right), truth.npz and shot.json; to play it to "
+                     "two nodes on this machine, their settings (left.json, right.json) and rig.json. A name "
+                     "that ends in .json: write the scene alone, for --scene", required=True, metavar="DIR")
     parser.add_argument("--pictures", type=positive_count, default=None, metavar="N",
                         help="N pictures per camera (DIR/left/000.png ...) instead of a recording: of a board, one at "
                              "each place where it is held still")

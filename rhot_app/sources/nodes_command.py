@@ -7,7 +7,8 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import SourceError, positive_number
+from rhot_app.errors import SourceError
+from rhot_app.options import add_json_argument, add_seconds_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -18,9 +19,8 @@ SECONDS_MAX = 60.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot nodes``."""
-    parser.add_argument("--seconds", type=positive_number, default=3.0, metavar="S",
-                        help="how long to look (default: 3)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_seconds_argument(parser, "how long to look", 3.0)
+    add_json_argument(parser)
     add_examples(parser, "rhot nodes", "rhot nodes --seconds 10 --json")
 
 

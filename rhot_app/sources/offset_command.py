@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from rhot_app.errors import RecordingError, input_file
+from rhot_app.options import add_json_argument
 from rhot_node.terminal import add_examples
 
 
@@ -17,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="two or more films of one scene, by their cameras; paths alone are named as the files")
     parser.add_argument("--by", choices=("sound", "flash"), default="sound",
                         help="what all films have: the sound (default), or a light that goes on once")
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_json_argument(parser)
     add_examples(parser, "rhot offset left=left.mp4 right=right.mp4",
                  "rhot offset left=left.mp4 right=right.mp4 --by flash")
 

@@ -19,6 +19,7 @@ from msgspec import Meta
 
 from rhot_app.errors import PairingError, positive_count
 from rhot_app.keys import KnownNode, MasterKeys, load_master_keys, remember_node
+from rhot_app.options import add_rig_argument
 from rhot_app.project import Rig, RigNode, load_rig
 from rhot_app.rig_history import accept
 from rhot_node.errors import NodeError, printable
@@ -156,7 +157,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot pair``."""
     parser.add_argument("node", metavar="NODE",
                         help="ADDRESS or ADDRESS:PORT of the node, or with --rig its name in the rig")
-    parser.add_argument("--rig", type=Path, metavar="FILE", help="write the node's key into this rig file")
+    add_rig_argument(parser, "write the node's key into this rig file", exists=False)
     parser.add_argument("--port", type=positive_count, default=None, metavar="N",
                         help="the node's pairing port (default: the rig's, or 47803)")
     parser.add_argument("--code", metavar="CODE", help="the code that `rhot-node pair` shows; asked for when missing")

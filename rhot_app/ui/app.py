@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from rhot_app.engine.compilation import BackgroundCompilation
 from rhot_app.engine.directory import default_directory
 from rhot_app.errors import EngineError, SourceError
+from rhot_app.options import add_directory_argument, add_rig_argument, add_settings_argument
 from rhot_app.project import load_rig
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot`` without a command."""
-    parser.add_argument("--rig", type=Path, metavar="FILE",
-                        help="open this rig file at once; with --cameras, take the cameras' lenses and places from it")
+    add_rig_argument(parser, "open this rig file at once; with --cameras, take the cameras' lenses and places from it",
+                     exists=False)
     parser.add_argument("--cameras", nargs="*", metavar="SOURCE",
                         help="open cameras of this computer: numbers that `rhot cameras` lists, films, folders of "
                              "pictures, or addresses of network cameras (http://, rtsp://)")
@@ -38,10 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_window_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of every command that opens the window."""
-    parser.add_argument("--directory", type=Path, metavar="DIR",
-                        help=f"private directory of the engine's sockets (default {default_directory()})")
-    parser.add_argument("--settings", type=Path, metavar="FILE",
-                        help="remember layout and settings in this file instead of the user's configuration folder")
+    add_directory_argument(parser, f"private directory of the engine's sockets (default {default_directory()})")
+    add_settings_argument(parser, "layout and settings")
     parser.add_argument("--reset", action="store_true", help="forget layout and settings first")
 
 

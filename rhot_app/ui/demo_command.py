@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rhot_app.errors import SimulatorError, count
+from rhot_app.errors import SimulatorError
+from rhot_app.options import add_seed_argument, add_tracker_argument
 from rhot_app.ui.app import add_window_arguments, open_window
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.models.words import shipped_motions
@@ -17,10 +18,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = ", ".join(info.name for info in shipped_motions())
     parser.add_argument("--motion", default=TwinChoice().motion, metavar="M",
                         help=f"what the hand does: {names}, or a motion file (default {TwinChoice().motion})")
-    parser.add_argument("--seed", type=count, default=TwinChoice().seed, metavar="N",
-                        help=f"seed of noise, clocks and cloth (default {TwinChoice().seed})")
-    parser.add_argument("--tracker", choices=("classic", "estimator"), default=TwinChoice().tracker,
-                        help=f"what makes a hand of the markers (default {TwinChoice().tracker})")
+    add_seed_argument(parser, "noise, clocks and cloth")
+    add_tracker_argument(parser, f"what makes a hand of the markers (default {TwinChoice().tracker})",
+                         TwinChoice().tracker)
     add_window_arguments(parser)
     add_examples(parser, "rhot demo", "rhot demo --motion pinch --tracker estimator")
 

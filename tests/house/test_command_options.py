@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 OFFERED_MOST = 347
-DEFINED_MOST = 281
+DEFINED_MOST = 209
 
 
 def test_commands_get_no_more_options(tmp_path: Path) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.calibration.commands.output import show
 from rhot_app.errors import CalibrationError, input_file
+from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -24,8 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     source.add_argument("--log", type=input_file, metavar="LOG",
                         help="a raw log in which the hand moves freely for a minute")
     source.add_argument("--tsv", type=input_file, metavar="FILE", help="a Qualisys TSV export with markers on a hand")
-    parser.add_argument("--rig", type=input_file, metavar="RIG",
-                        help="calibrated rig for the log (default: the log's own)")
+    add_rig_argument(parser, "calibrated rig for the log (default: the log's own)")
     parser.add_argument("--roles", nargs="+", default=[], metavar="NAME=ROLE",
                         help="where markers sit, as m1=index_tip m2=index_medial m3=palm_1 m4=wrist")
     parser.add_argument("--hand", type=input_file, metavar="BASE",
@@ -34,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--set", nargs="+", default=[], metavar="BONE=MM", dest="lengths",
                         help="enter lengths by hand, as index.proximal=41")
     parser.add_argument("--name", help="what the hand is called (default: after the recording; with --set: as before)")
-    parser.add_argument("--out", type=Path, metavar="HAND", help="write the hand file here")
+    add_out_argument(parser, "write the hand file here", metavar="HAND")
     add_json_argument(parser)
     add_examples(parser, "rhot calibrate bones --log free.rhotlog --rig desk.json --out mine.json",
                  "rhot calibrate bones --set index.proximal=41 middle.proximal=46 --out mine.json")

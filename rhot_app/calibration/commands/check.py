@@ -6,7 +6,8 @@ import argparse
 import math
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_json_argument, add_rig_argument, rig_of, tell
+from rhot_app.calibration.commands.output import add_rig_or_file, rig_of, tell
+from rhot_app.options import add_json_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot check``."""
-    add_rig_argument(parser)
+    add_rig_or_file(parser)
     add_json_argument(parser)
     add_examples(parser, "rhot check --rig desk.json", "rhot check --rig desk.json --json")
 

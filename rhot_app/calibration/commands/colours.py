@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.calibration.commands.output import show
 from rhot_app.errors import CalibrationError, input_file
+from rhot_app.options import add_json_argument, add_out_argument
 from rhot_node.errors import PictureError
 from rhot_node.terminal import add_examples
 
@@ -63,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--markers", type=input_file, metavar="BASE", help="marker file whose markers are learnt anew")
     parser.add_argument("--skin", action="append", default=[], metavar="x,y,w,h",
                         help="a box on bare skin (@2=x,y,w,h: in the second picture)")
-    parser.add_argument("--out", type=Path, required=True, metavar="MARKERS", help="marker file to write")
+    add_out_argument(parser, "marker file to write", required=True, metavar="MARKERS")
     add_json_argument(parser)
     add_examples(
         parser, "rhot calibrate colours --image hand.png --sample thumb=310,204,12,10 --out markers.json",

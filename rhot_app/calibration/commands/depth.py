@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
+from rhot_app.calibration.commands.output import require_folder, show
 from rhot_app.calibration.registry import DEPTH
 from rhot_app.errors import CalibrationError, input_file, positive_number
+from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -24,9 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot calibrate depth``."""
     parser.add_argument("--table", type=input_file, required=True, metavar="CSV",
                         help="measured distances and disparities, columns real_cm and disparity_px")
-    parser.add_argument("--rig", type=input_file, metavar="FILE", help="the rig whose two cameras were used")
-    parser.add_argument("--out", type=Path, metavar="FILE",
-                        help="write the rig with this law as its way to find distance")
+    add_rig_argument(parser, "the rig whose two cameras were used")
+    add_out_argument(parser, "write the rig with this law as its way to find distance")
     parser.add_argument("--baseline-mm", type=positive_number, metavar="B",
                         help="distance of the cameras, to compare with theory (default: the rig's, or 75)")
     parser.add_argument("--view-angle-deg", type=positive_number, metavar="A",

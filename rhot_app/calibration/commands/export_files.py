@@ -8,20 +8,20 @@ import re
 from pathlib import Path
 
 from rhot_app.calibration.commands.output import FORMAT_NAMES, add_length_arguments, require_folder, unit_of
-from rhot_app.errors import CalibrationError, input_file, refuse_existing
-from rhot_app.options import add_force_argument
+from rhot_app.errors import CalibrationError, refuse_existing
+from rhot_app.options import add_force_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot calibrate export``."""
-    parser.add_argument("--rig", type=input_file, required=True, metavar="RIG", help="the rig file")
+    add_rig_argument(parser, "the rig file", required=True)
     parser.add_argument("--format", choices=FORMAT_NAMES, required=True, help="whose file it is to be")
     parser.add_argument("--camera", action="append", default=[], metavar="NAME",
                         help="a camera of the rig, once per camera, in the order of the file (default: all)")
     add_length_arguments(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE",
-                        help="file to write; of ROS, which has a file for each camera, a new folder for a pair")
+    add_out_argument(parser, "file to write; of ROS, which has a file for each camera, a new folder for a pair",
+                     required=True)
     add_force_argument(parser)
     add_examples(parser, "rhot calibrate export --rig desk.json --format kalibr --out camchain.yaml",
                  "rhot calibrate export --rig desk.json --format opencv --unit mm --out stereo.yml")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.calibration.commands.output import show
 from rhot_app.calibration.registry import FILTERS
 from rhot_app.errors import CalibrationError, input_file, positive_number
+from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="10 s of a hand held still, recorded by rhot engine --log or the app")
     parser.add_argument("--log-fast", type=input_file, required=True, metavar="LOG",
                         help="10 s of a hand that waves briskly")
-    parser.add_argument("--rig", type=input_file, required=True, metavar="FILE", help="the rig, calibrated")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the rig with the proposed filters")
+    add_rig_argument(parser, "the rig, calibrated", required=True)
+    add_out_argument(parser, "write the rig with the proposed filters")
     parser.add_argument("--per-marker", action="store_true", help="write each marker's own settings too")
     parser.add_argument("--jitter-mm", type=positive_number, default=None, metavar="J",
                         help="jitter at rest that is allowed, mm rms (default 0.4)")

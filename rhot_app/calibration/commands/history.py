@@ -6,8 +6,9 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import add_json_argument, add_rig_argument, rig_of
+from rhot_app.calibration.commands.output import add_rig_or_file, rig_of
 from rhot_app.errors import positive_count
+from rhot_app.options import add_json_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot history``."""
-    add_rig_argument(parser)
+    add_rig_or_file(parser)
     parser.add_argument("--restore", type=positive_count, metavar="N",
                         help="bring version N of the list back; what is there now becomes a version itself")
     add_json_argument(parser)

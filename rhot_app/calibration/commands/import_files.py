@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.calibration.commands.output import (
     FORMAT_NAMES,
     UNITS_M,
-    add_json_argument,
     add_length_arguments,
     require_folder,
     show,
     unit_of,
 )
 from rhot_app.errors import CalibrationError, input_file
+from rhot_app.options import add_json_argument, add_out_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--keep-world", action="store_true",
                         help="the file's world is the rig frame, and its z axis points up (default: the first camera "
                              "is the rig frame)")
-    parser.add_argument("--out", type=Path, metavar="RIG", help="rig to write")
+    add_out_argument(parser, "rig to write", metavar="RIG")
     parser.add_argument("--intrinsics", type=Path, metavar="FILE",
                         help="intrinsics file to write, of one camera, for calibrate stereo")
     add_json_argument(parser)

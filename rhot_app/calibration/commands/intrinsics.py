@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
+from rhot_app.calibration.commands.output import add_board_arguments, board_of, require_folder, show
 from rhot_app.calibration.registry import LENS
+from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -21,8 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="pictures of one camera, such as 'left*.jpg', or films of a moving board")
     add_board_arguments(parser)
     parser.add_argument("--square-pixels", action="store_true", help="the same focal length along x and y")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="intrinsics file to write, for calibrate stereo")
-    parser.add_argument("--rig", type=Path, metavar="RIG", help="rig to put them into")
+    add_out_argument(parser, "intrinsics file to write, for calibrate stereo")
+    add_rig_argument(parser, "rig to put them into", exists=False)
     parser.add_argument("--node", metavar="NAME", help="the rig's camera that took the pictures")
     add_json_argument(parser)
     add_examples(parser, "rhot calibrate intrinsics --images 'left*.jpg' --square-mm 24.8 --out left.json",

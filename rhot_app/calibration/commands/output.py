@@ -11,25 +11,21 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.calibration.board.standard_board import KINDS, SPACING_MM, SQUARE_MM, TAG_SPACING
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.errors import CalibrationError, input_file, positive_number
+from rhot_app.options import add_rig_argument
 
 if TYPE_CHECKING:
     from rhot_app.calibration.board.boards import Board
 
 
-def add_json_argument(parser: argparse.ArgumentParser) -> None:
-    """``--json``, the same everywhere."""
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
-
-
-def add_rig_argument(parser: argparse.ArgumentParser) -> None:
+def add_rig_or_file(parser: argparse.ArgumentParser) -> None:
     """``--rig FILE``; scripts from before it may give the file alone."""
     given = parser.add_mutually_exclusive_group()
-    given.add_argument("--rig", type=Path, metavar="FILE", help="the rig file")
+    add_rig_argument(given, exists=False)
     given.add_argument("file", type=Path, nargs="?", help=argparse.SUPPRESS)
 
 
 def rig_of(args: argparse.Namespace) -> Path:
-    """The rig file of `add_rig_argument`. Raises RigError without one."""
+    """The rig file of `add_rig_or_file`. Raises RigError without one."""
     from rhot_app.errors import RigError
 
     if args.rig is None and args.file is None:

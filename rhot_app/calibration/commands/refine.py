@@ -9,9 +9,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
+from rhot_app.calibration.commands.output import require_folder, show
 from rhot_app.calibration.registry import REFINED
 from rhot_app.errors import CalibrationError, RecordingError, RhotError, input_file
+from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
 
@@ -27,8 +28,8 @@ SCALE_S = 120.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot refine``."""
     parser.add_argument("log", type=input_file, metavar="LOG", help="a raw log of a hand that moves through the volume")
-    parser.add_argument("--rig", type=input_file, metavar="FILE", help="rig to check (default: the log's own)")
-    parser.add_argument("--out", type=Path, metavar="RIG", help="write the refined rig here")
+    add_rig_argument(parser, "rig to check (default: the log's own)")
+    add_out_argument(parser, "write the refined rig here", metavar="RIG")
     parser.add_argument("--use", action="store_true",
                         help="write it to --rig; what is there is kept (rhot history)")
     parser.add_argument("--no-scale", action="store_true", help="do not estimate the hand's size, which takes longest")

@@ -8,9 +8,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_board_arguments, add_json_argument, board_of, require_folder, show
+from rhot_app.calibration.commands.output import add_board_arguments, board_of, require_folder, show
 from rhot_app.calibration.registry import STEREO
 from rhot_app.errors import CalibrationError, finite, positive_number
+from rhot_app.options import add_json_argument, add_out_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                      help="the board lying on the table: the world's z points up from it")
     rig.add_argument("--rig-from", type=Path, metavar="RIG",
                      help="rig to begin with (default: --out, or the shipped one)")
-    rig.add_argument("--out", type=Path, metavar="RIG", help="rig to write")
+    add_out_argument(rig, "rig to write", metavar="RIG")
     add_json_argument(parser)
     add_examples(
         parser, "rhot calibrate stereo --left 'left*.jpg' --right 'right*.jpg' --square-mm 24.8 --out desk.json",

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from rhot_app.calibration.board.standard_board import KINDS, TAG_SPACING
 from rhot_app.calibration.commands.output import SIZE_HELP, SQUARE_HELP, require_folder
 from rhot_app.errors import positive_number
+from rhot_app.options import add_out_argument
 from rhot_node.terminal import add_examples
 
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dictionary", metavar="NAME", help="the markers' dictionary (default DICT_4X4_50)")
     parser.add_argument("--legacy-pattern", action="store_true", help="the ChArUco layout of OpenCV before 4.6")
     parser.add_argument("--paper", default="A4", help="A5, A4 (default), A3, A2, A1, A0, letter, legal or tabloid")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="file to write, .pdf or .svg")
+    add_out_argument(parser, "file to write, .pdf or .svg", required=True)
     add_examples(parser, "rhot target chessboard --out board.pdf",
                  "rhot target aprilgrid --board 6x6 --paper A3 --square-mm 35 --out board.pdf")
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_json_argument, show
+from rhot_app.calibration.commands.output import show
 from rhot_app.calibration.registry import TIME
 from rhot_app.errors import input_file
+from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -20,9 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot calibrate time``."""
     parser.add_argument("--log", type=input_file, required=True, metavar="LOG",
                         help="20 s of a hand that waves up and down, recorded by rhot engine --log or the app")
-    parser.add_argument("--rig", type=input_file, required=True, metavar="FILE",
-                        help="the rig, its geometry calibrated")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the rig with corrected times")
+    add_rig_argument(parser, "the rig, its geometry calibrated", required=True)
+    add_out_argument(parser, "write the rig with corrected times")
     add_json_argument(parser)
     add_examples(parser, "rhot calibrate time --log wave.rhotlog --rig desk.json",
                  "rhot calibrate time --log wave.rhotlog --rig desk.json --out desk.json")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from rhot_app.engine.command import add_serving_arguments, asked_outputs, print_addresses
 from rhot_app.errors import RecordingError, input_file
+from rhot_app.options import add_json_argument, add_rig_argument, add_tracker_argument
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
 
@@ -28,17 +29,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot replay``."""
     parser.add_argument("path", type=input_file, metavar="LOG",
                         help="a raw log written by rhot engine --log or the app")
-    parser.add_argument("--rig", type=input_file, metavar="FILE",
-                        help="track with this rig instead of the one the log was recorded with")
-    parser.add_argument("--tracker", choices=("classic", "estimator"), default=None,
-                        help="track with this tracker instead of the one that the rig asks for")
+    add_rig_argument(parser, "track with this rig instead of the one the log was recorded with")
+    add_tracker_argument(parser, "track with this tracker instead of the one that the rig asks for")
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="N",
                         help="times real time, or max for as fast as possible (default 1)")
     parser.add_argument("--smooth", action="store_true",
                         help="let every state use what comes after it as well (estimator); the whole log is "
                              "tracked before the replay begins")
-    parser.add_argument("--json", action="store_true",
-                        help="serve nothing: replay at once and print a summary as one JSON object")
+    add_json_argument(parser, "serve nothing: replay at once and print a summary as one JSON object")
     parser.add_argument("--keep", action="store_true",
                         help="go on serving after the log's end: an app can look at the last state, or replay again")
     add_serving_arguments(parser)

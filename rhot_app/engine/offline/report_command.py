@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.engine.directory import default_directory
-from rhot_app.options import add_force_argument
+from rhot_app.options import add_directory_argument, add_force_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -18,12 +18,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot report``."""
     parser.add_argument("log", type=Path, nargs="?", metavar="LOG",
                         help="a raw log that shows the fault, for its last minute (default: what is being recorded)")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE.zip", help="zip file to write")
+    add_out_argument(parser, "zip file to write", required=True, metavar="FILE.zip")
     add_force_argument(parser)
-    parser.add_argument("--rig", type=Path, metavar="FILE",
-                        help="the rig file (default: the running engine's, or the log's)")
-    parser.add_argument("--directory", type=Path, metavar="DIR",
-                        help=f"directory of the engine (default {default_directory()})")
+    add_rig_argument(parser, "the rig file (default: the running engine's, or the log's)", exists=False)
+    add_directory_argument(parser, f"directory of the engine (default {default_directory()})")
     add_examples(parser, "rhot report --out fault.zip", "rhot report wave.rhotlog --out fault.zip --force")
 
 

@@ -9,8 +9,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_json_argument, require_folder, show
+from rhot_app.calibration.commands.output import require_folder, show
 from rhot_app.errors import CalibrationError, input_file, positive_number
+from rhot_app.options import add_json_argument, add_out_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="positions of a fingertip or tag on that tracker, t,x,y,z in s and m, rig frame")
     parser.add_argument("--search", type=positive_number, default=1.0, metavar="S",
                         help="search the time offset within this, either way (default: 1 s)")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the alignment")
+    add_out_argument(parser, "write the alignment")
     parser.add_argument("--check", type=input_file, metavar="FILE",
                         help="solve nothing: say whether the streams still agree with this alignment, or it is stale")
     add_json_argument(parser)

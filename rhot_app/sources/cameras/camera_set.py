@@ -21,6 +21,7 @@ from platformdirs import user_data_path
 
 from rhot_app.errors import RigError, SourceError
 from rhot_app.hand.anatomy import load_hand
+from rhot_app.options import add_json_argument
 from rhot_app.project import Intrinsics, Rig, RigNode, TrackerSettings, load_rig
 from rhot_app.rig_history import accept
 from rhot_app.sources.local_nodes import NodePorts
@@ -264,7 +265,7 @@ def names_of(sources: Sequence[CameraSource]) -> list[str]:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot cameras``."""
-    parser.add_argument("--json", action="store_true", help="print one JSON object: the cameras with all their modes")
+    add_json_argument(parser, "print one JSON object: the cameras with all their modes")
     add_examples(parser, "rhot cameras", "rhot cameras --json")
 
 

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.errors import SourceError, positive_number, refuse_existing
-from rhot_app.options import add_force_argument
+from rhot_app.errors import SourceError, refuse_existing
+from rhot_app.options import add_force_argument, add_json_argument, add_out_argument, add_seconds_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -24,11 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="openvr, libsurvive, run:PROGRAM, tcp:HOST:PORT, udp:PORT, or a CSV file")
     parser.add_argument("--tracker", default="", metavar="NAME",
                         help="the tracker's serial number or role (default: the only one)")
-    parser.add_argument("--seconds", type=positive_number, default=20.0, metavar="N",
-                        help="how long to listen (default: 20); a CSV file is read whole")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the tracked poses as CSV")
+    add_seconds_argument(parser, "how long to listen; a CSV file is read whole", 20.0)
+    add_out_argument(parser, "write the tracked poses as CSV")
     add_force_argument(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object on standard output")
+    add_json_argument(parser)
     add_examples(parser, "rhot poses --source openvr --seconds 60 --out tracker.csv",
                  "rhot poses --source tcp:192.168.0.5:4000 --tracker LHR-1")
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.errors import CalibrationError, input_file, not_negative
+from rhot_app.options import add_rig_argument, add_settings_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot fit-hand``."""
-    parser.add_argument("--rig", type=input_file, required=True, metavar="RIG", help="the calibrated rig")
+    add_rig_argument(parser, "the calibrated rig", required=True)
     parser.add_argument("--pictures", nargs="+", action="append", required=True, metavar="[NAME=]FILE",
                         help="pictures or videos of one instant, in the order of the rig's cameras or with their "
                              "names; give it again for another instant")
@@ -28,8 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--hand", type=input_file, metavar="HAND",
                         help="hand file to begin with (default: the rig's hand)")
     parser.add_argument("--save", type=Path, metavar="OUT", help="where Save writes the hand file (default: asked for)")
-    parser.add_argument("--settings", type=Path, metavar="FILE",
-                        help="remember settings in this file instead of the user's configuration folder")
+    add_settings_argument(parser, "settings")
     add_examples(parser, "rhot fit-hand --rig desk.json --pictures left.png right.png --save mine.json",
                  "rhot fit-hand --rig desk.json --pictures left=left.mp4 right=right.mp4 --at 1.5 3")
 
