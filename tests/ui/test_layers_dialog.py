@@ -49,7 +49,7 @@ def test_the_masks_follow_the_hand_until_they_are_paused(layers):
     bench.run(0.2)
     assert dialog.shown is held
     bench.press(Qt.Key.Key_F1, dialog)
-    assert bench.window.guide_page == "scene"
+    assert dialog.tools.guide.page == "scene"
 
 
 def test_each_camera_has_its_own_picture(layers):

@@ -44,13 +44,12 @@ def hand() -> Hand:
 
 @pytest.fixture
 def window(themed, qtbot, hand):
-    rig, opened = synthetic_rig(), []
-    window = MouseWindow(hand, lambda: rig, DARK, lambda: opened.append("guide"), clock=lambda: hand.clock_s)
-    window.opened = opened
+    rig = synthetic_rig()
+    window = MouseWindow(hand, lambda: rig, DARK, clock=lambda: hand.clock_s)
     qtbot.addWidget(window)
     Person(window)
     hand.be(states=REST)
-    window.step()
+    window.tick()
     yield window
     window.close()
 
@@ -67,16 +66,16 @@ def carry(window: MouseWindow, hand: Hand, ball: int, *place: float) -> None:
     start = to(window, ball)
     for where, angles in ((start, {}), (start, SPREAD["thumb"]), (place, SPREAD["thumb"]), (place, {})):
         hand.be(*where, **angles)
-        window.step()
+        window.tick()
 
 
 def test_a_ball_is_picked_moved_and_brought_back_by_undo(window, hand):
     before = window.pick.balls[1].centre
     hand.be(*to(window, 1))
-    window.step()
+    window.tick()
     assert all(word in window.sentence.text() for word in ("thumb", "pick", "blue"))
     hand.be(*to(window, 1), **SPREAD["thumb"])
-    window.step()
+    window.tick()
     assert window.words["thumb"].text() == "Thumb DOWN"
     assert "moves with the cursor" in window.sentence.text()
     carry(window, hand, 1, 0.0, 0.0, 0.0)
@@ -84,38 +83,38 @@ def test_a_ball_is_picked_moved_and_brought_back_by_undo(window, hand):
     assert window.pick.balls[1].centre[:2] == pytest.approx((0.0, 0.0), abs=1e-6)
     QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert window.pick.balls[1].centre == before
-    window.step()
+    window.tick()
     assert "back where it was" in window.sentence.text()
 
 
 def test_undo_without_a_move_is_a_sentence(window):
     QTest.mouseClick(window.undo_button, Qt.MouseButton.LeftButton)
-    window.step()
+    window.tick()
     assert "nothing to undo" in window.sentence.text()
 
 
 def test_a_lost_hand_and_a_silent_engine_are_said_and_nothing_is_lost(window, hand):
     carry(window, hand, 1, 0.0, 0.0, 0.0)
     hand.waiting.append(lost(hand.number))
-    window.step()
+    window.tick()
     assert "No hand is tracked" in window.sentence.text() and window.badge.word == "LOST"
     moved = list(window.pick.balls)
     hand.clock_s += 100.0
-    window.step()
+    window.tick()
     assert "No engine is heard" in window.sentence.text() and window.badge.word == "NO RIG"
     assert window.pick.balls == moved
     hand.be(states=2)
-    window.step()
+    window.tick()
     assert window.badge.word == "TRACKING"
 
 
 def test_h_takes_another_rest(window, hand):
     hand.be(0.05, 0.0, 0.0)
-    window.step()
+    window.tick()
     assert "+150 mm" in window.place.text()
     QTest.keyClick(window, Qt.Key.Key_H)
     hand.be(0.05, 0.0, 0.0, states=REST)
-    window.step()
+    window.tick()
     assert "right   +0 mm" in window.place.text()
 
 
@@ -128,10 +127,10 @@ def test_the_target_test_is_begun_clicked_through_and_ended(window, hand):
         x, y = test.targets[wanted] / window.mouse.settings.gain
         for angles in ({}, SPREAD["thumb"], {}):
             hand.be(x, y, 0.0, states=3, **angles)
-            window.step()
+            window.tick()
     assert "bit/s" in window.sentence.text() and "0 missed" in window.sentence.text()
     QTest.mouseClick(window.undo_button, Qt.MouseButton.LeftButton)
-    window.step()
+    window.tick()
     assert "moves no ball" in window.sentence.text()
     QTest.keyClick(window, Qt.Key.Key_T)
     assert window.test is None and window.pick.balls == balls
@@ -139,17 +138,17 @@ def test_the_target_test_is_begun_clicked_through_and_ended(window, hand):
 
 def test_a_ball_that_is_held_stays_while_the_target_test_is_done(window, hand):
     hand.be(*to(window, 1))
-    window.step()
+    window.tick()
     hand.be(*to(window, 1), **SPREAD["thumb"])
-    window.step()
+    window.tick()
     assert window.pick.held == 1
     QTest.keyClick(window, Qt.Key.Key_T)
     balls = list(window.pick.balls)
     hand.be(0.0, 0.05, 0.0, **SPREAD["thumb"])
-    window.step()
+    window.tick()
     QTest.keyClick(window, Qt.Key.Key_T)
     hand.be(0.0, 0.05, 0.0, states=2, **SPREAD["thumb"])
-    window.step()
+    window.tick()
     assert window.pick.held is None and window.pick.balls == balls
 
 
@@ -158,13 +157,13 @@ def test_the_palm_can_set_the_height(window, hand):
     QTest.keyClick(window.height_box, Qt.Key.Key_Down)
     hand.be(states=REST)
     hand.be(0.0, 0.0, 0.02)
-    window.step()
+    window.tick()
     assert "height 120 mm" in window.place.text()
 
 
 def test_f1_opens_the_guide_and_closing_ends_the_client(window, hand):
     QTest.keyClick(window, Qt.Key.Key_F1)
-    assert window.opened == ["guide"]
+    assert window.tools.guide.page == "mouse" and window.tools.guide.isVisible()
     window.close()
     assert hand.closed
 

@@ -166,8 +166,8 @@ class Dialogs:
     def show_mouse(self, controller: Controller, scheme: Scheme) -> None:
         """The 3-D mouse beside the window; with or without a rig."""
         if self.mouse is None:
-            self._hold("mouse", MouseWindow(controller.backend.client(), lambda: controller.rig, scheme,
-                                            lambda: self.open_guide("mouse"), self._parent, controller.clock))
+            self._hold("mouse", MouseWindow(controller.backend.client(), lambda: controller.rig, scheme, self._parent,
+                                            controller.clock))
         _bring_forward(self.mouse)
 
     def show_layers(self, controller: Controller, scheme: Scheme) -> None:
@@ -175,7 +175,7 @@ class Dialogs:
         if self.layers is None:
             from rhot_app.ui.dialogs.layers_dialog import LayersDialog
 
-            self._hold("layers", LayersDialog(controller, scheme, lambda: self.open_guide("scene"), self._parent))
+            self._hold("layers", LayersDialog(controller, scheme, self._parent))
         _bring_forward(self.layers)
 
     def set_scheme(self, scheme: Scheme) -> None:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
-from PySide6.QtCore import QRectF, QSize, Qt, QTimer
-from PySide6.QtGui import QColor, QIcon, QImage, QKeySequence, QPainter, QPixmap, QShortcut
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPixmap
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
-    QDialog,
     QHBoxLayout,
     QListWidget,
     QListWidgetItem,
@@ -25,8 +23,8 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.keys import bind_space
 from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.models.layers import LayerPicture, LayerPictures
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.picture_painter import fit
@@ -35,24 +33,19 @@ TICK_MS: Final = 60
 NEAR_NS: Final = 50_000_000
 """No state is nearer to a picture's time: the hand was not tracked in it."""
 
-_SIZE, _LIST_PX, _SWATCH_PX = (1000, 640), 220, 14
+_SIZE, _LIST_PX, _SWATCH_PX = QSize(1000, 640), 220, 14
 NO_HAND = "No hand is tracked, so there are no layers. Press Start, and show the hand to the cameras."
 FIRST = "The first picture takes a moment, the very first one of all half a minute."
 _LEGEND = ("1 is the link that nothing hides. A line is white beside the background, and black before another link. A "
            "number in brackets: the links hide each other in a circle, which is cut there.")
 
 
-class LayersDialog(QDialog):
-    """`step` is one turn of the timer. `shown` is the drawing, `shown_of` its camera and state; None for none."""
+class LayersDialog(ToolWindow):
+    """`shown` is the drawing, `shown_of` its camera and state; None for none."""
 
-    def __init__(self, controller: Controller, scheme: Scheme, open_guide: Callable[[], None],
-                 parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, controller: Controller, scheme: Scheme, parent: QWidget | None = None) -> None:
+        super().__init__("Layers of the hand", "scene", parent, _SIZE)
         self._controller = controller
-        self.setWindowTitle("Layers of the hand")
-        self.setProperty("guide", "scene")
-        self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
-        self.resize(*_SIZE)
         self._drawer: LayerPictures | None = None
         self._job: Job | None = None
         self._drawn: tuple[object, ...] = ()
@@ -77,12 +70,8 @@ class LayersDialog(QDialog):
         self.list.setAccessibleName("Visibility order")
         self.sentence = Sentence(2)
         self._lay_out()
-        bind_space(self, self.pause_button.toggle)
-        QShortcut(QKeySequence("F1"), self).activated.connect(open_guide)
-        self._timer = QTimer(self)
-        self._timer.timeout.connect(self.step)
-        self._timer.start(TICK_MS)
-        self.step()
+        self.start(TICK_MS, {}, self.pause_button.toggle)
+        self.tick()
 
     def _lay_out(self) -> None:
         top, middle = QHBoxLayout(), QHBoxLayout()
@@ -103,7 +92,7 @@ class LayersDialog(QDialog):
         """Other colours."""
         self.picture.set_scheme(scheme)
 
-    def step(self) -> None:
+    def tick(self) -> None:
         """Take in the newest state and picture, and have them drawn, one at a time."""
         self._follow(self._controller.rig)
         live = self._controller.live
@@ -169,11 +158,6 @@ class LayersDialog(QDialog):
     def _failed(self, sentence: str) -> None:
         self._job = None
         self.sentence.setText(sentence)
-
-    def done(self, result: int) -> None:
-        """Nothing goes on behind a closed window."""
-        self._timer.stop()
-        super().done(result)
 
 
 class _Picture(QWidget):

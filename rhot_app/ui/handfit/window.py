@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
-from PySide6.QtCore import QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMessageBox, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QWidget
 
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.handfit.quantities import Number
 from rhot_app.handfit.session import HandFit
-from rhot_app.ui.common.guide import GuideViewer
-from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.keys import bind_space
+from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.handfit.changes import Changes
 from rhot_app.ui.handfit.frame import FitFrame, Kept
 from rhot_app.ui.handfit.instants import TITLE, Instants, LiveCameras
@@ -25,25 +24,19 @@ REASON: Final = "hand fitted to pictures"
 """In the history of a rig file."""
 
 TICK_MS: Final = 50
-_SIZE: Final = (1280, 800)
 _FREEDOM_KEY, _SD_KEY = "fit/freedom", "fit/anchor sd px"
-_KEEP = "The hand was changed and not saved. Close without it?"
 
 
-class HandFitWindow(QDialog):
+class HandFitWindow(ToolWindow):
     """Shows one `HandFit`. `used` when the rig has the hand. `cameras`: None while none run."""
 
+    losing = "The hand was changed and not saved. Close without it?"
     used = Signal()
 
     def __init__(self, fit: HandFit, scheme: Scheme, memory: SettingsStore, kept: Kept, live: LiveCameras | None = None,
                  parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(TITLE, "fitting", parent)
         self.fit, self.cameras, self._memory = fit, live, memory
-        self.setWindowTitle(TITLE)
-        self.setProperty("guide", "fitting")
-        self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
-        self.resize(parent.window().size() if parent is not None else QSize(*_SIZE))
-        self._guide: GuideViewer | None = None
         self.frame = FitFrame(fit, scheme, kept, self, live=live is not None)
         self._changes = Changes(fit, kept, memory, self)
         self._instants = Instants(self._changes, self.frame, memory, live, self)
@@ -52,9 +45,11 @@ class HandFitWindow(QDialog):
         self._instants.show_list()
         if live is not None:
             live.feed.start()
-        self._timer = QTimer(self)
-        self._timer.timeout.connect(self._instants.show_newest)
-        self._timer.start(TICK_MS)
+        changes, instants = self._changes, self._instants
+        self.start(TICK_MS, {
+            "Ctrl+O": instants.choose_pictures, "Ctrl+S": changes.save, "Ctrl+Shift+Z": changes.redo,
+            "Ctrl+Y": changes.redo, "Ctrl+Return": changes.fit_to_anchors,
+            "Ctrl+Shift+Return": changes.fit_to_contours, "F": instants.frame_hand}, instants.take_pictures)
 
     # -- putting it together ---------------------------------------------------------------------------------------
 
@@ -73,13 +68,6 @@ class HandFitWindow(QDialog):
                 (frame.save_button, changes.save), (frame.use_button, changes.use), (frame.close_button, self.reject),
                 (frame.cancel_button, changes.cancel)):
             button.clicked.connect(lambda checked=False, action=action: action())
-        bind_space(self, instants.take_pictures)
-        for key, action in (("Ctrl+O", instants.choose_pictures),
-                            ("Ctrl+S", changes.save), ("Ctrl+Z", self._undo_key), ("Ctrl+Shift+Z", changes.redo),
-                            ("Ctrl+Y", changes.redo), ("Ctrl+Return", changes.fit_to_anchors),
-                            ("Ctrl+Shift+Return", changes.fit_to_contours), ("F", instants.frame_hand),
-                            ("F1", self.open_guide)):
-            QShortcut(QKeySequence(key), self).activated.connect(action)
         for camera, view in enumerate(frame.views):
             view.grabbed.connect(lambda joint, camera=camera: changes.edit(lambda: self.fit.grab(camera, joint)))
             view.dragged.connect(lambda x, y, last: changes.edit(lambda: self.fit.drag((x, y), last=last)))
@@ -183,46 +171,23 @@ class HandFitWindow(QDialog):
 
     # -- keys and the end ------------------------------------------------------------------------------------------
 
-    def _undo_key(self) -> None:
-        focus = QApplication.focusWidget()
-        if isinstance(focus, QLineEdit) and focus.isUndoAvailable():
-            focus.undo()
-        else:
-            self._changes.undo()
+    def tick(self) -> None:
+        """The newest pictures while the cameras are shown."""
+        self._instants.show_newest()
 
-    def open_guide(self) -> None:
-        """The page of the guide."""
-        if self._guide is None:
-            self._guide = GuideViewer(self)
-        self._guide.open_page("fitting")
+    def undo(self) -> None:
+        """Take the last change back."""
+        self._changes.undo()
 
-    def reject(self) -> None:
-        """Escape and Close: ask only when something would be lost."""
-        if not self.fit.unsaved or self._may_lose():
-            super().reject()
+    @property
+    def would_lose(self) -> bool:
+        """Whether the hand was changed and not saved."""
+        return self.fit.unsaved
 
-    def done(self, result: int) -> None:
-        """What runs ends with the window."""
-        self.end()
-        super().done(result)
-
-    def _may_lose(self) -> bool:
-        answer = QMessageBox.question(self, TITLE, _KEEP,
-                                      QMessageBox.StandardButton.Discard | QMessageBox.StandardButton.Cancel,
-                                      QMessageBox.StandardButton.Cancel)
-        return answer == QMessageBox.StandardButton.Discard
-
-    def end(self) -> Job:
-        """Stop what runs, in a worker, because a question to a node may be under way."""
-        self._timer.stop()
+    def stop(self) -> Callable[[], None] | None:
+        """Fits under way, and the cameras' pictures."""
         self._changes.end()
-        live = self.cameras
-
-        def stop() -> None:
-            if live is not None:
-                live.stop()
-
-        return Job(lambda progress: stop(), lambda _: None, lambda sentence: None).start()
+        return None if self.cameras is None else self.cameras.stop
 
 
 def _error_words(errors: list[float]) -> str:

@@ -6,9 +6,8 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QComboBox, QDialog, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import RhotError
@@ -23,6 +22,7 @@ from rhot_app.ui.backend.live import SILENCE_S
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.common.theme import app_font
+from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import NO_RIG, condition_look
@@ -33,7 +33,7 @@ TICK_MS: Final = 16
 TOLD_S: Final = 6.0
 """What was done stands so long, as in the main window."""
 
-_SIZE: Final = (960, 720)
+_SIZE: Final = QSize(960, 720)
 _SHAPE_PX: Final = 18
 _READOUT_PT: Final = 14.0
 _NAMES: Final = {"thumb": "Thumb", "little": "Little finger"}
@@ -42,19 +42,14 @@ NO_ENGINE: Final = ("No engine is heard, so no hand moves the mouse. Open a rig,
                     "window and press Start.")
 
 
-class MouseWindow(QDialog):
-    """`listener` is this window's own; `rig` gives the rig that is open. `step` is one turn of the timer."""
+class MouseWindow(ToolWindow):
+    """`listener` is this window's own; `rig` gives the rig that is open."""
 
-    def __init__(self, listener: Listener, rig: Callable[[], Rig | None], scheme: Scheme,
-                 open_guide: Callable[[], None], parent: QWidget | None = None,
+    def __init__(self, listener: Listener, rig: Callable[[], Rig | None], scheme: Scheme, parent: QWidget | None = None,
                  clock: Callable[[], float] = time.monotonic) -> None:
         """`clock` gives seconds."""
-        super().__init__(parent)
+        super().__init__("3-D mouse", "mouse", parent, _SIZE)
         self._clock = clock
-        self.setWindowTitle("3-D mouse")
-        self.setProperty("guide", "mouse")
-        self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
-        self.resize(*_SIZE)
         self._listener, self._rig, self._scheme = listener, rig, scheme
         self._followed: Rig | None = None
         self._heard_s = clock()
@@ -68,13 +63,8 @@ class MouseWindow(QDialog):
         self.view.frameSwapped.connect(lambda: self.pacer.end(time.monotonic()))
         self._make_parts(scheme)
         self._lay_out()
-        for key, action in (("H", self.take_rest), ("T", self.begin_or_end_test), ("Ctrl+Z", self.undo),
-                            ("F1", open_guide)):
-            QShortcut(QKeySequence(key), self).activated.connect(action)
-        self._timer = QTimer(self)
-        self._timer.timeout.connect(self.step)
-        self._timer.start(TICK_MS)
-        self.step()
+        self.start(TICK_MS, {"H": self.take_rest, "T": self.begin_or_end_test})
+        self.tick()
 
     def _make_parts(self, scheme: Scheme) -> None:
         self.rest_button = _button("Rest here", "The hand as it lies for the next half second becomes the cursor's "
@@ -147,7 +137,7 @@ class MouseWindow(QDialog):
 
     # -- every tick ------------------------------------------------------------------------------------------------
 
-    def step(self) -> None:
+    def tick(self) -> None:
         """Take in what arrived, and show it."""
         if self._rig() is not self._followed:
             self._followed = self._rig()
@@ -221,11 +211,9 @@ class MouseWindow(QDialog):
         self.badge.set_scheme(scheme)
         self.view.set_scheme(scheme)
 
-    def done(self, result: int) -> None:
-        """Stop listening, however the window is closed."""
-        self._timer.stop()
+    def stop(self) -> None:
+        """Listening."""
         self._listener.close()
-        super().done(result)
 
 
 def _button(title: str, meaning: str, action: Callable[[], None]) -> QPushButton:

@@ -10,9 +10,9 @@ from typing import Any
 
 import msgspec
 from platformdirs import user_cache_path
-from PySide6.QtCore import QEvent, Qt, QUrl, Signal
+from PySide6.QtCore import QEvent, QSize, Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices, QKeySequence, QShortcut
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app.errors import RhotError
 from rhot_app.keys import load_master_keys
@@ -22,6 +22,7 @@ from rhot_app.recording.video import Collected, collect_videos
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.job import Job, Progress
 from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import Remaining
 from rhot_app.ui.panels.empty_state import EmptyState
@@ -30,7 +31,7 @@ from rhot_app.ui.replay.library_table import RecordingTable
 from rhot_app.ui.replay.summaries import Summaries
 from rhot_app.ui.replay.work_strip import WorkStrip
 
-_SIZE = (1080, 560)
+_SIZE = QSize(1080, 560)
 
 
 def summaries_folder() -> Path:
@@ -38,7 +39,7 @@ def summaries_folder() -> Path:
     return user_cache_path("rhot", appauthor=False) / "recordings"
 
 
-class LibraryWindow(QDialog):
+class LibraryWindow(ToolWindow):
     """`open_asked` gives a recording's path; `renamed` its path before and after. `folder` holds the
     recordings; `rig`: the one that is open."""
 
@@ -48,11 +49,7 @@ class LibraryWindow(QDialog):
     def __init__(self, scheme: Scheme, folder: Path, cache: Path | None = None,
                  parent: QWidget | None = None, rig: Callable[[], Rig | None] = lambda: None,
                  make_solver: Callable[[], Solver] = Solver) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Recordings")
-        self.setProperty("guide", "recording")
-        self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
-        self.resize(*_SIZE)
+        super().__init__("Recordings", "recording", parent, _SIZE, "The recordings")
         self.library = Library(folder, cache or summaries_folder())
         self.summaries = Summaries(self.library, make_solver(), self)
         self._listing: Job | None = None
@@ -107,6 +104,7 @@ class LibraryWindow(QDialog):
         self.strip.cancel_asked.connect(self._stop_collecting)
         self.folder_button.clicked.connect(self.open_folder)
         self.close_button.clicked.connect(self.close)
+        self.tools.bind({})
         for key, action in (("Return", self.open_chosen), ("F2", self.table.edit_name),
                             ("Delete", self.delete_chosen), ("Ctrl+Z", self.undo)):
             shortcut = QShortcut(QKeySequence(key), self.table, context=Qt.ShortcutContext.WidgetShortcut)
@@ -259,12 +257,11 @@ class LibraryWindow(QDialog):
                 not self.table.editing):
             self.refresh()
 
-    def done(self, result: int) -> None:
-        """What was deleted is gone for good now; the work on summaries ends."""
+    def stop(self) -> None:
+        """Work on summaries and videos; what was deleted is gone for good now."""
         self.summaries.close()
         self._stop_collecting()
         self.library.empty_trash()
-        super().done(result)
 
 
 def _collect(log: Path, rig: Rig | None, progress: Progress) -> list[Collected]:

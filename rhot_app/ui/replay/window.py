@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
     QFileDialog,
     QMainWindow,
@@ -21,10 +21,9 @@ from rhot_app.export.trim import Trimmed, trim_log
 from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.disposal import dispose
-from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.keys import bind_space
 from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.common.tool_window import AS_MAIN, WindowTools
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
 from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording
 from rhot_app.ui.models.notice import Notice, TransientNotices
@@ -39,7 +38,6 @@ from rhot_app.ui.replay.toolbar import BookmarkWriter, ReplayToolBar
 from rhot_app.ui.replay.work_strip import WorkStrip
 
 TICK_MS = 16
-_SIZE = (1280, 800)
 _AT_BOOKMARK_S = 0.02  # a bookmark is where it was set, to a state or two
 
 _NO_STATE = Look("NO STATE", "cross", "bad", "The recording has no state at this moment.")
@@ -57,9 +55,8 @@ class ReplayWindow(QMainWindow):
         super().__init__(parent)
         self._clock = clock
         self.setObjectName("replay window")
-        self.setWindowTitle("RHOT replay")
-        self.setProperty("guide", "recording")
-        self.resize(*_SIZE)
+        self.tools = WindowTools(self, "RHOT replay", "recording", "Replay")
+        self.resize(AS_MAIN)
         self.replay: Replay | None = None
         self.work = TrackingWork(make_solver(), states, self)
         self._settings = settings
@@ -67,7 +64,6 @@ class ReplayWindow(QMainWindow):
         self.exporting: ExportDialog | None = None
         self.trimming: Job | None = None
         self.bookmarks = BookmarkWriter(self)
-        self.guide: GuideViewer | None = None
         self.passing = TransientNotices()
         self.toolbar = ReplayToolBar(scheme, self)
         self.strip = WorkStrip()
@@ -78,10 +74,11 @@ class ReplayWindow(QMainWindow):
         self._connect()
         self._show_run()
         self.work.solver.prepare("rhot_app.ui.replay.run")
-        self._timer = QTimer(self)
-        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
-        self._timer.timeout.connect(self.tick)
-        self._timer.start(TICK_MS)
+        self.tools.start(self.tick, TICK_MS, {
+            "Left": lambda: self.step(-1), "Right": lambda: self.step(1), "Home": lambda: self.seek(0.0),
+            "End": self.go_to_end, "B": self.ask_for_bookmark, "[": lambda: self._loop("begin"),
+            "]": lambda: self._loop("end"), "F": self.parts.scene.frame_hand, "Ctrl+O": self.choose,
+            "Ctrl+E": self.export, "P": self.toolbar.pictures.trigger}, self.toggle)
 
     # -- putting it together ---------------------------------------------------------------------------------------
 
@@ -125,14 +122,6 @@ class ReplayWindow(QMainWindow):
         row.bookmark_asked.connect(self.ask_for_bookmark)
         for plot in self.parts.plots:
             plot.copied.connect(lambda sentence: self.tell("info", sentence))
-        bind_space(self, self.toggle)
-        for key, action in (("Left", lambda: self.step(-1)),
-                            ("Right", lambda: self.step(1)), ("Home", lambda: self.seek(0.0)),
-                            ("End", self.go_to_end), ("B", self.ask_for_bookmark), ("[", lambda: self._loop("begin")),
-                            ("]", lambda: self._loop("end")), ("F", self.parts.scene.frame_hand),
-                            ("Ctrl+O", self.choose), ("Ctrl+E", self.export), ("P", bar.pictures.trigger),
-                            ("F1", self.open_guide)):
-            QShortcut(QKeySequence(key), self).activated.connect(action)
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours."""
@@ -336,15 +325,9 @@ class ReplayWindow(QMainWindow):
         """Show a sentence for a while."""
         self.passing.show(Notice(level, sentence), self._clock())
 
-    def open_guide(self) -> None:
-        """The guide's page about recordings."""
-        if self.guide is None:
-            self.guide = GuideViewer(self)
-        self.guide.open_page("recording", "Replay")
-
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Free the states and end the process that tracks."""
-        self._timer.stop()
+        self.tools.timer.stop()
         self.work.close()
         if self.trimming is not None:
             self.trimming.cancel()

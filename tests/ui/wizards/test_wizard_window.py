@@ -229,8 +229,8 @@ def test_every_wizard_has_its_section_in_the_guide():
 def test_f1_opens_the_guide_beside_the_wizard(open_sample):
     hands = open_sample()
     hands.key(Qt.Key.Key_F1)
-    hands.until(lambda: hands.window.guide is not None and hands.window.guide.isVisible())
-    guide = hands.window.guide
+    hands.until(lambda: hands.window.tools.guide is not None and hands.window.tools.guide.isVisible())
+    guide = hands.window.tools.guide
     assert guide.page == "calibration"
     guide.open_page("calibration", "Stereo calibration")
     assert guide.browser.verticalScrollBar().value() > 500

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections.abc import Callable
 
-from PySide6.QtCore import QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMessageBox, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QWidget
 
 from rhot_app.ui.backend.feed import LiveFeed, Picture
-from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.keys import bind_space
+from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.frame import WizardFrame
 from rhot_app.ui.wizards.framework.page import AcceptPage
@@ -21,27 +20,21 @@ from rhot_app.ui.wizards.models.step import AcceptStep, State, Step
 
 TICK_MS = 16
 SHOW_S = 0.1
-_SIZE = (1280, 800)
 
 
-class WizardWindow(QDialog):
+class WizardWindow(ToolWindow):
     """Shows one `Definition`, as large as the window that it stands over. `rig_used` gives the rig in force after
-    "Use this calibration" and after a restore; `used` the proposal, and whether it is in force now.
+    "Use this calibration" and after a restore; `used` the proposal, and whether it is in force now."""
 
-    `tick` is one turn of the timer, so that tests can turn by hand.
-    """
-
+    losing = ("Close without using this calibration? What was captured here is lost; the calibration in force stays as "
+              "it is.")
     rig_used = Signal(object)
     used = Signal(object, bool)
 
     def __init__(self, definition: Definition, context: WizardContext, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(definition.title, definition.guide, parent, section=definition.title)
         self.definition = definition
         self._context = context
-        self.setWindowTitle(definition.title)
-        self.setProperty("guide", definition.guide)
-        self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint)
-        self.resize(parent.window().size() if parent is not None else QSize(*_SIZE))
         self.feed = LiveFeed({node.name: node.node_id for node in context.rig.nodes if not node.text_datagrams},
                              context.connect)
         self.picture_worker = PictureWorker(self.feed)
@@ -52,18 +45,13 @@ class WizardWindow(QDialog):
         self._next_show = 0.0
         self._kept = 0
         self._job: Job | None = None
-        self.guide: GuideViewer | None = None
-        self._ending: Job | None = None
         self._connect_everything()
         self._go_to(0)
         self.feed.start()
         self.picture_worker.start()
         if definition.solver:
             self.work.solver.prepare(definition.solver)
-        self._timer = QTimer(self)
-        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
-        self._timer.timeout.connect(self.tick)
-        self._timer.start(TICK_MS)
+        self.start(TICK_MS, {"Alt+Left": self.back}, self._capture)
 
     def _connect_everything(self) -> None:
         frame = self.frame
@@ -77,9 +65,6 @@ class WizardWindow(QDialog):
             page.changed.connect(self._page_changed)
             if isinstance(page, AcceptPage):
                 page.restore_asked.connect(self.restore)
-        bind_space(self, self._capture)
-        for key, action in (("Alt+Left", self.back), ("F1", self.open_guide), ("Ctrl+Z", self._undo)):
-            QShortcut(QKeySequence(key), self).activated.connect(action)
 
     # -- steps -----------------------------------------------------------------------------------------------------
 
@@ -201,18 +186,10 @@ class WizardWindow(QDialog):
         if self.step.captures and self.step.capture():
             self.refresh()
 
-    def _undo(self) -> None:
-        focus = QApplication.focusWidget()
-        if isinstance(focus, QLineEdit):
-            focus.undo()
-        elif self.step.undo():
+    def undo(self) -> None:
+        """Take the step's last capture back."""
+        if self.step.undo():
             self._page_changed()
-
-    def open_guide(self) -> None:
-        """This wizard's section of the guide, beside it."""
-        if self.guide is None:
-            self.guide = GuideViewer(self)
-        self.guide.open_page(self.definition.guide, self.definition.title)
 
     # -- the end ---------------------------------------------------------------------------------------------------
 
@@ -223,35 +200,18 @@ class WizardWindow(QDialog):
         return not used and any(page.step.keeps for page in self.definition.pages)
 
     def reject(self) -> None:
-        """Escape and Close: ask only when something would be lost."""
-        if not self.busy and (not self.would_lose or self._may_lose()):
+        """Escape and Close, unless something is just being put into force."""
+        if not self.busy:
             super().reject()
 
-    def done(self, result: int) -> None:
-        """What runs ends with the window."""
-        self.end()
-        super().done(result)
-
-    def _may_lose(self) -> bool:
-        answer = QMessageBox.question(
-            self, self.definition.title, "Close without using this calibration? What was captured here is lost; the "
-            "calibration in force stays as it is.",
-            QMessageBox.StandardButton.Discard | QMessageBox.StandardButton.Cancel, QMessageBox.StandardButton.Cancel)
-        return answer == QMessageBox.StandardButton.Discard
-
-    def end(self) -> Job:
-        """End threads and processes, in a worker, because a question to a node may be under way; the worker's job."""
-        if self._ending is not None:
-            return self._ending
-        self._timer.stop()
+    def stop(self) -> Callable[[], None]:
+        """Threads and processes."""
         self.work.close()
-        put_back, feed, worker = self.definition.put_back, self.feed, self.picture_worker
 
-        def stop() -> None:
-            worker.stop()
-            feed.stop()
-            if put_back is not None:
-                put_back()
+        def wait() -> None:
+            self.picture_worker.stop()
+            self.feed.stop()
+            if self.definition.put_back is not None:
+                self.definition.put_back()
 
-        self._ending = Job(lambda progress: stop(), lambda _: None, lambda sentence: None).start()
-        return self._ending
+        return wait
