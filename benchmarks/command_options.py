@@ -23,13 +23,12 @@ from rhot_node.__main__ import daemon_parser
 from rhot_node.commands import COMMANDS, parser_of
 
 ROOT = Path(__file__).resolve().parents[1]
-FORMER = {"bare-hand"}  # commands that are read for one release
 
 
 def offered() -> dict[str, list[str]]:
     """By command: the options that its help lists."""
     found: dict[str, list[str]] = {}
-    for name in (None, *(name for name in SUBCOMMANDS if name not in FORMER)):
+    for name in (None, *SUBCOMMANDS):
         parser = argparse.ArgumentParser()
         importlib.import_module(APP if name is None else SUBCOMMANDS[name].module).add_arguments(parser)
         found |= dict(_of(parser, "rhot" if name is None else f"rhot {name}"))

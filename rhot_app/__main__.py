@@ -34,7 +34,6 @@ SUBCOMMANDS = {
     "landmarks": Subcommand("rhot_app.export.landmark_command", "make a raw log of landmark tables of a bare hand"),
     "track": Subcommand("rhot_app.export.track_command", "track a bare hand in recorded videos"),
     "offset": Subcommand("rhot_app.sources.offset_command", "find when films of one scene began, by sound or a flash"),
-    "bare-hand": Subcommand("rhot_app.export.track_command", "the former name of track, for one release"),
     "recover": Subcommand("rhot_app.recording.recover_command", "write a damaged log's sound records to a clean one"),
     "export": Subcommand("rhot_app.export.export_command", "write a raw log's hand as a file for other programs"),
     "trim": Subcommand("rhot_app.export.trim_command", "take a part of a recording as a recording of its own"),

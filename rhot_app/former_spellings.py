@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 _SCENE = {
     "--background": "--set background={}", "--back": "--set facing=back", "--worn": "--set worn_paint={}",
@@ -23,14 +23,20 @@ _SHOW = {
     "--legacy": "--set show.legacy=true", "--on-table": "--set show.on_table=true",
     "--ruler-mm": "--set show.length_mm={}", "--marker": "--set show.marker={}", "--moving": "--set show.moving=true",
 }
+_LENSES = {"--left-intrinsics": "--intrinsics left={}", "--right-intrinsics": "--intrinsics right={}"}
 _OPTIONS: dict[str, dict[str, str]] = {
     "simulate": _SCENE | _SHOW,
+    "calibrate stereo": _LENSES, "calibrate together": _LENSES,
     "evaluate live": _SCENE,
     "evaluate compare": _SCENE | {"--recording": "--motions {}"},
     "mouse run": {"--gain": "--set gain={}", "--height-gain": "--set height_gain={}",
                   "--height-from": "--set height_from={}", "--on-table": "--set on_table=true"},
 }
 """By command: the options that went, and what says the same now."""
+
+_BOARD = {"--kind": "{}", "--board": "{}", "--marker-mm": "marker_mm={}", "--tag-spacing": "tag_spacing={}",
+          "--dictionary": "dictionary={}", "--legacy-pattern": "legacy", "--legacy": "legacy"}
+"""The options that became the parts of `--board`, and the part that each is; the board of `target` has no option."""
 
 _EVALUATE = {"--compare": "compare", "--bare-hand": "bare-hand"}
 _MOUSE = {"--measure": "measure"}
@@ -39,7 +45,7 @@ _COMPARED = "rest,wave,grasp,pinch,fast"
 
 def present_spelling(arguments: Sequence[str]) -> list[str]:
     """The same command line as it is spelt now; a note on standard error says what has changed."""
-    present = _options_of(_with_subcommand(list(arguments)))
+    present = _certified(_tracked(_board(_options_of(_with_subcommand(list(arguments))))))
     if present != list(arguments):
         print(f"rhot: this is the former spelling, read for one release. Now: rhot {shlex.join(present)}",
               file=sys.stderr)
@@ -77,3 +83,68 @@ def _options_of(arguments: list[str]) -> list[str]:
                 found += ["--motions", _COMPARED]
             found += [part.replace("{}", given) for part in new.split()]
     return found
+
+
+def _taken(arguments: list[str], options: Iterable[str], flags: Iterable[str] = ()) -> tuple[
+        list[str], list[tuple[str, str]]]:
+    """The arguments without some options, and these, in order, each with its value."""
+    kept: list[str] = []
+    found: list[tuple[str, str]] = []
+    words = iter(arguments)
+    for word in words:
+        option, equals, value = word.partition("=")
+        if option in flags:
+            found.append((option, ""))
+        elif option in options and (equals or (value := next(words, "\0")) != "\0"):
+            found.append((option, value))
+        else:
+            kept.append(word)
+    return kept, found
+
+
+def _board(arguments: list[str]) -> list[str]:
+    """What described a board, as the parts of one option."""
+    command = tuple(arguments[:2])
+    target = command[:1] == ("target",)
+    if not target and command not in {("calibrate", name) for name in ("intrinsics", "lens", "stereo", "together")}:
+        return arguments
+    flags = [option for option, part in _BOARD.items() if "{}" not in part]
+    kept, found = _taken(arguments, _BOARD, flags)
+    if {option for option, _ in found} <= (set() if target else {"--board"}):
+        return arguments
+    found.sort(key=lambda one: list(_BOARD).index(one[0]))
+    parts = [_BOARD[option].replace("{}", value) for option, value in found]
+    if not target:
+        return [*kept, "--board", ",".join(parts)]
+    kind = next((k for k, word in enumerate(kept) if word in ("chessboard", "charuco", "aprilgrid", "circles")), None)
+    return arguments if kind is None else [*kept[:kind], ",".join([kept[kind], *parts]), *kept[kind + 1:]]
+
+
+def _tracked(arguments: list[str]) -> list[str]:
+    """`bare-hand` was the name of `track`, whose videos were options."""
+    if arguments[:1] not in (["track"], ["bare-hand"]):
+        return arguments
+    kept, found = _taken(arguments[1:], ["--video"])
+    return ["track", *(video for _, video in found), *kept]
+
+
+_CERTIFIED = ("--facing", "--marker", "--rod-mm", "--rod-markers")
+
+
+def _certified(arguments: list[str]) -> list[str]:
+    """What was said of all steps of `certify`, said of each."""
+    if arguments[:1] != ["certify"]:
+        return arguments
+    kept, found = _taken(arguments, _CERTIFIED)
+    if not found:
+        return arguments
+    said = dict(found)
+    facing, marker, length, pair = (said.get(option, "") for option in _CERTIFIED)
+    more = {"static": [facing], "ruler": [marker], "rod": [length, pair], "plumb": [pair]}
+
+    def step(text: str) -> str:
+        words, equals, file = text.partition("=")
+        return ":".join([words, *filter(None, more.get(words.split(":")[0], []))]) + equals + file
+
+    return [step(word) if kept[k - 1:k] == ["--step"] else f"--step={step(word[7:])}" if word.startswith("--step=")
+            else word for k, word in enumerate(kept)]

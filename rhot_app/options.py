@@ -37,6 +37,11 @@ def add_seconds_argument(parser: argparse._ActionsContainer, what: str, default:
                         help=what if default is None else f"{what} (default {default:g})")
 
 
+def add_offset_argument(parser: argparse._ActionsContainer, what: str) -> None:
+    """``--offset-s NAME=S``, of films."""
+    parser.add_argument("--offset-s", action="append", default=[], metavar="NAME=S", help=f"seconds to add to {what}")
+
+
 def add_tracker_argument(parser: argparse._ActionsContainer, what: str, default: str | None = None) -> None:
     """``--tracker``: what makes a hand of the observations."""
     parser.add_argument("--tracker", choices=("classic", "estimator"), default=default, help=what)

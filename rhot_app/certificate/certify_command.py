@@ -11,7 +11,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.errors import CertificateError, positive_number
+from rhot_app.errors import CertificateError
 from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument, add_seed_argument
 from rhot_node.compiled import announce_compilation
 from rhot_node.terminal import add_examples
@@ -32,15 +32,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--recordings", type=Path, default=None, metavar="DIR",
                         help="recordings made before, with protocol.json; without it, and without --step and "
                              "--simulated, the running engine records now, step by step in this terminal")
-    parser.add_argument("--step", action="append", default=[], metavar="NAME=FILE",
-                        help="a raw log as one step, in the place of that of --recordings: static=FILE, ruler:MM=FILE "
-                             "(repeatable), rod=FILE, plumb=FILE")
-    parser.add_argument("--facing", choices=("palm", "back"), default=None,
-                        help="which side of the hand faced the cameras in the static step (default: no hand)")
-    parser.add_argument("--marker", default=None, metavar="ID", help="the marker that was held along the ruler")
-    parser.add_argument("--rod-mm", type=positive_number, default=None, metavar="MM",
-                        help="the rod, from marker to marker")
-    parser.add_argument("--rod-markers", default=None, metavar="A,B", help="the rod's markers, the upper one first")
+    parser.add_argument("--step", action="append", default=[], metavar="NAME...=FILE",
+                        help="a raw log as one step, in the place of that of --recordings, with what was measured by "
+                             "hand: static:palm=FILE (or back; neither when it was no hand), ruler:MM:MARKER=FILE "
+                             "(repeatable), rod:MM:UPPER,LOWER=FILE and plumb:UPPER,LOWER=FILE, from marker to marker")
     parser.add_argument("--simulated", action="store_true",
                         help="the whole protocol on the simulated rig, unattended; --rig is then optional")
     parser.add_argument("--sketched", action="store_true", help="the simulated rig without pictures, much faster")
@@ -51,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--compare", type=Path, nargs=2, default=None, metavar=("OLD", "NEW"),
                         help="two certificates (their folders or JSON files): what changed beyond the intervals")
     add_json_argument(parser)
-    add_examples(parser, "rhot certify --rig desk.json --facing palm --keep recordings",
+    add_examples(parser, "rhot certify --rig desk.json --keep recordings",
                  "rhot certify --simulated --sketched --out certificate")
 
 
@@ -142,8 +137,7 @@ def _recorded(args: argparse.Namespace, folder: Path, line: ProgressLine) -> tup
         return rig or simulated_rig(scene), protocol
     assert rig is not None
     if args.step or args.recordings is not None:
-        given = protocol_of_steps(args.step, facing=args.facing, marker=args.marker, rod_mm=args.rod_mm,
-                                  rod_markers=args.rod_markers)
+        given = protocol_of_steps(args.step)
         return rig, given if args.recordings is None else merged(read_protocol(args.recordings), given)
     from rhot_app.engine.client import EngineClient
 

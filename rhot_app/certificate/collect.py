@@ -106,36 +106,39 @@ def _number(ask: Callable[[str], str], say: Callable[[str], None], question: str
         say(f"{answer!r} is no length in mm between 0 and 10000.")
 
 
-def protocol_of_steps(steps: list[str], *, facing: str | None, marker: str | None, rod_mm: float | None,
-                      rod_markers: str | None) -> ProtocolFile:
-    """The protocol of ``--step NAME=FILE`` options; a distance is ``ruler:MM=FILE``. Raises CertificateError."""
+FORMS = {"static": "static[:palm|:back]=FILE", "ruler": "ruler:MM:MARKER=FILE", "rod": "rod:MM:UPPER,LOWER=FILE",
+         "plumb": "plumb:UPPER,LOWER=FILE"}
+"""How a raw log is given as one step, and what is said of it."""
+
+
+def protocol_of_steps(steps: list[str]) -> ProtocolFile:
+    """The protocol of ``--step`` options, written as in `FORMS`. Raises CertificateError."""
     fields: dict[str, Any] = {}
     ruler: list[RulerStep] = []
-    pair = tuple((rod_markers or "").split(","))
     for text in steps:
-        name, _, file = text.partition("=")
-        name, _, amount = name.partition(":")
+        words, _, file = text.partition("=")
+        name, *said = words.split(":")
         if name not in STEPS or not file:
-            raise CertificateError(f"--step {text}: write NAME=FILE; names are static, ruler:MM, rod and plumb.")
+            raise CertificateError(f"--step {text}: write {', '.join(FORMS.values())}.")
         log = str(Path(file).absolute())
         if name == "flash":
             raise CertificateError(f"--step {text}: a flash needs the times of its screen, which protocol.json has. "
                                    "Use --recordings DIR with a folder of the app.")
-        if name in ("rod", "plumb") and len(pair) != 2:
-            raise CertificateError(f"--step {text}: say which markers are at the rod's ends, the upper one first: "
-                                   "--rod-markers A,B.")
-        if name == "static":
-            fields["static"] = StaticStep(log, facing)  # type: ignore[arg-type]
-        elif name == "ruler":
-            distance_mm = _length(amount, f"--step {text}: write ruler:MM=FILE, such as ruler:300=FILE")
-            ruler.append(RulerStep(log, distance_mm, _given(marker, f"--step {text}: say which marker is held: "
-                                                            "--marker ID")))
-        elif name == "rod":
-            if rod_mm is None or not rod_mm > 0.0:
-                raise CertificateError(f"--step {text}: say how long the rod is: --rod-mm MM.")
-            fields["rod"] = RodStep(log, rod_mm, (pair[0], pair[1]))
-        else:
-            fields["plumb"] = PlumbStep(log, pair[0], pair[1])
+        wrong = CertificateError(f"--step {text}: write {FORMS[name]}, {_SAID[name]}.")
+        match name, said:
+            case "static", []:
+                fields["static"] = StaticStep(log)
+            case "static", ["palm" | "back" as facing]:
+                fields["static"] = StaticStep(log, facing)
+            case "ruler", [length, marker] if marker:
+                ruler.append(RulerStep(log, _length(length, wrong), marker))
+            case "rod", [length, pair] if len(_pair(pair)) == 2:
+                upper, lower = _pair(pair)
+                fields["rod"] = RodStep(log, _length(length, wrong), (upper, lower))
+            case "plumb", [pair] if len(_pair(pair)) == 2:
+                fields["plumb"] = PlumbStep(log, *_pair(pair))
+            case _:
+                raise wrong
     return ProtocolFile(ruler=tuple(ruler), **fields)
 
 
@@ -145,17 +148,21 @@ def merged(protocol: ProtocolFile, given: ProtocolFile) -> ProtocolFile:
     return msgspec.structs.replace(protocol, **steps)
 
 
-def _length(text: str, otherwise: str) -> float:
+_SAID = {"static": "with the side of the hand that faced the cameras, or nothing when it was no hand",
+         "ruler": "with the distance by the ruler and the marker that was held, as ruler:300:index=FILE",
+         "rod": "with its length and its markers, the upper one first, as rod:152:thumb,index=FILE",
+         "plumb": "with the rod's markers, the upper one first"}
+
+
+def _pair(text: str) -> list[str]:
+    return [one for one in text.split(",") if one]
+
+
+def _length(text: str, otherwise: CertificateError) -> float:
     try:
         value = float(text)
     except ValueError:
         value = 0.0
     if not 0.0 < value <= 10_000.0:
-        raise CertificateError(f"{otherwise}.")
-    return value
-
-
-def _given(value: str | None, otherwise: str) -> str:
-    if not value:
-        raise CertificateError(f"{otherwise}.")
+        raise otherwise
     return value

@@ -9,7 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.errors import RecordingError, input_file, positive_number
-from rhot_app.options import add_force_argument, add_json_argument, add_out_argument, add_rig_argument
+from rhot_app.options import (
+    add_force_argument,
+    add_json_argument,
+    add_offset_argument,
+    add_out_argument,
+    add_rig_argument,
+)
 
 if TYPE_CHECKING:
     from rhot_app.project import Rig
@@ -20,8 +26,6 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments that landmarks and contours share."""
     add_rig_argument(parser, "the calibrated rig, with the hand's side")
-    parser.add_argument("--video", action="append", metavar="NAME=FILE",
-                        help="a camera of the rig and its video; once for each camera, also for one alone")
     background = parser.add_mutually_exclusive_group()
     background.add_argument("--background", action="append", default=[], metavar="NAME=FILE",
                             help="for contours: a video of the same scene without a hand; once for each camera")
@@ -36,8 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     began = parser.add_mutually_exclusive_group()
     began.add_argument("--offset", choices=("sound", "flash"), default=None,
                        help="find out when each film began, by the sound of all or by a light that goes on once")
-    began.add_argument("--offset-s", action="append", default=[], metavar="NAME=S",
-                       help="seconds to add to a camera's times, where the videos did not begin together")
+    add_offset_argument(began, "a camera's times, where the videos did not begin together")
     parser.add_argument("--unknown-size", action="store_true",
                         help="estimate the hand's size, too, unless all its bones are measured")
     add_out_argument(parser, "write the states as .csv, .parquet or .npz")
@@ -58,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.project import load_rig
 
     rig, start_frame = with_start(load_rig(args.rig), args.start)
-    given, empty_given = named(args.video, "--video", rig), named(args.background, "--background", rig)
+    given, empty_given = named(args.videos, "", rig), named(args.background, "--background", rig)
     for path in (*given.values(), *empty_given.values()):
         input_file(path)  # refused before numba is loaded
     from rhot_app.export.bare_hand import learn_backgrounds, track_videos

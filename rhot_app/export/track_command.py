@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``rhot track``, whose former name is ``rhot bare-hand``."""
+    """Arguments of ``rhot track``."""
     parser.add_argument("videos", nargs="*", default=[], metavar="CAMERA=VIDEO",
                         help="a camera of the rig and its video; paths alone take the rig's cameras in order. A video "
                              "is a film, a picture, or a folder of pictures or of raw frames")
@@ -31,9 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--log", type=Path, metavar="FILE",
                         help="write the landmarks as a raw log, too, which the app replays beside the films' pictures")
     parser.add_argument("--smooth", action="store_true", help="every state uses what came after it as well")
-    name = parser.prog
-    add_examples(parser, f"{name} left=left.mp4 right=right.mp4 --rig desk.json --out hand.csv --overlay hand.mp4",
-                 f"{name} hand.mp4 --overlay hand-tracked.mp4")
+    add_examples(parser, "rhot track left=left.mp4 right=right.mp4 --rig desk.json --out hand.csv --overlay hand.mp4",
+                 "rhot track hand.mp4 --overlay hand-tracked.mp4")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -50,17 +49,16 @@ def run(args: argparse.Namespace) -> int:
         raise RecordingError("--log: only landmarks are kept; take --observe landmarks, or leave --log out.")
     if args.smooth:
         raise RecordingError("--smooth: only landmarks are smoothed; take --observe landmarks, or leave --smooth out.")
-    args.video = with_names(args, rig)
+    args.videos = with_names(args.videos, rig)
     return bare_hand_command.run(args)
 
 
-def with_names(args: argparse.Namespace, rig: Rig) -> list[str]:
+def with_names(given: list[str], rig: Rig) -> list[str]:
     """All videos as CAMERA=VIDEO; paths alone take the cameras in the rig's order. Raises RecordingError."""
     names = [node.name for node in rig.nodes]
-    given = [*args.videos, *(args.video or [])]
     if not given:
         raise RecordingError(f"give a video of a camera, as in {names[0]}=hand.mp4.")
-    if args.video or any("=" in text and not Path(text).exists() for text in given):
+    if any("=" in text and not Path(text).exists() for text in given):
         return given
     if len(given) > len(names):
         raise RecordingError(f"{len(given)} videos, but the rig has {len(names)} cameras: {', '.join(names)}.")
@@ -75,9 +73,9 @@ def _by_landmarks(args: argparse.Namespace, rig: Rig | None) -> int:
         raise RecordingError("--adapt writes the bones that are measured; leave --bones rig out.")
     if args.background or args.background_seconds is not None:
         said.append("Landmarks need no background: what was given of it is not used.")
-    paths = [*args.videos, *(args.video or [])]
+    paths = args.videos
     if rig is not None:
-        given = named(with_names(args, rig), "--video" if args.video else "", rig)
+        given = named(with_names(args.videos, rig), "", rig)
         paths = list(given.values())
     for path in paths if rig is not None or len(paths) == 1 else ():
         input_file(path)  # refused before numba is loaded

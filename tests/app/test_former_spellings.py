@@ -29,6 +29,15 @@ DOCUMENT = (Path(__file__).parents[2] / "docs" / "commands.md").read_text()
     ("evaluate --seeds 2 --bare-hand", "evaluate bare-hand --seeds 2"),
     ("mouse", "mouse run"), ("mouse --measure --places 3", "mouse measure --places 3"),
     ("mouse --gain 2 --on-table", "mouse run --set gain=2 --set on_table=true"),
+    ("calibrate stereo --left a --right b --kind charuco --board 8x5 --marker-mm 20 --legacy-pattern",
+     "calibrate stereo --left a --right b --board charuco,8x5,marker_mm=20,legacy"),
+    ("calibrate lens --images a --dictionary=DICT_5X5_50 --marker-mm 9",
+     "calibrate lens --images a --board marker_mm=9,dictionary=DICT_5X5_50"),
+    ("calibrate stereo --left a --left-intrinsics l.json", "calibrate stereo --left a --intrinsics left=l.json"),
+    ("target aprilgrid --board 6x4 --tag-spacing 0.2 --out b.svg", "target aprilgrid,6x4,tag_spacing=0.2 --out b.svg"),
+    ("bare-hand --fps 30 --video left=a --video=right=b", "track left=a right=b --fps 30"),
+    ("certify --step static=s --step=ruler:30=r --step rod=o --step plumb=p --facing back --marker m --rod-mm 5 "
+     "--rod-markers a,b", "certify --step static:back=s --step=ruler:30:m=r --step rod:5:a,b=o --step plumb:a,b=p"),
     ("--directory here mouse --pointer", "mouse run --directory here --pointer"),
 ])
 def test_a_former_line_is_read_as_the_present_one(former: str, now: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -39,7 +48,8 @@ def test_a_former_line_is_read_as_the_present_one(former: str, now: str, capsys:
 
 
 @pytest.mark.parametrize("present", ["replay a.rhotlog --json", "evaluate --help", "mouse run --json", "export --back",
-                                     "evaluate compare --sketched", "simulate --set facing=back --out a"])
+                                     "evaluate compare --sketched", "simulate --set facing=back --out a",
+                                     "calibrate stereo --board 9x6", "target charuco,8x5 --out a.svg", "track a b"])
 def test_a_present_line_stays(present: str) -> None:
     assert present_spelling(present.split()) == present.split()
 

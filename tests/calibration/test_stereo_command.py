@@ -16,8 +16,9 @@ from stereo_pictures import FOLDER, needs_pictures, picture
 
 from rhot_app import rig_history
 from rhot_app.__main__ import main
-from rhot_app.calibration.board.boards import STANDARD_BOARD, CharucoBoard
-from rhot_app.calibration.commands.output import add_board_arguments, board_of
+from rhot_app.calibration.board.boards import STANDARD_BOARD, AprilGrid, CharucoBoard, Chessboard, CircleGrid
+from rhot_app.calibration.commands.output import add_board_arguments, board_of, described_board
+from rhot_app.errors import CalibrationError
 from rhot_app.project import load_rig, save_rig
 from rhot_node.files import resource_path
 
@@ -88,7 +89,28 @@ def test_the_board_is_the_one_of_rhot_target_where_nobody_names_another() -> Non
     add_board_arguments(parser)
     assert board_of(parser.parse_args([])) == STANDARD_BOARD
     assert board_of(parser.parse_args(["--square-mm", "24.6"])).square_m == pytest.approx(0.0246)
-    assert board_of(parser.parse_args(["--marker-mm", "20"])) == CharucoBoard(10, 7, 0.025, 0.02)
+    assert board_of(parser.parse_args(["--board", "marker_mm=20"])) == CharucoBoard(10, 7, 0.025, 0.02)
+
+
+@pytest.mark.parametrize(("text", "board"), [
+    ("charuco", CharucoBoard(10, 7, 0.025, 0.75 * 0.025)), ("8x5", Chessboard(8, 5, 0.025)),
+    ("9,6", Chessboard(9, 6, 0.025)), ("circles,4x9", CircleGrid(4, 9, 0.025)), ("", STANDARD_BOARD),
+    ("charuco, 8x5, marker_mm=15, dictionary=DICT_5X5_100, legacy",
+     CharucoBoard(8, 5, 0.025, 0.015, "DICT_5X5_100", True)),
+    ("aprilgrid,6x6,tag_spacing=0.2", AprilGrid(6, 6, 0.025, 0.2))])
+def test_a_board_is_written_in_parts(text: str, board: object) -> None:
+    assert described_board(text, 25.0) == board
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("chess", "'chess' is no part of a board"), ("charuco,8x5,9x6", "'9x6' is no part"),
+    ("charuco,8xx5", "two numbers"),
+    ("charuco,marker_mm=x", "marker_mm=x is not a finite number"), ("charuco,colour=red", "'colour=red' is no part"),
+    ("chessboard,legacy", "belong to a ChArUco board"), ("charuco,tag_spacing=0.3", "belongs to an AprilGrid"),
+    ("charuco,dictionary=NONE", "no marker dictionary")])
+def test_a_board_that_cannot_be_is_refused(text: str, said: str) -> None:
+    with pytest.raises(CalibrationError, match=said):
+        described_board(text, None)
 
 
 def test_a_rig_that_was_there_is_kept_and_nothing_else_in_it_changes(pictures: Path) -> None:
@@ -156,7 +178,7 @@ def test_a_picture_of_another_size_is_left_out(pictures: Path, capsys: pytest.Ca
 
 
 MISTAKES: list[tuple[tuple[str, ...], str]] = [
-    (("--board", "nine by six"), "A board's size is written as two numbers"),
+    (("--board", "nine by six"), "'nine by six' is no part of a board"),
     (("--ruler-mm", "240"), "ends in the pictures of two cameras"),
     (("--ruler-mm", "240", "--ruler", "left=1,2,3", "--ruler", "right=1,2,3,4"), "--ruler left=1,2,3"),
     (("--left", "nowhere/*.jpg"), "left: no file matches"),

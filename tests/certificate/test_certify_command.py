@@ -59,12 +59,12 @@ def test_logs_by_themselves_are_steps(made: Recorded, rig: Path, tmp_path: Path,
                                       capsys: pytest.CaptureFixture[str]) -> None:
     protocol = made.protocol
     assert protocol.rod is not None and protocol.plumb is not None
+    pair = ",".join(protocol.rod.markers)
     code = main(["certify", "--rig", str(rig), "--out", str(tmp_path / "c"), "--json",
-                 "--step", f"rod={made.folder / protocol.rod.log}", "--rod-mm", str(protocol.rod.length_mm),
-                 "--rod-markers", ",".join(protocol.rod.markers), "--marker", protocol.ruler[0].marker,
-                 "--step", f"plumb={made.folder / protocol.plumb.log}",
-                 *(word for row in protocol.ruler for word in ("--step",
-                                                               f"ruler:{row.distance_mm}={made.folder / row.log}"))])
+                 "--step", f"rod:{protocol.rod.length_mm}:{pair}={made.folder / protocol.rod.log}",
+                 "--step", f"plumb:{pair}={made.folder / protocol.plumb.log}",
+                 *(word for row in protocol.ruler for word in (
+                     "--step", f"ruler:{row.distance_mm}:{row.marker}={made.folder / row.log}"))])
     lines = {line["code"]: line["verdict"] for line in json.loads(capsys.readouterr().out)["certificate"]["lines"]}
     assert code == (1 if "differs" in lines.values() else 0)
     assert lines["static"] == lines["latency"] == lines["handedness"] == "not measured"
@@ -97,11 +97,13 @@ def test_a_batch_certifies_folders_and_none_twice_for_nothing(made: Recorded, tm
     (["--rig", "RIG", "--recordings", "BROKEN"], "gone.rhotlog"),
     (["--rig", "RIG", "--recordings", "EMPTY", "--simulated"], "makes its own recordings"),
     (["--rig", "RIG", "--sketched", "--recordings", "EMPTY"], "give --simulated too"),
-    (["--rig", "RIG", "--step", "walk=x.log"], "names are static, ruler:MM, rod and plumb"),
-    (["--rig", "RIG", "--step", "ruler:far=x.log", "--marker", "index"], "write ruler:MM=FILE"),
-    (["--rig", "RIG", "--step", "ruler:300=x.log"], "--marker ID"),
-    (["--rig", "RIG", "--step", "rod=x.log", "--rod-markers", "a,b"], "--rod-mm MM"),
-    (["--rig", "RIG", "--step", "rod=x.log", "--rod-mm", "300"], "--rod-markers A,B"),
+    (["--rig", "RIG", "--step", "walk=x.log"], "write static[:palm|:back]=FILE, ruler:MM:MARKER=FILE"),
+    (["--rig", "RIG", "--step", "ruler:far:index=x.log"], "write ruler:MM:MARKER=FILE"),
+    (["--rig", "RIG", "--step", "ruler:300=x.log"], "the marker that was held"),
+    (["--rig", "RIG", "--step", "rod:long:a,b=x.log"], "write rod:MM:UPPER,LOWER=FILE"),
+    (["--rig", "RIG", "--step", "rod:300=x.log"], "write rod:MM:UPPER,LOWER=FILE"),
+    (["--rig", "RIG", "--step", "static:side=x.log"], "the side of the hand"),
+    (["--rig", "RIG", "--step", "plumb:a=x.log"], "write plumb:UPPER,LOWER=FILE"),
     (["--rig", "RIG", "--step", "flash=x.log"], "the times of its screen"),
     (["--simulated", "--out", "EMPTY"], "exists already"),
     (["--simulated", "--out", "nowhere/here"], "is not a folder"),

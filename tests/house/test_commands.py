@@ -41,8 +41,6 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot track": ("CAMERA=VIDEO", "--rig", "--observe", "--bones", "--smooth", "--fps", "--offset-s", "--out",
                    "--overlay", "--force", "--json"),
     "rhot offset": ("NAME=FILM", "--by", "--json"),
-    "rhot bare-hand": ("--rig", "--video", "--background", "--background-seconds", "--fps", "--offset-s",
-                       "--unknown-size", "--out", "--overlay", "--force", "--json"),
     "rhot export": ("LOG", "--out", "--format", "--rig", "--tracker", "--rate", "--frame", "--units", "--hand",
                     "--smooth", "--force"),
     "rhot trim": ("LOG", "--from", "--to", "--out", "--force"),
@@ -66,18 +64,17 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "rhot calibrate import": ("FILE", "--format", "--unit", "--square-mm", "--size", "--camera", "--rig-from",
                               "--keep-world", "--out", "--intrinsics", "--json"),
     "rhot calibrate export": ("--rig", "--format", "--camera", "--unit", "--square-mm", "--out", "--force"),
-    "rhot calibrate intrinsics": ("--images", "--board", "--square-mm", "--marker-mm", "--dictionary",
-                                  "--legacy-pattern", "--square-pixels", "--out", "--rig", "--node", "--json"),
-    "rhot target": ("chessboard", "--board", "--square-mm", "--marker-mm", "--dictionary", "--legacy-pattern",
+    "rhot calibrate intrinsics": ("--images", "--board", "--square-mm", "charuco", "marker_mm", "dictionary",
+                                  "legacy", "--square-pixels", "--out", "--rig", "--node", "--json"),
+    "rhot target": ("chessboard", "marker_mm", "--square-mm", "dictionary", "legacy", "aprilgrid", "circles",
                     "--paper", "--out"),
     "rhot check": ("--rig", "--json"),
     "rhot history": ("--rig", "--restore", "--json"),
-    "rhot certify": ("--rig", "--recordings", "--step", "--facing", "--marker", "--rod-mm", "--rod-markers",
+    "rhot certify": ("--rig", "--recordings", "--step", "static:palm", "ruler:MM", "rod:MM", "plumb:",
                      "--simulated", "--sketched", "--seed", "--keep", "--out", "--compare", "--json"),
     "rhot calibrate stereo": (
-        "--left", "--right", "--camera", "--offset-s", "--board", "--square-mm", "--marker-mm", "--dictionary",
-        "--legacy-pattern",
-        "--left-intrinsics", "--right-intrinsics", "--intrinsics", "--refine-intrinsics", "--baseline-mm", "--ruler-mm",
+        "--left", "--right", "--camera", "--offset-s", "--board", "--square-mm", "marker_mm",
+        "--intrinsics", "--refine-intrinsics", "--baseline-mm", "--ruler-mm",
         "--ruler", "--table-image", "--rig-from", "--out", "--json"),
     "rhot hand": ("HAND", "--length", "--proportions", "--side", "--name", "--rows", "--out", "--rig", "--draw",
                   "--json"),
@@ -214,7 +211,7 @@ def test_wizards_and_commands_call_a_calibration_by_one_name() -> None:
 def test_a_file_that_exists_is_only_replaced_by_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The option has one name in all commands that have it; a bare hand's and a batch's have their own tests."""
     with_force = {name for name in SUBCOMMANDS if "--force" in help_of(f"rhot {name}")}
-    assert with_force == {"report", "layers", "export", "poses", "track", "trim", "bare-hand", "batch"}
+    assert with_force == {"report", "layers", "export", "poses", "track", "trim", "batch"}
     log, mine = tmp_path / "a.rhotlog", {name: tmp_path / f"mine.{name}" for name in ("zip", "png", "csv")}
     for path in (log, *mine.values()):
         path.write_text("mine")

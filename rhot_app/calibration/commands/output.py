@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,6 +105,7 @@ def unit_of(args: argparse.Namespace) -> float | None:
 
 # -- arguments that describe a board -----------------------------------------------------------------------------------
 
+_SIZE = re.compile(r"\s*\d+\s*,\s*\d+\s*")  # 9,6 is a size too
 _SIZES = {kind: size for kind, (size, _) in KINDS.items()}
 SIZE_HELP = (f"inner corners of a chessboard (default {_SIZES['chessboard']}), squares of a ChArUco board "
              f"({_SIZES['charuco']}), tags of an AprilGrid ({_SIZES['aprilgrid']}), circles in a row and rows "
@@ -110,34 +113,62 @@ SIZE_HELP = (f"inner corners of a chessboard (default {_SIZES['chessboard']}), s
 SQUARE_HELP = (f"side of a square or of a tag (default {SQUARE_MM:g}), distance of the rows of circles "
                f"({SPACING_MM:g})")
 
+
+BOARD_HELP = ("what it is, parts with commas between them, as charuco,10x7,marker_mm=18: the kind "
+              f"({', '.join(KINDS)}; default chessboard), its size ({SIZE_HELP}), and of a ChArUco board marker_mm=M, "
+              "dictionary=NAME, legacy (drawn by OpenCV before 4.6), of an AprilGrid tag_spacing=R (gap by side, "
+              f"default {TAG_SPACING:g})")
+_PARTS: dict[str, Callable[[str], Any]] = {"marker_mm": positive_number, "tag_spacing": positive_number,
+                                           "dictionary": str}
+
+
 def add_board_arguments(parser: argparse.ArgumentParser) -> None:
-    """Size, squares and markers."""
+    """The board and its squares."""
     board = parser.add_argument_group("board")
-    board.add_argument("--kind", dest="board_kind", choices=tuple(KINDS),
-                       help="what it is (default: a chessboard; with --marker-mm a ChArUco board)")
-    board.add_argument("--board", metavar="COLSxROWS",
-                       help=f"its size, or its file of Kalibr (.yaml), caliscope or anipose (.toml); {SIZE_HELP}")
-    board.add_argument("--square-mm", type=positive_number, metavar="S", help=f"as measured, for printers scale: "
-                       f"{SQUARE_HELP}")
-    board.add_argument("--tag-spacing", type=positive_number, metavar="R", help="gap between the tags of an AprilGrid, "
-                       f"as a part of their side (default {TAG_SPACING:g})")
-    board.add_argument("--marker-mm", type=positive_number, metavar="M",
-                       help="side of a marker: the board is a ChArUco board")
-    board.add_argument("--dictionary", default="", metavar="NAME", help="its markers (default DICT_4X4_50)")
-    board.add_argument("--legacy-pattern", action="store_true", help="it was drawn by OpenCV before 4.6")
+    board.add_argument("--board", default="", metavar="PART,PART,...",
+                       help=f"its file of Kalibr (.yaml), caliscope or anipose (.toml), or {BOARD_HELP}")
+    add_square_argument(board, "as measured, for printers scale: ")
+
+
+def add_square_argument(parser: argparse._ActionsContainer, what: str = "") -> None:
+    """The length that is measured on a board."""
+    parser.add_argument("--square-mm", type=positive_number, metavar="S", help=f"{what}{SQUARE_HELP}")
 
 
 def board_of(args: argparse.Namespace) -> Board:
     """The board; raises CalibrationError for an impossible one."""
-    from rhot_app.calibration.board.boards import make_board
     from rhot_app.calibration.exchange.boards import SUFFIXES, read_board
 
-    if args.board is not None and args.board.lower().endswith(SUFFIXES):
-        told = (args.board_kind, args.square_mm, args.marker_mm, args.tag_spacing)
-        if any(one is not None for one in told) or args.dictionary or args.legacy_pattern:
-            raise CalibrationError(f"{args.board} says what the board is; leave --kind, --square-mm, --marker-mm, "
-                                   "--tag-spacing, --dictionary and --legacy-pattern out, or give the size by numbers.")
-        return read_board(input_file(args.board))
-    kind = args.board_kind or ("chessboard" if args.marker_mm is None else "charuco")
-    return make_board(kind, args.board, square_mm=args.square_mm, marker_mm=args.marker_mm,
-                      dictionary=args.dictionary or None, legacy=args.legacy_pattern, tag_spacing=args.tag_spacing)
+    text = args.board
+    if not any(part.lower().endswith(SUFFIXES) for part in text.split(",")):
+        return described_board(text, args.square_mm)
+    if args.square_mm is not None or not text.lower().endswith(SUFFIXES):
+        raise CalibrationError(f"--board {text}: the file says what the board is; leave --square-mm and further parts "
+                               "out, or give the size by numbers.")
+    return read_board(input_file(text))
+
+
+def described_board(text: str, square_mm: float | None) -> Board:
+    """The board of parts with commas between them. Raises CalibrationError."""
+    from rhot_app.calibration.board.boards import make_board
+
+    kind, size, chosen = "", None, dict[str, Any]()
+    for part in [text] if _SIZE.fullmatch(text) else [part.strip() for part in text.split(",") if part.strip()]:
+        name, equals, value = part.partition("=")
+        if part in KINDS and not kind:
+            kind = part
+        elif part == "legacy":
+            chosen["legacy"] = True
+        elif name in _PARTS and equals:
+            try:
+                chosen[name] = _PARTS[name](value)
+            except argparse.ArgumentTypeError as exc:
+                raise CalibrationError(f"board {text}: {name}={exc}.") from exc
+        elif size is None and part[0].isdigit():
+            size = part
+        else:
+            raise CalibrationError(f"board {text}: {part!r} is no part of a board. Write the kind "
+                                   f"({', '.join(KINDS)}), the size (9x6), {', '.join(f'{one}=...' for one in _PARTS)} "
+                                   "or legacy.")
+    marked = chosen.keys() & {"marker_mm", "dictionary", "legacy"}
+    return make_board(kind or ("charuco" if marked else "chessboard"), size, square_mm=square_mm, **chosen)

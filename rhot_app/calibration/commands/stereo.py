@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rhot_app.calibration.commands.output import add_board_arguments, board_of, require_folder, show
 from rhot_app.calibration.registry import STEREO
 from rhot_app.errors import CalibrationError, finite, positive_number
-from rhot_app.options import add_json_argument, add_out_argument
+from rhot_app.options import add_json_argument, add_offset_argument, add_out_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
@@ -112,13 +112,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     pictures.add_argument("--right", metavar="PATTERN", help="pictures of the camera called right")
     pictures.add_argument("--camera", action="append", default=[], metavar="NAME=PATTERN",
                           help="pictures of a camera of the rig; once per camera")
-    pictures.add_argument("--offset-s", action="append", default=[], metavar="NAME=S",
-                          help="seconds to add to the times of a camera's film, where films did not begin together "
-                               "(rhot offset finds them)")
+    add_offset_argument(pictures, "the times of a camera's film, where films did not begin together (rhot offset finds "
+                                  "them)")
     add_board_arguments(parser)
     lenses = parser.add_argument_group("lenses; found from the same pictures where they are not given")
-    lenses.add_argument("--left-intrinsics", type=Path, metavar="FILE", help="lens of left")
-    lenses.add_argument("--right-intrinsics", type=Path, metavar="FILE", help="lens of right")
     lenses.add_argument("--intrinsics", action="append", default=[], metavar="NAME=FILE", help="lens of a camera")
     lenses.add_argument("--refine-intrinsics", action="store_true",
                         help="let given lenses change within their standard deviations")
@@ -193,9 +190,6 @@ def _given_lenses(args: argparse.Namespace, names: list[str]) -> dict[str, LensS
     from rhot_app.calibration.lens.intrinsics import load_intrinsics
 
     given = named_paths(args.intrinsics, "--intrinsics", names)
-    for name, path in (("left", args.left_intrinsics), ("right", args.right_intrinsics)):
-        if path is not None:
-            given[name] = path
     return {name: load_intrinsics(path).lens for name, path in given.items()}
 
 
