@@ -23,7 +23,7 @@ from distributed import LocalCluster
 from tables import arguments, publish, table
 
 from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set, data_sets_folder
-from rhot_app.export.export import FORMATS
+from rhot_app.export.formats import all_formats
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 
 GOALS = {"classic": 20.0, "estimator": 5.0}
@@ -62,7 +62,7 @@ def exports(log: Path, seconds: float, trackers: list[str], formats: list[str]) 
     for tracker in trackers:
         for name in formats:
             with tempfile.TemporaryDirectory() as folder:
-                out = Path(folder) / f"a{FORMATS[name].endings[0]}"
+                out = Path(folder) / f"a{all_formats()[name].endings[0]}"
                 wall_s, cpu_s, peak_mb = measured(["export", str(log), "--out", str(out), "--tracker", tracker])
                 row = {"tracker": tracker, "format": name, "wall_s": wall_s, "times_real_time": seconds / wall_s,
                        "times_real_time_cpu": seconds / cpu_s, "peak_mb": peak_mb,
@@ -96,7 +96,7 @@ def main() -> int:
     """Run, print, write the JSON."""
     parser = arguments(__doc__)
     parser.add_argument("--seconds", type=float, default=600.0)
-    parser.add_argument("--formats", default=",".join(FORMATS), help="which formats; none: the batch alone")
+    parser.add_argument("--formats", default=",".join(all_formats()), help="which formats; none: the batch alone")
     parser.add_argument("--trackers", default="classic,estimator")
     parser.add_argument("--batch", type=int, default=8, metavar="N", help="logs in the batch, 0: no batch (default 8)")
     parser.add_argument("--logs", type=Path, default=None, help="where logs are kept (default ~/.cache/rhot/takes)")

@@ -108,7 +108,7 @@ def export(log: str | Path, out: str | Path, *, rig: Rig | None = None, format: 
            tracker: Tracker | None = None, rate_hz: float | None = None, frame: Frame = "rig",
            units: Units | None = None, hand: Hand = "hand", smooth: bool = False, fill_s: float | None = None,
            again: bool = False, progress: Progress = silent) -> Exported:
-    """Track a raw log and write it as csv, trc, c3d, bvh, gltf, npz, parquet or mcap: `format`, or the ending of `out`.
+    """Track a raw log and write it in a format of `rhot_app.export.formats`: `format`, or the ending of `out`.
 
     The other arguments are those of ``rhot export`` (docs/export.md). `out` appears only when it is whole; an existing
     file is written over only `again`. Raises ExportError, RecordingError or RigError.

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.registry import ADAPTED
 from rhot_app.errors import ExportError, RecordingError, note_loss
-from rhot_app.export.export import check_place, format_of, make_writer, whole_file
+from rhot_app.export.export import check_place, format_of, whole_file
+from rhot_app.export.formats import all_formats
 from rhot_app.export.overlay import overlay
 from rhot_app.export.pictures import check_pictures, side_by_side, whole_pictures
 from rhot_app.export.plan import Plan
@@ -211,7 +212,7 @@ class StateTable:
 
     def _write(self) -> None:
         if self._writer is None:
-            self._writer = make_writer(self._kind, Plan(
+            self._writer = all_formats()[self._kind].writer(Plan(
                 self._path, self._rig, "rig", "m" if self._kind == "npz" else "mm", "hand", None, self._name,
                 datetime.now(UTC).isoformat(timespec="seconds"),
                 self._waiting[0].t_master_ns if self._zero_ns is None else self._zero_ns))

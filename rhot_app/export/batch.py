@@ -25,7 +25,8 @@ import msgspec
 import numpy as np
 
 from rhot_app.errors import ExportError, RhotError, require
-from rhot_app.export.export import FORMATS, export_log
+from rhot_app.export.export import export_log
+from rhot_app.export.formats import all_formats
 from rhot_app.export.plan import ExportOptions
 from rhot_app.export.recording import TrackedLog
 from rhot_app.state import Knowledge
@@ -73,7 +74,7 @@ Ends = Generator[JobOutcome, None, None]
 def jobs_of(logs: Sequence[Path], folder: Path, format_name: str | None, rig: Path | None,
             options: ExportOptions) -> list[BatchJob]:
     """The jobs of some logs, each named after its log. Raises ExportError when two would have the same name."""
-    ending = ".json" if format_name in (None, CERTIFICATE) else FORMATS[str(format_name)].endings[0]
+    ending = ".json" if format_name in (None, CERTIFICATE) else all_formats()[str(format_name)].endings[0]
     named: dict[str, Path] = {}
     for log in logs:
         other = named.setdefault(log.stem, log.absolute())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import os
 import tempfile
 from collections.abc import Callable, Iterator
@@ -11,9 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rhot_app.errors import ExportError, refuse_existing
+from rhot_app.export.formats import all_formats
 from rhot_app.export.frames import in_frame
 from rhot_app.export.gaps import FilledGap, GapFiller, checked_fill
-from rhot_app.export.plan import ExportOptions, Plan, Units, Writer
+from rhot_app.export.plan import ExportOptions, Plan, Writer
 from rhot_app.export.recording import RATE_AFTER_S, TrackedLog
 from rhot_app.export.resample import Resampler, checked_rate
 from rhot_app.export.states import HandStates
@@ -21,34 +21,6 @@ from rhot_app.progress import Progress, silent, within
 from rhot_app.project import Rig
 from rhot_app.tracking.smoothing import NOT_SMOOTHED
 from rhot_node.files import replacing
-
-
-@dataclass(frozen=True, slots=True)
-class Format:
-    """A format: its writer as module:class, the endings of its files (the first one is given to new ones), the unit of
-    length by default, whether another can be chosen, whether it has a rate instead of times, and whether it says how
-    every value is known."""
-
-    writer: str
-    endings: tuple[str, ...]
-    units: Units
-    units_free: bool = True
-    uniform: bool = False
-    says_knowledge: bool = False
-
-
-FORMATS: dict[str, Format] = {
-    "csv": Format("rhot_app.export.tables:CsvWriter", (".csv",), "mm", says_knowledge=True),
-    "trc": Format("rhot_app.export.formats.points:TrcWriter", (".trc",), "mm", uniform=True),
-    "c3d": Format("rhot_app.export.formats.points:C3dWriter", (".c3d",), "mm", uniform=True),
-    "bvh": Format("rhot_app.export.formats.bvh:BvhWriter", (".bvh",), "m", uniform=True),
-    "gltf": Format("rhot_app.export.formats.gltf:GltfWriter", (".glb", ".gltf"), "m", units_free=False),
-    "npz": Format("rhot_app.export.tables:NpzWriter", (".npz",), "m", says_knowledge=True),
-    "parquet": Format("rhot_app.export.tables:ParquetWriter", (".parquet",), "mm", says_knowledge=True),
-    "mcap": Format("rhot_app.export.formats.mcap_file:McapWriter", (".mcap",), "m", units_free=False,
-                   says_knowledge=True),
-    "ros2": Format("rhot_app.export.formats.ros2_file:Ros2Writer", (".mcap",), "m", units_free=False),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,19 +37,20 @@ def format_of(name: str | None, out: Path | None) -> str:
     """The format that is asked for by its name or ending, or by the ending of the file to write. Raises
     ExportError."""
     if name is not None:
-        name = next((found for found, one in FORMATS.items() if f".{name}" in one.endings), name)
-        if name not in FORMATS:
-            raise ExportError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}.")
-        if out is not None and out.suffix.lower() not in FORMATS[name].endings:
-            raise ExportError(f"{out}: a {name} file ends in {' or '.join(FORMATS[name].endings)}; change the file's "
-                              "name or the format.")
+        name = next((found for found, one in all_formats().items() if f".{name}" in one.endings), name)
+        if name not in all_formats():
+            raise ExportError(f"there is no format {name!r}; choose one of {', '.join(all_formats())}.")
+        allowed = all_formats()[name].endings
+        if out is not None and out.suffix.lower() not in allowed:
+            raise ExportError(f"{out}: a {name} file ends in {' or '.join(allowed)}; change the file's name or the "
+                              "format.")
         return name
     if out is None:
-        raise ExportError(f"the format is missing; give --format with one of {', '.join(FORMATS)}.")
-    for found, one in FORMATS.items():
+        raise ExportError(f"the format is missing; give --format with one of {', '.join(all_formats())}.")
+    for found, one in all_formats().items():
         if out.suffix.lower() in one.endings:
             return found
-    endings = ", ".join(dict.fromkeys(ending for one in FORMATS.values() for ending in one.endings))
+    endings = ", ".join(dict.fromkeys(ending for one in all_formats().values() for ending in one.endings))
     raise ExportError(f"{out}: no format has the ending {out.suffix!r}; give the file one of {endings}.")
 
 
@@ -92,7 +65,7 @@ def export_log(log: Path, out: Path, *, format_name: str | None = None, rig: Rig
     name = format_of(format_name, out)
     check_options(name, options)
     check_place(log, out, again)
-    if options.fill_s is not None and not FORMATS[name].says_knowledge:
+    if options.fill_s is not None and not all_formats()[name].says_knowledge:
         check_place(log, gaps_path(out), again)
     with TrackedLog(log, rig, options.tracker, within(progress, 0.0, 0.98), smooth=options.smooth) as tracked:
         notes = _write(tracked, name, options, out, lambda: progress(f"writing {out.name}", 0.99))
@@ -111,7 +84,7 @@ def check_options(name: str | None, options: ExportOptions) -> None:
         checked_rate(options.rate_hz)
     if options.fill_s is not None:
         checked_fill(options.fill_s)
-    chosen = None if name is None else FORMATS[name]
+    chosen = None if name is None else all_formats()[name]
     if chosen is not None and options.units not in (None, chosen.units) and not chosen.units_free:
         raise ExportError(f"{name} files are in {chosen.units}, as their readers expect; leave --units out.")
 
@@ -142,7 +115,7 @@ def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path, re
     def end() -> None:
         """Beside the file, the table of its gaps, where the file itself cannot mark them."""
         ready()
-        if not FORMATS[name].says_knowledge:
+        if not all_formats()[name].says_knowledge:
             gaps_path(out).unlink(missing_ok=True)  # of a file that is written over
             if filler is not None and filler.filled and plan is not None:
                 _list_gaps(gaps_path(out), filler.filled, plan)
@@ -150,7 +123,7 @@ def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path, re
     with whole_file(out, end) as path:
         try:
             for plan, states in _prepared(tracked, name, options, path, filler):
-                writer = writer or make_writer(name, plan)
+                writer = writer or all_formats()[name].writer(plan)
                 writer.add(in_frame(states, options.frame))
             assert writer is not None  # else there were no states, and that is an error
             writer.finish()
@@ -159,7 +132,7 @@ def _write(tracked: TrackedLog, name: str, options: ExportOptions, out: Path, re
                 with contextlib.suppress(OSError):  # a full disk has been reported already
                     writer.close()
     if filler is not None and filler.filled:
-        writer.notes.append(_filled_note(filler.filled, None if FORMATS[name].says_knowledge else gaps_path(out)))
+        writer.notes.append(_filled_note(filler.filled, None if all_formats()[name].says_knowledge else gaps_path(out)))
     return writer.notes
 
 
@@ -185,7 +158,7 @@ def _prepared(tracked: TrackedLog, name: str, options: ExportOptions, path: Path
     held: list[HandStates] = []  # until the cameras' rate is known
     resampler: Resampler | None = None
     plan: Plan | None = None
-    uniform = FORMATS[name].uniform or options.rate_hz is not None
+    uniform = all_formats()[name].uniform or options.rate_hz is not None
     for block in _ended(tracked.blocks()):
         if block is not None:
             held.append(block)
@@ -197,7 +170,7 @@ def _prepared(tracked: TrackedLog, name: str, options: ExportOptions, path: Path
             camera_hz = tracked.camera_rate_hz or 1.0
             rate_hz = options.rate_hz or max(float(round(camera_hz)), 1.0)
             resampler = Resampler(rate_hz, 1.0 / camera_hz) if uniform else None
-            plan = Plan(path, tracked.rig, options.frame, options.units or FORMATS[name].units, options.hand,
+            plan = Plan(path, tracked.rig, options.frame, options.units or all_formats()[name].units, options.hand,
                         rate_hz if uniform else None, tracked.path.name, tracked.created, first_ns, options.smooth,
                         tracked.wall_clock_offset_ns)
         for states in held:
@@ -214,13 +187,6 @@ def _ended(blocks: Iterator[HandStates]) -> Iterator[HandStates | None]:
     """The blocks, then None."""
     yield from blocks
     yield None
-
-
-def make_writer(name: str, plan: Plan) -> Writer:
-    """The writer of a format. Raises ExportError when its package is missing."""
-    module, _, kind = FORMATS[name].writer.partition(":")
-    made: Writer = getattr(importlib.import_module(module), kind)(plan)
-    return made
 
 
 @contextlib.contextmanager

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -> None:
     """What ``rhot export`` and ``rhot batch`` have in common; `without_format` says what holds without --format."""
     parser.add_argument("--format", default=None, metavar="F",
-                        help=f"csv, trc, c3d, bvh, gltf (or glb), npz, parquet, mcap or ros2 ({without_format})")
+                        help=f"format, such as csv; docs/export.md lists them ({without_format})")
     add_rig_argument(parser, "track with this rig instead of the one the log was recorded with")
     add_tracker_argument(parser, "track with this tracker instead of the one that the rig asks for")
     parser.add_argument("--rate", type=positive_number, default=None, metavar="HZ",
@@ -52,12 +52,13 @@ def add_export_arguments(parser: argparse.ArgumentParser, without_format: str) -
 
 def run(args: argparse.Namespace) -> int:
     """Export, and say what came of it."""
-    from rhot_app.export.export import FORMATS, export_log, format_of
+    from rhot_app.export.export import export_log, format_of
+    from rhot_app.export.formats import all_formats
     from rhot_app.progress import ProgressLine
     from rhot_node.compiled import announce_compilation
 
     name = format_of(args.format, args.out)
-    out = args.out or args.path.with_suffix(FORMATS[name].endings[0])
+    out = args.out or args.path.with_suffix(all_formats()[name].endings[0])
     announce_compilation()
     line = ProgressLine(f"exporting {args.path.name}")
     done = export_log(args.path, out, format_name=name, rig=args.rig, options=options_of(args), again=args.force,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
@@ -79,3 +80,19 @@ class Writer(Protocol):
     def close(self) -> None:
         """Let go of the file, whole or not. May be called twice."""
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format. `title`: what it is called where somebody chooses one. `endings` of its files, the first of which is
+    given to new ones. `units`: of length, unless others may be chosen (`units_free`). `uniform`: it has a rate instead
+    of times. `says_knowledge`: it says how every value is known."""
+
+    name: str
+    title: str
+    writer: Callable[[Plan], Writer]
+    endings: tuple[str, ...]
+    units: Units
+    units_free: bool = True
+    uniform: bool = False
+    says_knowledge: bool = False

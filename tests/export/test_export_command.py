@@ -17,7 +17,9 @@ import pytest
 
 from rhot_app.__main__ import main
 from rhot_app.errors import ExportError
-from rhot_app.export.export import FORMATS, export_log
+from rhot_app.export import formats
+from rhot_app.export.export import export_log
+from rhot_app.export.formats import all_formats
 from rhot_app.export.plan import ExportOptions
 from rhot_app.export.process import export_apart
 from rhot_app.project import save_rig, with_tracker
@@ -29,10 +31,56 @@ def left(folder: Path) -> list[str]:
 
 
 def ending(name: str) -> str:
-    return FORMATS[name].endings[0]
+    return all_formats()[name].endings[0]
 
 
-@pytest.mark.parametrize("name", FORMATS)
+TOY = '''
+"""Counts states."""
+from rhot_app.export.plan import Format
+
+
+class Tally:
+    def __init__(self, plan):
+        self.notes, self._plan, self._count = [], plan, 0
+
+    def add(self, states):
+        self._count += len(states.t_master_ns)
+
+    def finish(self):
+        self._plan.path.write_text(f"{self._count} states in {self._plan.units}")
+
+    def close(self):
+        pass
+
+
+FORMATS = (Format("tally", "Tally: how many", Tally, (".tally",), "mm"),)
+'''
+
+
+def test_one_file_adds_a_format(log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "formats").mkdir()
+    (tmp_path / "formats" / "tally.py").write_text(TOY)
+    monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(tmp_path / "formats")])
+    all_formats.cache_clear()
+    try:
+        assert main(["export", str(log), "--out", str(tmp_path / "a.tally"), "--tracker", "classic"]) == 0
+        assert (tmp_path / "a.tally").read_text() == "72 states in mm"
+        assert main(["export", str(log), "--format", "abacus"]) == 2
+        assert "tally" in capsys.readouterr().err
+    finally:
+        all_formats.cache_clear()
+        sys.modules.pop("rhot_app.export.formats.tally", None)
+
+
+def test_the_documents_know_every_format() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "export.md").read_text()
+    for name, one in all_formats().items():
+        word = "MCAP for ROS 2" if name == "ros2" else one.title.split(":")[0]
+        assert f"| {word} |" in page and f"`{name}`" in page
+
+
+@pytest.mark.parametrize("name", all_formats())
 def test_every_format_by_its_ending(name: str, log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / f"a{ending(name)}"
     assert main(["export", str(log), "--out", str(out), "--tracker", "classic"]) == 0
@@ -76,9 +124,9 @@ def test_the_file_is_named_as_the_log(log: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    (("--format", "fbx"), "there is no format 'fbx'; choose one of csv, trc"),
+    (("--format", "fbx"), "there is no format 'fbx'; choose one of bvh, c3d"),
     ((), "the format is missing"),
-    (("--out", "a.xlsx"), "no format has the ending '.xlsx'; give the file one of .csv"),
+    (("--out", "a.xlsx"), "no format has the ending '.xlsx'; give the file one of .bvh"),
     (("--out", "a.csv", "--format", "trc"), "a trc file ends in .trc"),
     (("--out", "a.csv", "--rate", "2000"), "the rate 2000 Hz is out of range"),
     (("--out", "a.csv", "--smooth", "--tracker", "classic"), "only the estimator smooths"),
@@ -171,7 +219,7 @@ def small_disk(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", all_formats())
 def test_a_full_disk_leaves_nothing(name: str, log: Path, tmp_path: Path) -> None:
     out = tmp_path / f"a{ending(name)}"
     out.write_text("older")
@@ -180,7 +228,7 @@ def test_a_full_disk_leaves_nothing(name: str, log: Path, tmp_path: Path) -> Non
     assert left(tmp_path) == [out.name] and out.read_text() == "older"
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", all_formats())
 def test_an_interrupt_at_the_last_moment_leaves_nothing(name: str, log: Path, tmp_path: Path,
                                                         monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(handle: int) -> None:

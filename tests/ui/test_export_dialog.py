@@ -15,6 +15,7 @@ from patience import PATIENCE_MS
 from screen_pictures import check, picture_of
 
 from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
+from rhot_app.export.formats import all_formats
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
 
@@ -63,6 +64,11 @@ def test_the_first_rows_follow_the_choices(dialog: ExportDialog, qtbot: Any) -> 
     dialog.smooth_box.setChecked(True)
     assert dialog.options().smooth
     qtbot.waitUntil(lambda: "only the estimator smooths" in dialog.sentence.text(), timeout=PATIENCE_MS)
+
+
+def test_every_format_can_be_chosen(dialog: ExportDialog) -> None:
+    box = dialog.format_box
+    assert {box.itemData(k) for k in range(box.count())} == set(all_formats()) and box.currentData() == "csv"
 
 
 def test_a_file_is_written_in_a_process_of_its_own(dialog: ExportDialog, qtbot: Any, tmp_path: Path) -> None:

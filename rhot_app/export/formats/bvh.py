@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from rhot_app.errors import ExportError
 from rhot_app.export.formats.bones import PARENTS, TURNING, Skeleton, skeleton_of
 from rhot_app.export.frames import file_from_frame, frame_up
-from rhot_app.export.plan import Plan
+from rhot_app.export.plan import Format, Plan
 from rhot_app.export.states import HandStates
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import JOINTS
@@ -113,3 +113,6 @@ def _hierarchy(skeleton: Skeleton, turn: Array) -> Iterator[str]:
 
 def _numbers(point: Array) -> str:
     return " ".join(f"{value:.6f}" for value in point)
+
+
+FORMATS = (Format("bvh", "BVH: a moving skeleton", BvhWriter, (".bvh",), "m", uniform=True),)

@@ -12,7 +12,7 @@ from rhot_app.errors import ExportError, require
 from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.export.formats.bones import PARENTS, TIPS, TURNING, Skeleton, skeleton_of
 from rhot_app.export.frames import file_from_frame, frame_up
-from rhot_app.export.plan import Plan
+from rhot_app.export.plan import Format, Plan
 from rhot_app.export.states import HandStates
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.kinematics import forward
@@ -283,3 +283,6 @@ def _faces(rings: int) -> Indices:
                   np.column_stack([low + here, high + after, high + here])]
     faces.append(np.column_stack([np.full(AROUND, 1 + rings * AROUND), last + here, last + after]))
     return np.concatenate(faces)
+
+
+FORMATS = (Format("gltf", "glTF: an animated hand", GltfWriter, (".glb", ".gltf"), "m", units_free=False),)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import require
 from rhot_app.estimation.se3 import quaternion_from_rotation
-from rhot_app.export.plan import Plan
+from rhot_app.export.plan import Format, Plan
 from rhot_app.export.states import CONDITIONS, OBJECT_ARRAYS, VALIDITIES, HandStates
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import OTHER_HAND
@@ -229,3 +229,6 @@ def _transform(t_ns: int, child: str, place: Any, rotation_wxyz: Any) -> Message
     w, x, y, z = rotation_wxyz
     return {"timestamp": _time(t_ns), "parent_frame_id": "rig", "child_frame_id": child,
             "translation": _vector(list(place)), "rotation": {"x": x, "y": y, "z": z, "w": w}}
+
+
+FORMATS = (Format("mcap", "MCAP: for Foxglove", McapWriter, (".mcap",), "m", units_free=False, says_knowledge=True),)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import ExportError, require
 from rhot_app.export.frames import Axes, file_from_frame, frame_up
-from rhot_app.export.plan import Plan
+from rhot_app.export.plan import Format, Plan
 from rhot_app.export.states import HandStates, hidden_where_lost
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND
@@ -184,3 +184,8 @@ class C3dWriter(_Points):
 
 def _description(label: str) -> str:
     return "marker" if label.startswith("marker_") else "fingertip" if label.endswith("_fingertip") else "joint"
+
+
+FORMATS = (
+    Format("trc", "TRC: points, for OpenSim", TrcWriter, (".trc",), "mm", uniform=True),
+    Format("c3d", "C3D: points, motion capture", C3dWriter, (".c3d",), "mm", uniform=True))

@@ -9,7 +9,7 @@ import numpy as np
 
 from rhot_app.errors import require
 from rhot_app.estimation.se3 import quaternion_from_rotation
-from rhot_app.export.plan import Plan
+from rhot_app.export.plan import Format, Plan
 from rhot_app.export.states import HandStates
 from rhot_app.hand.skeleton import ANGLES
 from rhot_app.project import OTHER_HAND
@@ -110,3 +110,6 @@ def _transform(t_ns: int, child: str, place: Any, rotation_wxyz: Any) -> Message
     w, x, y, z = rotation_wxyz
     return {"header": {"stamp": _time(t_ns), "frame_id": "rig"}, "child_frame_id": child,
             "transform": {"translation": _vector(place), "rotation": {"x": x, "y": y, "z": z, "w": w}}}
+
+
+FORMATS = (Format("ros2", "MCAP: for ROS 2", Ros2Writer, (".mcap",), "m", units_free=False),)

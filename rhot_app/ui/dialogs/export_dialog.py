@@ -24,7 +24,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from rhot_app.export.export import FORMATS, Exported
+from rhot_app.export.export import Exported
+from rhot_app.export.formats import all_formats
 from rhot_app.export.gaps import LONGEST_S
 from rhot_app.export.plan import ExportOptions, Units
 from rhot_app.export.process import export_apart, first_states
@@ -41,9 +42,6 @@ LOOK_MS = 300  # a choice is looked at when it has stood for a while
 
 _SIZE, _BUTTON_PX = (860, 600), 120
 _OWN_RATE, _NO_FILL = "as recorded", "leave gaps"
-_FORMATS = {"csv": "CSV: a table", "parquet": "Parquet: a table for analysis", "npz": "NPZ: NumPy's arrays",
-            "trc": "TRC: points, for OpenSim", "c3d": "C3D: points, motion capture", "bvh": "BVH: a moving skeleton",
-            "gltf": "glTF: an animated hand", "mcap": "MCAP: for Foxglove"}
 _TRACKERS = (("as recorded", None), ("classic", "classic"), ("estimator", "estimator"))
 _FRAMES = (("rig", "rig"), ("wrist, along the palm's axes", "wrist"))
 _UNITS: tuple[tuple[str, Units], ...] = (("mm", "mm"), ("m", "m"))
@@ -69,7 +67,9 @@ class ExportDialog(QDialog):
         self.log_label = QLabel()
         self.log_button = QPushButton("Choose …")
         self.log_button.setToolTip("Another recording (.rhotlog).")
-        self.format_box = _box(((words, name) for name, words in _FORMATS.items()), "Which programs shall read it.")
+        self.format_box = _box(((one.title, name) for name, one in all_formats().items()),
+                               "Which programs shall read it.")
+        self.format_box.setCurrentIndex(self.format_box.findData("csv"))
         self.tracker_box = _box(_TRACKERS, "Which tracker makes a hand of the recorded datagrams.")
         self.frame_box = _box(_FRAMES, "Where positions are told: in the rig frame, or relative to the wrist joint.")
         self.units_box = _box(_UNITS, "Unit of length, where the format leaves a choice.")
@@ -159,7 +159,7 @@ class ExportDialog(QDialog):
     def options(self) -> ExportOptions:
         """The other choices."""
         rate = self.rate_box.value()
-        units: Units | None = self.units_box.currentData() if FORMATS[self.format].units_free else None
+        units: Units | None = self.units_box.currentData() if all_formats()[self.format].units_free else None
         return ExportOptions(self.tracker_box.currentData(), rate or None, self.frame_box.currentData(), units,
                              smooth=self.smooth_box.isChecked(), fill_s=self.fill_box.value() or None)
 
@@ -183,7 +183,7 @@ class ExportDialog(QDialog):
 
     def _show_format(self) -> None:
         """A new format's unit, and whether another can be chosen."""
-        chosen = FORMATS[self.format]
+        chosen = all_formats()[self.format]
         self.units_box.setCurrentIndex(self.units_box.findData(chosen.units))
         self.units_box.setEnabled(chosen.units_free)
 
@@ -195,7 +195,7 @@ class ExportDialog(QDialog):
         log, name, options, rig = self.log, self.format, self.options(), self._rig
         if log is None or self._job is not None:
             return
-        units = options.units or FORMATS[name].units
+        units = options.units or all_formats()[name].units
 
         def look(progress: Any) -> HandStates:
             return first_states(log, name, options, ROWS, rig)
@@ -230,14 +230,15 @@ class ExportDialog(QDialog):
             return
         if self.log is None:
             return
-        ending = FORMATS[self.format].endings[0]
+        ending = all_formats()[self.format].endings[0]
         beside = self.log.with_suffix(ending)
         start = beside if self._out_folder is None else self._out_folder / beside.name
         name, _ = QFileDialog.getSaveFileName(self, "Export to", str(start),
                                               f"{self.format} (*{ending});;All files (*)")
         if name:
             out = Path(name)
-            self.export(out if out.suffix.lower() in FORMATS[self.format].endings else out.with_name(out.name + ending))
+            named = out.suffix.lower() in all_formats()[self.format].endings
+            self.export(out if named else out.with_name(out.name + ending))
 
     def export(self, out: Path) -> None:
         """Write `out`; what stands there is written over, as the person was asked when choosing it."""

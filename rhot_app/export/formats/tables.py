@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rhot_app.errors import require
-from rhot_app.export.plan import Plan
+from rhot_app.export.plan import Format, Plan
 from rhot_app.export.states import ARRAYS, OBJECT_ARRAYS, Column, HandStates, columns
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND
@@ -203,3 +203,9 @@ def _scaled_object(name: str, column: Column, scale: float) -> Column:
 def _store(archive: zipfile.ZipFile, name: str, array: Column) -> None:
     with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
         np.lib.format.write_array(file, array, allow_pickle=False)
+
+
+FORMATS = (
+    Format("csv", "CSV: a table", CsvWriter, (".csv",), "mm", says_knowledge=True),
+    Format("npz", "NPZ: NumPy's arrays", NpzWriter, (".npz",), "m", says_knowledge=True),
+    Format("parquet", "Parquet: a table for analysis", ParquetWriter, (".parquet",), "mm", says_knowledge=True))
