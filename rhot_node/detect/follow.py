@@ -208,7 +208,10 @@ def _soft(image, track, outline, fitted):
 @njit(**c.FAST)
 def _outline(image, track, outline, noise, work):
     """Fit the outline about the soft centroid; False when the marker is not as plainly in view as it was."""
-    fitted = work.fitted[0]
+    fitted, radius = work.fitted[0], outline.radius
+    growth = math.exp(0.5 * track.growth)
+    for j in range(c.NODES + 1):
+        radius[j] *= growth
     x, y, before_u, before_v = fitted.x, fitted.y, outline.paint_u, outline.paint_v
     contrast = math.hypot(before_u - outline.around_u, before_v - outline.around_v)
     return (fit(image, x, y, outline, np.int64(1), work)
@@ -244,8 +247,9 @@ def _axes_hold(outline, fitted):
 @njit(**c.FAST)
 def _state(track, fitted, outline, noise, report):
     """Report what was fitted, and take it into the track."""
-    extent = length_of(0.5 * (fitted.m_xx + fitted.m_yy
-                                + math.hypot(fitted.m_xx - fitted.m_yy, 2.0 * fitted.m_xy)))
+    half = 0.5 * (fitted.m_xx + fitted.m_yy)
+    spread = math.hypot(0.5 * (fitted.m_xx - fitted.m_yy), fitted.m_xy)
+    extent, breadth = length_of(half + spread), length_of(max(half - spread, 0.0))
     bias = math.hypot(t.hidden_bias(fitted.area / track.area, max(extent, track.extent), fitted.area, t.SHARP),
                       t.smear_bias(outline.blur))
     bias = math.hypot(bias, outline.off_axis * extent)
@@ -262,12 +266,15 @@ def _state(track, fitted, outline, noise, report):
     t.state(fitted, floor, bias, level, noise, report)
     if outline.rims > 0.0:
         t.widen_band(outline.axis_x, outline.axis_y, extent, report)
-    t.take(track, fitted, extent, level, False)
+    t.take(track, fitted, (extent, breadth, 1.0), level, False)
 
 
 # -- start of fast tracking --------------------------------------------------------------------------------------------
 
 ARC_VARIANCE = 2.0 / 3.0 - ARC * ARC  # of sqrt(1 - u^2) over -1..1
+START_AWAY = 0.35
+"""Chroma px that outline and careful measurement may differ by. Where they differ by more, a marker would jump whenever
+it changes lanes: so does the cube's green face, beside the cyan one, in `../shared/data/trifinger_cube`."""
 
 
 @njit(**c.FAST)
@@ -300,7 +307,8 @@ def start(image, tracks, outlines, slot, measured, noises, work):
         x, y = fitted.x, fitted.y
     outline.sag_frames = outline.sag_zero = 0.0
     found = (_misfit_is_noise(outline, fitted, noise)
-             and fitted.area < AREA_RATIO * place.area and place.area < AREA_RATIO * fitted.area)
+             and fitted.area < AREA_RATIO * place.area and place.area < AREA_RATIO * fitted.area
+             and math.hypot(x - place.x, y - place.y) < START_AWAY)
     outline.ready = 1.0 if found else 0.0
     return found
 

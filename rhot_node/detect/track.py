@@ -153,7 +153,8 @@ def widen_band(axis_x, axis_y, breadth, report):
 
 MEMORY_FRAMES = 40  # for which a lost marker's size and velocity are kept
 VELOCITY_GAIN = 0.7
-AREA_GAIN = 0.4  # per frame, of the expected log area
+AREA_GAIN = 0.4  # per frame, of the expected log area and of its trend
+GROWTH_MAX = 0.1  # of log area per frame: 2 m/s of approach at 1 m, at 40 frames/s
 PARTIAL_AREA = 0.82  # of the expected area: less is half hidden
 BROKEN_AREA = 0.93  # of the expected area: a band with less whose rims no longer fit is half hidden
 HIDDEN_DECAY = 0.99  # per frame, of the expected area: what looks hidden for long is that small
@@ -167,16 +168,20 @@ PARTIAL, EDGE, AMBIGUOUS = int(MarkerFlag.PARTIAL), int(MarkerFlag.EDGE), int(Ma
 
 
 class Track(NamedTuple):
-    """Chroma px, and px per frame. `area`: expected in the next frame. `extent`: length along the major axis. `fitted`:
-    a band's curvature is known; `sag_x`, `sag_y`: from its centre to its centroid. `missed`: frames since the last
-    observation. `limb_taken`, `limb_left`: LIMB_OF_SHAPE; `band`: whether its marker is one."""
+    """Chroma px, and px per frame. `area`: expected in the next frame; `growth`: trend of its logarithm per frame, by
+    approach. `extent`, `breadth`: lengths along both axes, `outlined`: by a fitted outline. `fitted`: a band's
+    curvature is known; `sag_x`, `sag_y`: from its centre to its centroid. `missed`: frames since the last observation.
+    `limb_taken`, `limb_left`: LIMB_OF_SHAPE; `band`: whether its marker is one."""
 
     x: float = 0.0
     y: float = 0.0
     vx: float = 0.0
     vy: float = 0.0
     area: float = 0.0
+    growth: float = 0.0
     extent: float = 0.0
+    breadth: float = 0.0
+    outlined: float = 0.0
     level: float = 0.0
     fitted: float = 0.0
     sag_x: float = 0.0
@@ -255,8 +260,8 @@ def observe(tracks, slot, measured, noise, flags, reports):
         off_axis = SAG_STALE * math.hypot(track.sag_x, track.sag_y) if track.fitted > 0.0 else OFF_AXIS_SD * extent
         bias = math.hypot(bias, off_axis)
     if not known:
-        track.vx = track.vy = track.area = track.fitted = track.sag_x = track.sag_y = 0.0
-    take(track, row, extent, row.level, flags & (PARTIAL | EDGE) and ratio < 1.0)
+        track.vx = track.vy = track.area = track.growth = track.fitted = track.sag_x = track.sag_y = 0.0
+    take(track, row, (extent, length_of(row.var_minor), 0.0), row.level, flags & (PARTIAL | EDGE) and ratio < 1.0)
     floor = FLOOR_VARIANCE if row.careful > 0.0 else mask_variance(row.area)
     state(row, floor, bias, row.level, noise, report)
     if row.fit > 0.0:
@@ -298,10 +303,26 @@ def _plausible_bias(track, row, ratio, width, flags):
 
 
 @njit(cache=True)
-def take(track, place, extent, level, hidden):
-    """Take a measured place into a track: motion, and, unless something hides a part, size.
+def even_growth(track, lengths):
+    """Growth of the log area by approach, which changes both lengths alike: twice the lesser of theirs.
 
-    A track whose area is 0 knows nothing yet.
+    What is hidden from one side, or turns away, changes one length alone. Lengths of coverage hold the blur, those of
+    an outline do not.
+    """
+    extent, breadth, outlined = lengths
+    if outlined != track.outlined or not min(track.breadth, breadth) > 0.0:
+        return 0.0
+    along, across = math.log(extent / track.extent), math.log(breadth / track.breadth)
+    if along * across <= 0.0:
+        return 0.0
+    return 2.0 * (along if abs(along) < abs(across) else across)
+
+
+@njit(cache=True)
+def take(track, place, lengths, level, hidden):
+    """Take a measured place into a track: motion, and, unless something hides a part, size and its trend.
+
+    A track whose area is 0 knows nothing yet. `lengths`: extent, breadth and outlined, as in `Track`.
     """
     gap = track.missed + 1.0
     if track.area > 0.0:
@@ -310,10 +331,14 @@ def take(track, place, extent, level, hidden):
         track.vy += gain * ((place.y - track.y) / gap - track.vy)
         if hidden:
             track.area *= HIDDEN_DECAY
+            track.growth = 0.0
         else:
-            track.area *= (place.area / track.area) ** AREA_GAIN
-            track.extent = extent
+            seen = min(max(even_growth(track, lengths) / gap, -GROWTH_MAX), GROWTH_MAX)
+            track.growth += AREA_GAIN * (seen - track.growth)
+            track.area *= (place.area / track.area) ** AREA_GAIN * math.exp(track.growth)
+            track.extent, track.breadth, track.outlined = lengths
     else:
-        track.area, track.extent = place.area, extent
+        track.area = place.area
+        track.extent, track.breadth, track.outlined = lengths
     track.x, track.y, track.level = place.x, place.y, level
     track.alive, track.missed = 1.0, 0.0

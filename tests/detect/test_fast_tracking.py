@@ -239,3 +239,26 @@ def test_a_marker_that_went_farther_away_unseen_is_whole_again_after_a_while() -
     farther = [shown(7.8) for _ in range(60)]  # three quarters of the area: it may as well be half hidden
     assert farther[0].flags & MarkerFlag.PARTIAL and not farther[-1].flags & DOUBTS
     assert error(farther[-1], 160.0, 120.0) < 0.1
+
+
+@pytest.mark.parametrize("away", [1.0, -1.0])
+def test_a_marker_that_comes_nearer_or_goes_away_fast_is_in_plain_view(away: float) -> None:
+    detector = only("ring")
+    rng = np.random.default_rng(2)
+    radii = [11.0] * 6 + [11.0 * math.exp(0.05 * away * k) for k in range(1, 15)]
+    flagged = 0
+    for radius in radii:
+        canvas = Canvas(320, 240).paint(disc(160, 120, radius), RGB["ring"], (160, 120), radius + 3)
+        flagged += bool(detector.detect(canvas.expose(rng))[0].flags & DOUBTS)
+    assert flagged <= 2  # until it is known that it does
+
+
+def test_a_marker_that_is_covered_slowly_from_one_side_is_half_hidden_not_farther_away() -> None:
+    detector = only("ring")
+    rng = np.random.default_rng(3)
+    for cover in [0.0] * 6 + [2.5 * k for k in range(1, 12)]:
+        canvas = Canvas(320, 240).paint(disc(160, 120, 22), RGB["ring"], (160, 120), 25)
+        canvas.rgb[:, 130:round(138 + cover)] = SKIN
+        seen = detector.detect(canvas.expose(rng))[0]
+        assert seen.flags & DOUBTS or error(seen, 160.0, 120.0) < 0.5 + 2.5 * sigma(seen)
+        assert seen.flags & DOUBTS or cover < 22.0

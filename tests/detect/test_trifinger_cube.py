@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rhot_node.commands.detect_command import detect_all
-from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.fast import DOUBTFUL, FastDetector
 from rhot_node.detect.image import from_bgr
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
@@ -48,6 +48,22 @@ def test_every_visible_face_is_found_near_its_mask(camera: int) -> None:
             assert seen[name].found
             assert np.hypot(seen[name].x - truth[0], seen[name].y - truth[1]) < 3.0, name
     assert faces == 3
+
+
+def test_a_face_does_not_jump_while_the_picture_moves() -> None:
+    bgr = cv2.imread(str(FOLDER / "camera60.png"))
+    assert bgr is not None
+    rng, detector, green = np.random.default_rng(0), FastDetector(CUBE), CUBE.ids.index("green")
+    places = []
+    for k in range(60):
+        dx, dy = 40.0 * np.sin(k / 6.0), 30.0 * np.sin(k / 5.0)
+        moved = cv2.warpAffine(bgr, np.array([[1.0, 0.0, dx], [0.0, 1.0, dy]]), (540, 540), flags=cv2.INTER_AREA,
+                               borderMode=cv2.BORDER_REFLECT)
+        seen = detector.detect(from_bgr(np.clip(moved + rng.normal(0.0, 3.0, moved.shape), 0, 255).astype(np.uint8)))
+        if seen[green].found and not seen[green].flags & DOUBTFUL:
+            places.append((seen[green].x - dx, seen[green].y - dy))
+    assert len(places) > 30
+    assert np.percentile(np.hypot(*(np.array(places) - np.median(places, axis=0)).T), 90) < 0.8
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
