@@ -49,6 +49,7 @@ SECTIONS = {
     "whole-path": Section("python benchmarks/accuracy.py", 20.0),
     "paints": Section("python benchmarks/paints.py", 20.0),
     "jitter": Section("python benchmarks/jitter.py", 1.0),
+    "jitter-definitions": Section("python benchmarks/jitter_definitions.py", 0.5),
     "pairing": Section("python benchmarks/pairing.py", 2.0),
     "clock": Section("python benchmarks/clock.py --seeds 5", 0.5),
     "latency": Section("python benchmarks/latency.py", 0.5),

@@ -18,6 +18,7 @@ from rhot_app.certificate import thesis
 from rhot_app.certificate.document import Line, figure, in_words, not_measured, number
 from rhot_app.certificate.intervals import Interval, mean_of, percentile_of
 from rhot_app.certificate.recordings import CertifiedRecording, Latencies
+from rhot_app.latency import whole_way
 from rhot_app.state import LATENCY_STAGES
 
 Array = NDArray[np.float64]
@@ -38,8 +39,7 @@ def judge_timing(latencies: Array) -> Line:
     figures, curves = [], dict[str, list[float | None]]()
     known = [k for k, name in enumerate(LATENCY_STAGES) if name != "receive_to_state"
              and np.isfinite(latencies[:, k]).any()]
-    whole = np.where(np.isfinite(latencies[:, known]), latencies[:, known], 0.0).sum(axis=1)
-    for name, samples in [*((LATENCY_STAGES[k], latencies[:, k]) for k in known), ("sum", whole)]:
+    for name, samples in [*((LATENCY_STAGES[k], latencies[:, k]) for k in known), ("sum", whole_way(latencies))]:
         of_thesis = thesis.TIMING_MS.get(_ONES.get(name, name))
         words = "" if of_thesis is None else f"mean {of_thesis[0]:.2f}, SD {of_thesis[1]:.2f} ms (table 7.1)"
         middle, late = (percentile_of(samples, part).scaled(1e3) for part in (0.5, 0.99))

@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.filters.meters import jitter
 from rhot_app.certificate import thesis
 from rhot_app.certificate.document import Figure, Line, figure, in_words, not_measured, number
 from rhot_app.certificate.geometry import axes_of
 from rhot_app.certificate.intervals import Interval, mean_of, sd_of
 from rhot_app.certificate.recordings import CertifiedRecording
+from rhot_app.filters import jitter
 from rhot_app.project import Rig
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ def judge_static(recording: CertifiedRecording, rig: Rig) -> Line:
         figures.append(figure(f"{name}: distance", "mm", distance))
         larger = max(pixels, key=lambda sd: sd.value)
         curves[name] = [pixels[0].value, pixels[1].value, distance.value]
-        short = jitter(recording.times_s, axes.distance(places)[:, None])
+        short = jitter.resting(recording.times_s, axes.distance(places)[:, None])
         if math.isfinite(short) and 1e-3 * distance.low > _SWAYS * short:
             sways.append(name)
         if math.isfinite(larger.value) and (worst is None or larger.value > worst[0]):

@@ -19,6 +19,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import build_model, neutral_pose
 from rhot_app.hand.places import ROLES, place_of
+from rhot_app.latency import p50_p99
 from rhot_app.objects.object_file import ObjectModel
 from rhot_app.objects.observations import FiducialFrame
 from rhot_app.project import OTHER_HAND, Rig, RigNode
@@ -204,11 +205,8 @@ class LatencyMeter:
 
     def summary(self) -> dict[str, LatencySummary]:
         """Median and 99th percentile of each stage that has any value."""
-        ordered = np.sort(self._values, axis=0)  # NaN last
-        counts = np.count_nonzero(~np.isnan(ordered), axis=0)
-        return {stage: LatencySummary(float(ordered[int(0.5 * (count - 1)), k]),
-                                      float(ordered[round(0.99 * (count - 1)), k]))
-                for k, (stage, count) in enumerate(zip(LATENCY_STAGES, counts.tolist(), strict=True)) if count}
+        return {stage: LatencySummary(float(p50), float(p99))
+                for stage, p50, p99 in zip(LATENCY_STAGES, *p50_p99(self._values), strict=True) if np.isfinite(p50)}
 
     def clear(self) -> None:
         """Forget all values: a new run begins."""

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.filters.jitter import scatter
 from rhot_app.hand.skeleton import ANGLES, TIP_ROLES, WRIST_ROLE
+from rhot_app.latency import latency_row, p50_p99
 from rhot_app.state import LATENCY_STAGES, HandState, Knowledge
 
 Array = NDArray[np.float64]
@@ -40,15 +42,6 @@ def rms(values: Array) -> float | None:
     return float(np.sqrt(np.mean(finite**2))) if finite.size else None
 
 
-def percentiles(values: Array) -> dict[str, float | None]:
-    """Median and 99th percentile of the finite values."""
-    finite = values[np.isfinite(values)]
-    if not finite.size:
-        return {"p50": None, "p99": None}
-    p50, p99 = np.percentile(finite, [50.0, 99.0])
-    return {"p50": float(p50), "p99": float(p99)}
-
-
 def count_swaps(positions: Array, truth: Array) -> int:
     """Number of times a marker's position (N, M, 3) is nearer to another marker's truth for SWAP_FRAMES states.
 
@@ -65,10 +58,9 @@ def count_swaps(positions: Array, truth: Array) -> int:
     return swaps
 
 
-def jitter(errors: Array) -> float | None:
-    """Standard deviation of a 3-D error (N, 3) about its mean, all axes together; None below two samples."""
-    finite = errors[np.isfinite(errors).all(axis=1)]
-    return float(np.sqrt(finite.var(axis=0).sum())) if len(finite) > 1 else None
+def _summary(values: Array) -> dict[str, float | None]:
+    """Median and 99th percentile; None without values."""
+    return dict(zip(("p50", "p99"), (float(one) if np.isfinite(one) else None for one in p50_p99(values)), strict=True))
 
 
 def _millimetres(value: float | None) -> float | None:
@@ -107,7 +99,7 @@ def score(states: Sequence[HandState], truth: TrueSamples, roles: Sequence[str |
                                for k, name in enumerate(ids)},
         "marker_unfiltered_rms_mm": _millimetres(rms(np.where(measured, np.linalg.norm(raw_error, axis=2), np.nan))),
         "marker_jitter_unfiltered_mm_each": {
-            name: _millimetres(jitter(np.where(measured[:, k, None], raw_error[:, k], np.nan)))
+            name: _millimetres(scatter(np.where(measured[:, k, None], raw_error[:, k], np.nan)))
             for k, name in enumerate(ids)},
         "wrist_rms_mm": _millimetres(rms(np.where(wrist_seen, wrist, np.nan))),
         "joint_rms_deg": None if (value := rms(angle_error)) is None else float(np.degrees(value)),
@@ -117,9 +109,9 @@ def score(states: Sequence[HandState], truth: TrueSamples, roles: Sequence[str |
         "visible_samples": int(visible.sum()),
         "swaps": count_swaps(positions, truth.markers),
         "state_rate_hz": (len(states) - 1) / span_s if span_s > 0 else None,
-        "state_age_ms": percentiles(1e3 * state_ages(states)),
-        "latency_ms": {stage: percentiles(1e3 * np.array([state.latency_s.get(stage, np.nan) for state in states]))
-                       for stage in LATENCY_STAGES},
+        "state_age_ms": _summary(1e3 * state_ages(states)),
+        "latency_ms": {stage: _summary(column) for stage, column in zip(
+            LATENCY_STAGES, 1e3 * np.array([latency_row(state) for state in states]).T, strict=True)},
     }
 
 

@@ -5,7 +5,6 @@ The mouse gets the tracker's states only. The true hand serves to compute the er
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any, Final
 
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.evaluation.data_sets import Watch
+from rhot_app.latency import p50_p99
 from rhot_app.mouse.pick_scene import Ball, PickScene
 from rhot_app.mouse.play import MARKERS, MouseRun, SetUp, play
 from rhot_app.mouse.pointer import BUTTONS, GROUND_M, MouseSettings, MouseState
@@ -125,8 +125,7 @@ def latency(run: MouseRun) -> Figures | None:
     shifts = np.arange(0.0, 0.1, 0.001)
     costs = [sum(np.square(np.interp(times - shift, times, true[:, k]) - cursor[:, k]).mean() for k in range(2))
                for shift in shifts]
-    p50, p99 = (None if math.isnan(value) else 1e3 * float(value)
-                for value in np.percentile(run.age_s[inside], [50, 99]))
+    p50, p99 = (1e3 * float(value) if np.isfinite(value) else None for value in p50_p99(run.age_s[inside]))
     return {"ready_p50_ms": p50, "ready_p99_ms": p99,
             "lag_ms": abs(round(1e3 * float(shifts[int(np.argmin(costs))]), 1))}
 

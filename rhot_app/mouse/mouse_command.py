@@ -297,7 +297,9 @@ class _Outputs:
         if len(self._ages_ms) > 1:
             import numpy as np
 
-            p50, p99 = np.percentile(self._ages_ms, [50, 99])
+            from rhot_app.latency import p50_p99
+
+            p50, p99 = p50_p99(np.array(self._ages_ms))
             rate = (len(self._came_s) - 1) / max(self._came_s[-1] - self._came_s[0], 1e-9)
             slow = (f" The mouse needs {LEAST_HZ:g} or more: this computer is too slow or too busy. Close other "
                     "programs; markers need less time than a bare hand." if rate < LEAST_HZ else "")

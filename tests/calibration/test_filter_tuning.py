@@ -19,7 +19,6 @@ from rhot_app.calibration.filters.meters import (
     FilterMeter,
     FilterTargets,
     MarkerFigures,
-    jitter,
     judge_filters,
     lag,
     motion_of,
@@ -29,6 +28,7 @@ from rhot_app.calibration.observations import InstantTable
 from rhot_app.calibration.recorded_observations import read_instants
 from rhot_app.calibration.verdict import Grade, Verdict
 from rhot_app.errors import CalibrationError
+from rhot_app.filters import jitter
 from rhot_app.filters.one_euro import OneEuroFilter
 from rhot_app.project import FilterSettings, OneEuroSettings, load_rig, save_rig
 from rhot_app.tracking.scene import make_tracker
@@ -73,7 +73,7 @@ def test_jitter_is_the_noise_whatever_the_hand_does_slowly() -> None:
     noise = rng.normal(0.0, 3e-4, (400, 3))
     drifting = noise + 0.01 * np.sin(2.0 * np.pi * 0.4 * times)[:, None]
     for values in (noise, drifting):
-        assert jitter(times, values) == pytest.approx(3e-4 * np.sqrt(3.0), rel=0.06)
+        assert jitter.resting(times, values) == pytest.approx(3e-4 * np.sqrt(3.0), rel=0.06)
     assert np.isnan(lag(times, noise, motion_of(times, noise))[0])  # a hand at rest shows no lag
 
 
@@ -198,5 +198,7 @@ def test_the_live_meter_reads_what_happens_now() -> None:
     reading = meter.read()
     assert reading.lag_s[0] > 0.05 and np.isnan(reading.lag_s[1])
     assert reading.raw_jitter_m[1] == pytest.approx(3e-4 * np.sqrt(3.0), rel=0.2) and reading.jitter_m[1] < 1e-4
+    assert reading.raw_jitter_m[0] == pytest.approx(3e-4 * np.sqrt(3.0), rel=0.2), "whatever the hand does"
+    assert np.isnan(reading.jitter_m[0]), "of a filter it is told at rest"
     assert reading.speed_m_s[0] > 0.7 > reading.speed_m_s[1]
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rhot_app.evaluation.score import TrueSamples, count_swaps, jitter, score, state_ages
+from rhot_app.evaluation.score import TrueSamples, count_swaps, score, state_ages
+from rhot_app.filters.jitter import scatter
 from rhot_app.hand.skeleton import ANGLES, JOINTS, TIP_ROLES
 from rhot_app.state import UNESTIMATED, Condition, HandState, Knowledge
 
@@ -75,7 +76,7 @@ def test_swap_needs_three_states_in_a_row(truth: np.ndarray) -> None:
 def test_jitter_ignores_bias() -> None:
     rng = np.random.default_rng(1)
     errors = rng.normal(0.0, 0.3e-3, (20000, 3)) + 5e-3
-    assert jitter(errors) == pytest.approx(0.3e-3 * np.sqrt(3.0), rel=0.02)
+    assert scatter(errors) == pytest.approx(0.3e-3 * np.sqrt(3.0), rel=0.02)
 
 
 def test_age_of_the_last_state_is_unknown(truth: np.ndarray) -> None:

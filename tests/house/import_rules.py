@@ -16,8 +16,8 @@ APP_BASE = ("rhot_node", "resources", "rhot_app.diagnostics", "rhot_app.errors",
 MODELS = ("rhot_app.geometry", "rhot_app.filters", "rhot_app.estimation")
 SOLVERS = ("rhot_app.calibration", "rhot_app.hand", "rhot_app.objects")
 ENGINE_SIDE = ("rhot_app.recording", "rhot_app.sources", "rhot_app.outputs", "rhot_app.simulator")
-BELOW_ENGINE = (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.state", "rhot_app.tracking", "rhot_app.barehand",
-                "rhot_app.articulated", "rhot_app.handfit", *ENGINE_SIDE)
+BELOW_ENGINE = (*APP_BASE, *MODELS, *SOLVERS, "rhot_app.state", "rhot_app.latency", "rhot_app.tracking",
+                "rhot_app.barehand", "rhot_app.articulated", "rhot_app.handfit", *ENGINE_SIDE)
 
 MAY_IMPORT: dict[str, tuple[str, ...]] = {
     # the node
@@ -54,6 +54,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.objects": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.calibration.verdict"),
     "rhot_app.objects.alignment.alignment_command": BELOW_ENGINE,
     "rhot_app.state": ("rhot_node.wire.messages", "rhot_app.objects.state"),
+    "rhot_app.latency": ("rhot_app.state",),
     "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.state"),
     "rhot_app.articulated": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.barehand"),
     "rhot_app.handfit": (*APP_BASE, *MODELS, "rhot_app.calibration", "rhot_app.hand", "rhot_app.barehand"),

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from fake_engine import FakeEngine
 
-from rhot_app.ui.models.meters import JitterWindow, difference_weights
+from rhot_app.filters.jitter import difference_weights
+from rhot_app.ui.models.meters import JitterWindow
 
 RATE_HZ = 40.0
 

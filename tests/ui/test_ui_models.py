@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from fake_engine import FakeEngine
 
+from rhot_app.latency import STACKED
 from rhot_app.state import LATENCY_STAGES, Condition, Knowledge
 from rhot_app.ui.models import words
 from rhot_app.ui.models.label_layout import Box, place_at_sides, place_labels
-from rhot_app.ui.models.meters import STACKED, LatencyWindow, LossMeter, RateRows, unused_frames
+from rhot_app.ui.models.meters import LatencyWindow, LossMeter, RateRows, unused_frames
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import SCHEMES, contrast, visible_on
 from rhot_app.ui.models.rows import bytes_text, clock_text, marker_rows, node_row

@@ -1,7 +1,7 @@
 """Jitter and lag of marker positions, of a whole recording or of the last seconds; the verdict on proposed filters.
 
-Jitter is the rms distance from a parabola through the half second about each sample, so that a hand that drifts or
-sways does not count as jitter. Lag is the delay by which the unfiltered curve has to be put back so that the filtered
+Jitter is that of `rhot_app.filters.jitter`: of unfiltered positions that of a hand that may move, of filtered ones that
+of a hand at rest. Lag is the delay by which the unfiltered curve has to be put back so that the filtered
 one lies on it best (least squares over all axes).
 """
 
@@ -14,17 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, told_apart
+from rhot_app.filters import jitter
+from rhot_app.filters.jitter import parabolas
 
 Array = NDArray[np.float64]
 
-JITTER_WINDOW_S = 0.5
 SPEED_WINDOW_S = 0.15
 
 SLOW_M_S = 0.15
 """A lag is not told from noise while the marker's speed (95th percentile) is below."""
 
-_LEAST_NEIGHBOURS = 2  # on each side of a parabola
-_LONGEST_WINDOW = 1.5  # times its length, when samples are missing
 _LAG_ROUNDS = 4
 _LIVE_S = 2.0
 
@@ -51,14 +50,7 @@ def motion_of(times_s: Array, positions: Array) -> MarkerMotion:
 
 def velocities(times_s: Array, positions: Array, window_s: float) -> Array:
     """(T, 3) m/s by parabolas through `window_s` of positions (T, 3) m; NaN where some of them are missing."""
-    return _parabolas(times_s, positions, window_s)[1]
-
-
-def jitter(times_s: Array, values: Array) -> float:
-    """rms distance of `values` (T, D) from the parabolas through their half seconds; NaN with too few of them."""
-    middles, _, leverage = _parabolas(times_s, values, JITTER_WINDOW_S)
-    away = np.square(values - middles).sum(axis=1) / (1.0 - leverage)
-    return float(np.sqrt(np.nanmean(away))) if np.isfinite(away).any() else np.nan
+    return parabolas(times_s, positions, window_s)[1]
 
 
 def lag(times_s: Array, filtered: Array, motion: MarkerMotion) -> tuple[float, float]:
@@ -77,32 +69,10 @@ def lag(times_s: Array, filtered: Array, motion: MarkerMotion) -> tuple[float, f
     return delay, error
 
 
-def _parabolas(times_s: Array, values: Array, window_s: float) -> tuple[Array, Array, Array]:
-    """Least squares about each sample of (T, D): value and slope there (T, D), and the sample's own say (T,); NaN
-    where the sample or too many of its neighbours are missing, and at both ends."""
-    middles, slopes = np.full((2, *values.shape), np.nan)
-    leverage = np.full(len(times_s), np.nan)
-    known = np.flatnonzero(np.isfinite(values).all(axis=1))
-    if len(known) < 2 * _LEAST_NEIGHBOURS + 1:
-        return middles, slopes, leverage
-    period_s = float(np.median(np.diff(times_s)))
-    half = max(_LEAST_NEIGHBOURS, round(0.5 * window_s / period_s))
-    around = known[np.arange(half, len(known) - half)[:, None] + np.arange(-half, half + 1)]
-    rows = around[:, half]
-    dt = (times_s[around] - times_s[rows, None]) / window_s
-    whole = np.ptp(dt, axis=1) < _LONGEST_WINDOW * max(1.0, 2 * half * period_s / window_s)
-    rows, around, dt = rows[whole], around[whole], dt[whole]
-    powers = np.stack([np.ones_like(dt), dt, dt * dt], axis=2)
-    normal = np.linalg.inv(powers.transpose(0, 2, 1) @ powers)
-    solved = normal @ (powers.transpose(0, 2, 1) @ values[around])
-    middles[rows], slopes[rows], leverage[rows] = solved[:, 0], solved[:, 1] / window_s, normal[:, 0, 0]
-    return middles, slopes, leverage
-
-
 @dataclass(frozen=True, slots=True)
 class MeterReading:
-    """The last two seconds, per marker (M,): jitter of the unfiltered and filtered positions, m; lag, s, NaN while the
-    marker hardly moves; speed (95th percentile), m/s."""
+    """The last two seconds, per marker (M,): jitter of the unfiltered positions, m, and of the filtered ones, NaN while
+    the marker moves; lag, s, NaN while it hardly does; speed (95th percentile), m/s."""
 
     raw_jitter_m: Array
     jitter_m: Array
@@ -135,7 +105,9 @@ class FilterMeter:
             raw, filtered = self._raw[order, marker], self._filtered[order, marker]
             motion = motion_of(times, raw)
             filtered = np.where(np.isfinite(raw), filtered, np.nan)
-            rows.append((jitter(times, raw), jitter(times, filtered), lag(times, filtered, motion)[0], motion.speed))
+            rests = motion.speed <= MOVING_M_S  # what a filter leaves is not told from a motion
+            rows.append((jitter.moving(times, raw), jitter.resting(times, filtered) if rests else math.nan,
+                         lag(times, filtered, motion)[0], motion.speed))
         return MeterReading(*np.array(rows, dtype=np.float64).reshape(-1, 4).T)
 
 

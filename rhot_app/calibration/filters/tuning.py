@@ -22,11 +22,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.calibration.filters.meters import (
-    JITTER_WINDOW_S,
     FilterFigures,
     FilterTargets,
     MarkerFigures,
-    jitter,
     judge_filters,
     lag,
     motion_of,
@@ -35,7 +33,7 @@ from rhot_app.calibration.filters.meters import (
 from rhot_app.calibration.observations import InstantTable
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.errors import CalibrationError
-from rhot_app.filters import one_euro
+from rhot_app.filters import jitter, one_euro
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.triangulate import cast, empty_rays, triangulate
 from rhot_app.progress import Progress, silent
@@ -309,11 +307,11 @@ class FilterBench:
         return found[:, 0], found[:, 1]
 
     def _jitter(self, values: Array) -> Array:
-        return np.array([jitter(self._still.times_s, values[:, m]) for m in range(values.shape[1])])
+        return np.array([jitter.resting(self._still.times_s, values[:, m]) for m in range(values.shape[1])])
 
     def _drift(self, resting: Array) -> float:
         """The median marker's, m/s rms; 0 when no marker is known."""
-        speeds = [np.linalg.norm(velocities(self._still.times_s, resting[:, m], JITTER_WINDOW_S), axis=1)
+        speeds = [np.linalg.norm(velocities(self._still.times_s, resting[:, m], jitter.WINDOW_S), axis=1)
                   for m in np.flatnonzero(self.known)]
         found = [float(np.sqrt(np.mean(np.square(one[np.isfinite(one)])))) for one in speeds if np.isfinite(one).any()]
         return float(np.median(found)) if found else 0.0

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.engine.status import EngineStatus, Preview, Published
+from rhot_app.latency import STACKED
 from rhot_app.state import HandState, SeenContour
 from rhot_app.ui.backend.contract import Listener
-from rhot_app.ui.models.meters import STACKED, JitterWindow, LatencyWindow, LossMeter, RateRows, rate_names
+from rhot_app.ui.models.meters import JitterWindow, LatencyWindow, LossMeter, RateRows, rate_names
 from rhot_app.ui.models.series import Series
 
 Array = NDArray[np.float64]

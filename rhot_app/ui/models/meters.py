@@ -6,29 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.engine.status import EngineStatus, NodeStatus
+from rhot_app.filters.jitter import GAP_S, ORDER, difference_weights
+from rhot_app.latency import STACKED, latency_row, p50_p99, whole_way
 from rhot_app.state import LATENCY_STAGES, HandState
 
 Array = NDArray[np.float64]
-
-ORDER = 3
-"""Differences are of third order: they remove any motion that is a parabola over four states."""
-
-
-def difference_weights(times_s: Array) -> Array:
-    """(4,) weights that annul every parabola sampled at `times_s` (4,) s and pass white noise with gain one.
-
-    They are those of the third divided difference, scaled to unit length, so unevenly spaced states are no problem.
-    """
-    gaps = times_s[:, None] - times_s[None, :]
-    np.fill_diagonal(gaps, 1.0)
-    weights = 1.0 / gaps.prod(axis=1)
-    return np.asarray(weights / np.linalg.norm(weights))
 
 
 class JitterWindow:
     """Fed with every state; tells each marker's jitter over the last `span_s` seconds, m."""
 
-    def __init__(self, span_s: float = 1.0, capacity: int = 512, gap_s: float = 0.12) -> None:
+    def __init__(self, span_s: float = 1.0, capacity: int = 512, gap_s: float = GAP_S) -> None:
         self._span_ns = round(span_s * 1e9)
         self._gap_ns = round(gap_s * 1e9)
         self._capacity = capacity
@@ -77,9 +65,6 @@ class JitterWindow:
 
 # -- latency by stage --------------------------------------------------------------------------------------------------
 
-STACKED: tuple[str, ...] = LATENCY_STAGES[:-1]
-"""The stages that follow one another; the last entry of `LATENCY_STAGES` overlaps them and is not stacked."""
-
 BUDGET_S = 1.0 / 90.0
 """One frame at the 90 fps that the thesis names as the camera's limit (RHOT ch. 9): 11.1 ms."""
 
@@ -90,7 +75,7 @@ class LatencyWindow:
     def __init__(self, span_s: float = 2.0, capacity: int = 1024) -> None:
         self._span_ns = round(span_s * 1e9)
         self._times = np.zeros(capacity, dtype=np.int64)
-        self._stages = np.full((capacity, len(STACKED)), np.nan)
+        self._stages = np.full((capacity, len(LATENCY_STAGES)), np.nan)
         self._count = 0
 
     def clear(self) -> None:
@@ -101,7 +86,7 @@ class LatencyWindow:
         """Take one state in; stages it does not name are unknown."""
         slot = self._count % len(self._times)
         self._times[slot] = state.t_master_ns
-        self._stages[slot] = [state.latency_s.get(stage, np.nan) for stage in STACKED]
+        self._stages[slot] = latency_row(state)
         self._count += 1
 
     def summary(self, now_ns: int) -> tuple[Array, Array]:
@@ -111,17 +96,7 @@ class LatencyWindow:
         """
         n = min(self._count, len(self._times))
         inside = self._stages[:n][now_ns - self._times[:n] <= self._span_ns]
-        p50 = np.full(len(STACKED) + 1, np.nan)
-        p99 = p50.copy()
-        known = np.isfinite(inside)
-        if not known.any():
-            return p50, p99
-        whole = np.where(known, inside, 0.0).sum(axis=1)
-        for column in range(len(STACKED)):
-            values = inside[known[:, column], column]
-            if len(values):
-                p50[column], p99[column] = np.percentile(values, (50, 99))
-        p50[-1], p99[-1] = np.percentile(whole, (50, 99))
+        p50, p99 = p50_p99(np.column_stack([inside[:, :len(STACKED)], whole_way(inside)]))
         return p50, p99
 
 

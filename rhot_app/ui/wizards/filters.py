@@ -78,8 +78,8 @@ class MeterPage(MovementPage):
         self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.table.setShowGrid(False)
-        self.table.setToolTip("Of the last two seconds: jitter without and with the filters in force, mm rms; and how "
-                              "far the filters lag behind, ms, while a marker moves.")
+        self.table.setToolTip("Of the last two seconds: jitter without filters and, at rest, with those in force, mm "
+                              "rms; and how far the filters lag behind, ms, while a marker moves.")
         caption = QLabel("Jitter, mm, and lag, ms, of now")
         caption.setProperty("muted", True)
         self.column.insertWidget(self.column.count() - 1, caption)
