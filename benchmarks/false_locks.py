@@ -62,7 +62,7 @@ def case(background: str, bare: bool, frames: int, kinds: list[str], folder: Pat
         scene = twin_scene(background, seed=seed)
         ids = scene.markers.ids
         missing = frozenset(ids if bare else (ids[seed % len(ids)],))
-        order = Order(scene, MOTIONS[seed % len(MOTIONS)], SECONDS, missing=missing)
+        order = Order(scene, MOTIONS[seed % len(MOTIONS)], SECONDS, unpainted=missing)
         filmed = data_set(order, folder)
         for kind in kinds:
             counts[kind] += tally(filmed, missing, kind)

@@ -48,13 +48,15 @@ what was found in them."""
 @dataclass(frozen=True, eq=False)
 class Order:
     """What a take shall show: a motion (name or file) in a scene, for how long, and over which network it is sent.
-    `sketched`: without pictures (`rhot_app.simulator.film.ideal_observations`), a hundred times faster."""
+    `sketched`: without pictures (`rhot_app.simulator.film.ideal_observations`), a hundred times faster. `unpainted`:
+    ids of markers that the hand does not wear, though the rig has them."""
 
     scene: Scene
     motion: str
     seconds: float
     network: Network = CABLE
     sketched: bool = False
+    unpainted: frozenset[str] = frozenset()
 
     @property
     def title(self) -> str:
@@ -65,6 +67,8 @@ class Order:
         """A folder name that differs with the order."""
         facts = [msgspec.to_builtins(self.scene.settings), self.scene.seed, self.seconds, asdict(self.network),
                  asdict(ORDINARY) if self.sketched else False, _motion_digest(self.motion)]
+        if self.unpainted:
+            facts.append(sorted(self.unpainted))
         if self.scene.settings.markers.endswith(".json"):  # a file may say something else the next time
             facts.append(msgspec.to_builtins(self.scene.markers))
         digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
@@ -120,7 +124,7 @@ def data_set(order: Order, folder: Path, watch: Watch = lambda title: None) -> D
 
 
 def _film(order: Order, place: Path, progress: Progress | None) -> None:
-    shot = make_shot(order.scene, order.motion, order.seconds)
+    shot = make_shot(order.scene, order.motion, order.seconds, order.unpainted)
     with new_folder(place) as work:
         save_shot(shot, work)
         rig = load_rig(work / RIG_NAME)

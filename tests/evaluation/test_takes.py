@@ -107,8 +107,17 @@ def test_orders_that_differ_have_names_that_differ() -> None:
     names = {Order(scene(), "grasp", 1.0).name(), Order(scene(2), "grasp", 1.0).name(),
              Order(scene(), "wave", 1.0).name(), Order(scene(), "grasp", 2.0).name(),
              Order(scene(), "grasp", 1.0, Network(loss=0.1)).name(), Order(scene(), "grasp", 1.0, CABLE, True).name(),
-             Order(make_scene(msgspec.structs.replace(twin_defaults(), markers="rhot8"), 1), "grasp", 1.0).name()}
-    assert len(names) == 7
+             Order(make_scene(msgspec.structs.replace(twin_defaults(), markers="rhot8"), 1), "grasp", 1.0).name(),
+             Order(scene(), "grasp", 1.0, unpainted=frozenset({"thumb"})).name()}
+    assert len(names) == 8
+
+
+def test_a_hand_without_a_markers_paint_shows_all_others(tmp_path: Path) -> None:
+    one = data_set(Order(scene(), "rest", 0.3, unpainted=frozenset({"ring"})), tmp_path)
+    _, frames = through_the_door(one, one.records())
+    share = found_share(frames)
+    ring = scene().markers.ids.index("ring")
+    assert share[ring] < 0.1 and np.delete(share, ring).min() > 0.9
 
 
 def test_a_marker_file_that_says_something_else_is_another_order(tmp_path: Path) -> None:
