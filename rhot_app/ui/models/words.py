@@ -36,9 +36,11 @@ CONDITIONS: dict[str, Look] = {
     Condition.IDLE.value: Look("IDLE", "square", "neutral", "Nothing is running. Press Start to begin."),
     Condition.SEARCHING.value: Look("SEARCHING", "ring", "accent",
                                     "The nodes stream, but the hand has not been found yet."),
-    Condition.TRACKING.value: Look("TRACKING", "disc", "good", "The hand is tracked and every marker is seen."),
+    Condition.TRACKING.value: Look("TRACKING", "disc", "good",
+                                   "The hand is tracked, and its markers, landmarks or contours are seen by enough "
+                                   "cameras."),
     Condition.PARTIAL.value: Look("PARTIAL", "half", "caution",
-                                  "The hand is tracked, but some markers, or contours of some fingers, are not "
+                                  "The hand is tracked, but some of its markers, landmarks or contours are not "
                                   "seen by enough cameras."),
     Condition.LOST.value: Look("LOST", "cross", "bad", "The hand was tracked and is out of sight now."),
     Condition.FAULT.value: Look("FAULT", "octagon", "fault", "Something is broken; the sentence below says what."),
