@@ -58,6 +58,11 @@ class Chart:
         return _Paper(self, width, height).drawing()
 
 
+def hex_of(rgb: tuple[int, int, int]) -> str:
+    """``#rrggbb`` of three bytes."""
+    return "#{:02x}{:02x}{:02x}".format(*rgb)
+
+
 def ticks(span: Span, *, log: bool) -> list[float]:
     """Round values of an axis: at most seven, or powers of ten, with 2 and 5 between where there are few of them."""
     low, high = span

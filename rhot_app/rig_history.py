@@ -15,9 +15,12 @@ from pathlib import Path
 from rhot_app.errors import RigError
 from rhot_app.hand.anatomy import FORMAT, HandAnatomy, load_hand, save_hand
 from rhot_app.project import Rig, load_rig, save_rig
-from rhot_node.files import read_json, require_replaceable, why
+from rhot_node.files import read_input, read_json, require_replaceable, why
 
 KEPT = 50  # versions; the oldest go first
+
+RESTORING = "restoring"
+"""First word of the reason of every restore."""
 
 _NAME = re.compile(r"^(\d{8}T\d{6}\d{6}Z)-(.*)\.json$")
 _STAMP = "%Y%m%dT%H%M%S%fZ"
@@ -98,13 +101,36 @@ def restore(path: Path, version: Version) -> Rig:
     Raises RigError when the version cannot be read or the rig not written.
     """
     rig = load_version(path, version)
-    accept(path, rig, "restoring an earlier version")
+    accept(path, rig, f"{RESTORING} an earlier version")
     return rig
 
 
 def load_version(path: Path, version: Version) -> Rig:
     """The rig of a kept version of `path`, whose objects lie where those of `path` do. Raises RigError."""
     return load_rig(version.path, path.absolute().parent)
+
+
+def in_force(path: Path) -> dict[str, datetime]:
+    """Time of the last calibration by its reason, as far as it is still in force: one that a restore took away is not,
+    and one that a restore brought back is. Empty for a rig file without a history."""
+    kept = list(reversed(versions(path)))  # oldest first; each file is the state before its event
+    texts = [_text(version.path) for version in kept] + [_text(path)]
+    states: list[dict[str, datetime]] = [{}]
+    for number, version in enumerate(kept):
+        after = texts[number + 1]
+        if version.replaced_by.startswith(RESTORING):
+            earlier = [k for k in range(number + 1) if texts[k] == after]
+            states.append(dict(states[earlier[-1]]) if earlier else {})
+        else:
+            states.append({**states[-1], version.replaced_by: version.replaced_at})
+    return states[-1]
+
+
+def _text(path: Path) -> bytes:
+    try:
+        return read_input(path)
+    except OSError:
+        return b""
 
 
 def _folder(path: Path) -> Path:

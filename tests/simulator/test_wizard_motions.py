@@ -16,7 +16,7 @@ from rhot_app.simulator.film.scene_objects import make_object
 from rhot_app.simulator.scene.rigid_target import BoardPoses
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_description import BoardShow, HandShow
-from rhot_app.ui.wizards.steps.bones_steps import SECONDS
+from rhot_app.ui.wizards.bones import SECONDS
 
 Array = NDArray[np.float64]
 

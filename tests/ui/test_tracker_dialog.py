@@ -13,13 +13,14 @@ from patience import PATIENCE_MS, PATIENCE_S
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
+from rhot_app.calibration.proposal import rows_of
+from rhot_app.calibration.rig_figures import tracker_text
 from rhot_app.hand.anthropometry import hand_length
 from rhot_app.project import DepthSettings, TrackerSettings, load_rig, save_rig
 from rhot_app.rig_history import versions
 from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
 from rhot_app.ui.models import proposal
-from rhot_app.ui.models.rows import rig_rows
-from rhot_app.ui.models.words import scale_text, settings_text, size_text
+from rhot_app.ui.models.words import scale_text, size_text
 from rhot_node.files import resource_path
 from rhot_node.markers import load_markers
 
@@ -238,7 +239,7 @@ def test_a_size_is_written_with_the_digits_that_mean_something():
 
 
 def test_earlier_versions_tell_of_the_tracker():
-    rows = rig_rows(synthetic_rig(), with_tracker(FLOATING))
+    rows = rows_of(synthetic_rig(), with_tracker(FLOATING))
     assert [(row.what, row.before, row.after) for row in rows] == [
         ("tracker", "classic", "estimator, full, anatomical limits, size estimated")]
 
@@ -275,7 +276,7 @@ def test_an_old_rig_with_landmarks_says_what_it_tracks(opened):
     QTest.keyClicks(dialog.observe_box, "Landm")
     desk.until(lambda: load_rig(desk.path).tracker.observe == "landmarks" and dialog.close_button.isEnabled())
     assert "detector" in dialog.observe_words.text()
-    assert settings_text(desk.dialog.chosen).split(", ")[:3] == ["estimator", "landmarks", "full"]
+    assert tracker_text(desk.dialog.chosen).split(", ")[:3] == ["estimator", "landmarks", "full"]
 
 
 def test_two_bare_hands_come_back_from_the_classic_tracker(opened):

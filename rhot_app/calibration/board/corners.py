@@ -20,7 +20,7 @@ FEWEST_CORNERS = 6  # of a board that is seen in part
 SMALLEST_PX = 48  # the shorter side of a picture; smaller ones hold no board, and OpenCV's searches fail on them
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class BoardView:
     """The corners of one board in one picture.
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.colour.identity import free_paints, identify
-from rhot_app.calibration.colour.illuminant import SAME
 from rhot_app.calibration.colour.model import Obstacles, range_of_samples, solve_models
 from rhot_app.calibration.colour.samples import MarkedPicture, PaintSamples
 from rhot_app.calibration.colour.separability import Separability, judge_colours
@@ -46,37 +44,6 @@ class ColourReport:
     rehearsal: Rehearsal
     free: tuple[str, ...]
     verdict: Verdict
-
-    def to_json(self) -> dict[str, Any]:
-        """The fields of ``rhot calibrate colours --json``, the verdict's excepted."""
-        chosen = {marker.id: marker for marker in self.markers.markers}
-        return {
-            "markers": [{
-                "id": one.name, "role": chosen[one.name].role, "chroma": msgspec.to_builtins(chosen[one.name].chroma),
-                "range": msgspec.to_builtins(chosen[one.name].range), "display_rgb": list(one.rgb),
-                "samples": len(one.colours), "pictures": one.frames, "area_px": round(4.0 * one.area, 1),
-                "coverage_percent": round(100.0 * covered, 2), "lost_percent": round(100.0 * lost, 1)}
-                for one, covered, lost in zip(self.samples, self.separability.coverage, self.rehearsal.lost,
-                                              strict=True)],
-            "separability": {
-                "rows": list(self.names), "columns": [*self.names, *self.separability.others],
-                "percent": np.round(100.0 * self.separability.matrix, 2).tolist(),
-                "sentences": list(self.separability.sentences)},
-            "room": {
-                "hue_step_deg": 360 // len(self.room.hue_px), "hue_from_deg": -180,
-                "hue_px": np.round(self.room.hue_px, 1).tolist(),
-                "rivals": {name: None if rival is None else {
-                    "picture": rival.picture + 1, "x": round(rival.x, 1), "y": round(rival.y, 1),
-                    "area_px": round(rival.area_px), "passing_px": round(rival.passing_px),
-                    "merit": round(rival.merit, 3)}
-                    for name, rival in zip(self.names, self.room.rivals, strict=True)}},
-            "failures": [{"marker": one.marker, "picture": one.picture + 1, "outcome": one.outcome,
-                          "cause": one.cause.code, "sentence": one.cause.sentence,
-                          "warmth": one.lamp.temperature_shift, "brightness": one.lamp.brightness,
-                          "tracked": one.tracked,
-                          "same_lamp": one.lamp == SAME} for one in self.rehearsal.failures],
-            "free_paints": list(self.free),
-        }
 
 
 def solve_colours(samples: Sequence[PaintSamples], views: Sequence[MarkedPicture], *, skin: Colours = NO_COLOURS,

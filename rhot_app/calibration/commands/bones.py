@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import show
+from rhot_app.calibration.registry import BONES
+from rhot_app.calibration.report import Figure, Report, Table
 from rhot_app.errors import CalibrationError, input_file
 from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
@@ -15,7 +18,10 @@ from rhot_node.terminal import add_examples
 if TYPE_CHECKING:
     from rhot_app.calibration.hand.bones_report import BonesReport
     from rhot_app.calibration.hand.marker_places import MarkerTracks
+    from rhot_app.calibration.proposal import Proposal
     from rhot_app.hand.anatomy import HandAnatomy
+    from rhot_app.progress import Progress
+    from rhot_app.project import Rig
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,17 +56,18 @@ def run(args: argparse.Namespace) -> int:
                                "--set BONE=MM (lengths measured with a ruler).")
     if args.out is not None and not args.out.parent.is_dir():
         raise CalibrationError(f"--out {args.out}: the folder {args.out.parent} does not exist; create it first.")
-    report, seats = _move(args) if recorded else (_enter(args, lengths), None)
+    result, seats = _move(args) if recorded else (_enter(args, lengths), None)
     written = ""
-    if args.out is not None and report.verdict.acceptable:
+    if args.out is not None and result.verdict.acceptable:
         try:
-            save_hand(args.out, report.hand)
+            save_hand(args.out, result.hand)
         except OSError as exc:
             raise CalibrationError(f"--out {args.out}: cannot be written ({exc.strerror}).") from exc
         written = str(args.out)
-    fields = {"name": report.hand.name, **report.to_json()} | ({} if seats is None else seats.to_json())
-    lines = _lines(report) + ([] if seats is None else seats.lines())
-    return show(fields, lines, report.verdict, as_json=args.json, written=written)
+    said = report(result)
+    if seats is not None:
+        said = replace(said, notes=(*said.notes, *seats.lines()), fields={**said.fields, **seats.to_json()})
+    return show(said, as_json=args.json, written=written)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,9 +131,8 @@ def _tracks(args: argparse.Namespace) -> tuple[MarkerTracks, _Seats, HandAnatomy
     from rhot_app.project import load_rig
 
     rig, instants = read_instants(args.log, None if args.rig is None else load_rig(args.rig))
-    markers = rig.markers.markers
-    roles = {marker.id: marker.role for marker in markers if marker.role is not None} | roles
-    painted = frozenset(marker.id for marker in markers if marker.shape in ("capsule", "band"))
+    worn, painted = roles_of(rig)
+    roles = worn | roles
     tracks = tracks_of(instants.times_s, instants.positions, rig.markers.ids, roles, painted=painted)
     return tracks, _seats(tracks, rig.markers.ids, roles), rig.hand
 
@@ -176,13 +182,65 @@ def _lengths(words: list[str]) -> dict[str, float]:
     return found
 
 
-def _lines(report: BonesReport) -> list[str]:
-    """The figures for people."""
-    lines = [f"{'bone':18}{'length':>9}{'±':>7}  mm"]
-    lines += [f"{bone.name:18}{bone.length_mm:9.1f}{bone.std_mm:7.1f}  {bone.known.word}" for bone in report.bones]
-    lines += [f"{'reach ' + reach.finger:18}{reach.length_mm:9.1f}{reach.std_mm:7.1f}" for reach in report.reaches]
-    lines += [f"marker {spot.marker} on {spot.place}: along {spot.along_mm:.1f}, across {spot.across_mm:.1f}, "
-              f"above {spot.above_mm:.1f} mm" for spot in report.markers]
-    lines += [f"rigid: {pair.first} - {pair.second} {pair.distance_mm:.2f} ± {pair.std_mm:.2f} mm"
-              for pair in report.rigid]
-    return lines
+# -- what is said of the result, and what it changes -------------------------------------------------------------------
+
+NAMES = {"movement": "measured by movement", "reach": "measured by movement", "entered": "measured with a ruler",
+         "landmarks": "measured from landmarks"}
+"""Of a hand in a rig, by the method."""
+
+
+def solve_log(log: Path, rig: Rig, base: HandAnatomy, *, progress: Progress) -> BonesReport:
+    """The hand from a recording. Raises CalibrationError."""
+    from rhot_app.calibration.hand.bones import solve_bones
+    from rhot_app.calibration.hand.marker_places import tracks_of
+    from rhot_app.calibration.recorded_observations import read_instants
+
+    progress("reading the recording", 0.0)
+    _, instants = read_instants(log, rig)
+    roles, painted = roles_of(rig)
+    tracks = tracks_of(instants.times_s, instants.positions, rig.markers.ids, roles, painted=painted)
+    return solve_bones(tracks, base, progress=progress)
+
+
+def roles_of(rig: Rig) -> tuple[dict[str, str], frozenset[str]]:
+    """The places of markers that have one, and the markers that are painted round a finger."""
+    markers = rig.markers.markers
+    return ({marker.id: marker.role for marker in markers if marker.role is not None},
+            frozenset(marker.id for marker in markers if marker.shape in ("capsule", "band")))
+
+
+def report(result: BonesReport) -> Report:
+    """The size of the hand, its bones and reaches, and where its markers sit."""
+    bones = tuple((Figure("bone", bone.name), Figure("length", bone.length_mm, "mm", decimals=1, key="length_mm"),
+                   Figure("±", bone.std_mm, "mm", decimals=1, key="std_mm"),
+                   Figure("", bone.usual_std_mm, key="usual_std_mm"), Figure("known", bone.known.word),
+                   Figure("", bone.known.value, key="known")) for bone in result.bones)
+    reaches = tuple((Figure("reach of", reach.finger),
+                     Figure("length", reach.length_mm, "mm", decimals=1, key="length_mm"),
+                     Figure("±", reach.std_mm, "mm", decimals=1, key="std_mm")) for reach in result.reaches)
+    spots = tuple((Figure("marker", spot.marker), Figure("on", spot.place, key="place"),
+                   Figure("along", spot.along_mm, "mm", decimals=1, key="along_mm"),
+                   Figure("across", spot.across_mm, "mm", decimals=1, key="across_mm"),
+                   Figure("above", spot.above_mm, "mm", decimals=1, key="above_mm"),
+                   Figure("", spot.std_mm, key="std_mm")) for spot in result.markers)
+    rigid = tuple((Figure("rigid", f"{pair.first} - {pair.second}"),
+                   Figure("", (pair.first, pair.second), key="markers"),
+                   Figure("distance", pair.distance_mm, "mm", pair.std_mm, key="distance_mm", sd_key="std_mm"))
+                  for pair in result.rigid)
+    return Report(
+        result.verdict, (Figure("size", 100.0 * result.size, "%", 100.0 * result.size_std),),
+        (Table("bones", bones, by_name=True), Table("reach", reaches, by_name=True),
+         Table("markers", spots, by_name=True), Table("rigid_distances", rigid)), fields={
+            "name": result.hand.name, "method": result.method, "side": result.hand.side, "size": result.size,
+            "size_std": result.size_std, "residual_mm": result.residual_mm, "noise_mm": result.noise_mm,
+            "error_mm": result.error_mm, "seconds": result.seconds, "instants": result.instants})
+
+
+def propose(result: BonesReport, rig: Rig) -> Proposal:
+    """The rig with this hand."""
+    import msgspec
+
+    from rhot_app.calibration.proposal import proposed
+
+    after = msgspec.structs.replace(rig, hand=msgspec.structs.replace(result.hand, name=NAMES[result.method]))
+    return proposed(BONES.reason, report(result), rig, after)

@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import add_rig_or_file, rig_of, tell
+from rhot_app.calibration.report import Report
 from rhot_app.options import add_json_argument
 from rhot_node.terminal import add_examples
 
@@ -30,8 +31,9 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.calibration.check.checks import check_rig
 
     report, calibration = check_rig(rig), calibration_text(rig)
-    tell({**_fields(report), "calibration": calibration}, [*_lines(report), f"cameras calibrated: {calibration}"],
-         report.verdict, as_json=args.json)
+    said = Report(report.verdict, notes=(*_lines(report), f"cameras calibrated: {calibration}"),
+                  fields={**_fields(report), "calibration": calibration})
+    tell(said, as_json=args.json)
     return 0 if report.verdict.acceptable else 2
 
 

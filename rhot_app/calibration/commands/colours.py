@@ -5,11 +5,14 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import show
+from rhot_app.calibration.registry import COLOURS
+from rhot_app.calibration.report import Figure, Report, Table
 from rhot_app.errors import CalibrationError, input_file
 from rhot_app.options import add_json_argument, add_out_argument
 from rhot_node.errors import PictureError
@@ -20,7 +23,10 @@ if TYPE_CHECKING:
 
     from rhot_app.calibration.colour.colours import ColourReport
     from rhot_app.calibration.colour.paint_region import PaintRegion
+    from rhot_app.calibration.proposal import Proposal
     from rhot_app.calibration.verdict import Finding
+    from rhot_app.charts import Chart
+    from rhot_app.project import Rig
     from rhot_node.detect.image import YuvImage
 
 EPILOG = """Boxes are x,y,w,h in pixels of the picture, (0, 0) at its top-left corner: nothing but paint inside, and as
@@ -95,17 +101,18 @@ def run(args: argparse.Namespace) -> int:
     skin = _skin([parse_box(f"skin{text}" if text.startswith("@") else f"skin={text}", "--skin") for text in args.skin],
                  images, args.image)
     line = ProgressLine("colours", sys.stderr)
-    report = solve_colours(collector.samples, collector.views, skin=skin, base=base, progress=line.report)
+    result = solve_colours(collector.samples, collector.views, skin=skin, base=base, progress=line.report)
     line.finish()
-    verdict, written = with_findings(report.verdict, [*unreadable, *_note_enlarged(enlarged)]), ""
-    if report.verdict.acceptable:
+    said, written = report(result), ""
+    if result.verdict.acceptable:
         try:
-            save_markers(args.out, report.markers)
+            save_markers(args.out, result.markers)
         except OSError as exc:
             raise CalibrationError(f"--out {args.out}: cannot be written ({exc.strerror}).") from exc
         written = str(args.out)
-    fields = {**report.to_json(), "images": [str(path) for path in args.image]}
-    return show(fields, _lines(report), verdict, as_json=args.json, written=written)
+    said = replace(said, verdict=with_findings(said.verdict, [*unreadable, *_note_enlarged(enlarged)]),
+                   fields={**said.fields, "images": [str(path) for path in args.image]})
+    return show(said, as_json=args.json, written=written)
 
 
 def parse_box(text: str, option: str) -> BoxArgument:
@@ -221,21 +228,107 @@ def _skin(boxes: list[BoxArgument], images: list[YuvImage | PictureError], paths
     return np.concatenate(found)
 
 
-def _lines(report: ColourReport) -> list[str]:
-    """The tables for people: every marker's model, and the separability matrix in percent."""
-    lines = [f"{'marker':<12} {'Cb':>6} {'Cr':>6} {'hue ±':>7} {'chroma >=':>9} {'luma':>8} {'covered %':>9} "
-             f"{'pictures':>8} {'lost %':>6}"]
-    chosen = {marker.id: marker.chroma for marker in report.markers.markers}
-    for one, covered, lost in zip(report.samples, report.separability.coverage, report.rehearsal.lost, strict=True):
-        chroma = chosen[one.name]
-        lines.append(f"{one.name:<12} {chroma.cb:6.1f} {chroma.cr:6.1f} {chroma.hue_tolerance_deg:7.1f} "
-                     f"{chroma.magnitude_min:9.1f} {chroma.luma_min:4d}-{chroma.luma_max:<3d} {100 * covered:9.1f} "
-                     f"{one.frames:8d} {100 * lost:6.1f}")
-    columns = (*report.names, *report.separability.others)
-    lines += ["", "taken for     " + " ".join(f"{name[:9]:>9}" for name in columns) + "   (% of the column)"]
-    for name, row in zip(report.names, report.separability.matrix, strict=True):
-        lines.append(f"{name:<13} " + " ".join(f"{100 * share:9.1f}" for share in row))
-    if max(one.frames for one in report.samples) == 1:
-        lines += ["", "Every colour was learnt from one picture. Boxes in others (NAME@2), with the marker in another "
-                  "place and turned, make the models safer."]
-    return lines
+# -- what is said of the result, and what it changes -------------------------------------------------------------------
+
+def report(result: ColourReport) -> Report:
+    """Every marker's model, which colours are taken for which, what else in the room has them, and the hues."""
+    import msgspec
+    import numpy as np
+
+    from rhot_app.calibration.colour.illuminant import SAME
+
+    apart, room = result.separability, result.room
+    chosen = {marker.id: marker for marker in result.markers.markers}
+    markers = []
+    for one, covered, lost in zip(result.samples, apart.coverage, result.rehearsal.lost, strict=True):
+        marker, chroma = chosen[one.name], chosen[one.name].chroma
+        markers.append((
+            Figure("marker", one.name, key="id"), Figure("", marker.role, key="role"),
+            Figure("", msgspec.to_builtins(chroma), key="chroma"),
+            Figure("", msgspec.to_builtins(marker.range), key="range"), Figure("", one.rgb, key="display_rgb"),
+            Figure("Cb", chroma.cb, decimals=1), Figure("Cr", chroma.cr, decimals=1),
+            Figure("hue ±", chroma.hue_tolerance_deg, "°", decimals=1),
+            Figure("chroma at least", chroma.magnitude_min, decimals=1),
+            Figure("luma", f"{chroma.luma_min}-{chroma.luma_max}"),
+            Figure("covered", round(100.0 * covered, 2), "%", decimals=1, key="coverage_percent"),
+            Figure("pictures", one.frames, decimals=0, key="pictures"),
+            Figure("lost", round(100.0 * lost, 1), "%", decimals=1, key="lost_percent"),
+            Figure("", len(one.colours), key="samples"), Figure("", round(4.0 * one.area, 1), key="area_px")))
+    columns = (*result.names, *apart.others)
+    matrix = tuple((Figure("taken for", name), *(Figure(column, 100.0 * share, "%", decimals=1)
+                                                 for column, share in zip(columns, shares, strict=True)))
+                   for name, shares in zip(result.names, apart.matrix, strict=True))
+    few = max(one.frames for one in result.samples) == 1
+    rivals = {name: None if rival is None else {
+        "picture": rival.picture + 1, "x": round(rival.x, 1), "y": round(rival.y, 1), "area_px": round(rival.area_px),
+        "passing_px": round(rival.passing_px), "merit": round(rival.merit, 3)}
+        for name, rival in zip(result.names, room.rivals, strict=True)}
+    return Report(
+        result.verdict, tables=(Table("markers", tuple(markers)), Table("", matrix)),
+        notes=("Every colour was learnt from one picture. Boxes in others (NAME@2), with the marker in another place "
+               "and turned, make the models safer.",) if few else (),
+        fields={
+            "separability": {"rows": result.names, "columns": columns, "percent": np.round(100.0 * apart.matrix, 2),
+                             "sentences": apart.sentences},
+            "room": {"hue_step_deg": 360 // len(room.hue_px), "hue_from_deg": -180, "hue_px": np.round(room.hue_px, 1),
+                     "rivals": rivals},
+            "failures": [{"marker": one.marker, "picture": one.picture + 1, "outcome": one.outcome,
+                          "cause": one.cause.code, "sentence": one.cause.sentence, "warmth": one.lamp.temperature_shift,
+                          "brightness": one.lamp.brightness, "tracked": one.tracked, "same_lamp": one.lamp == SAME}
+                         for one in result.rehearsal.failures],
+            "free_paints": result.free},
+        charts=(hue_chart(result),))
+
+
+HEADROOM = 1.05
+"""Of the chart above the highest column, logarithmically."""
+
+
+def hue_chart(result: ColourReport) -> Chart:
+    """Which hues the room has, and which of them each marker's bounds let through."""
+    import numpy as np
+
+    from rhot_app.charts import Chart, Curve, hex_of
+
+    room = result.room.hue_px
+    step_deg = 360.0 / len(room)
+    left = -180.0 + step_deg * np.arange(len(room))
+    x = np.stack([left, left + step_deg], axis=1).ravel()
+    top = 10.0 ** (HEADROOM * np.log10(max(float(room.max()), 10.0)))
+    chosen = {marker.id: marker for marker in result.markers.markers}
+    curves = [Curve("the room", x, np.repeat(np.maximum(room, 1.0), 2))]
+    for one in result.samples:
+        marker = chosen[one.name]
+        middle = float(np.degrees(marker.chroma.hue_rad))
+        low, high = middle - marker.chroma.hue_tolerance_deg, middle + marker.chroma.hue_tolerance_deg
+        for turn in (-360.0, 0.0, 360.0):  # a band across red is drawn at both ends
+            ends = np.clip(np.array([low + turn, high + turn]), -180.0, 180.0)
+            if ends[1] > ends[0]:
+                name = one.name if low + turn < middle + turn <= 180.0 and middle + turn > -180.0 else ""
+                curves.append(Curve(name, ends, np.ones(2), "band", np.full(2, top), hex_of(one.rgb)))
+    return Chart("Colours of the room and of the markers", "hue (angle of chroma), °",
+                 "pixels per picture", tuple(curves), log_y=True)
+
+
+def propose(result: ColourReport, rig: Rig, node_settings: Mapping[int, dict[str, Any]]) -> Proposal:
+    """The rig with the new marker set, and every node whose settings are known with the very same."""
+    import msgspec
+
+    from rhot_app.calibration.proposal import NodeChange, Row, proposed
+
+    markers = msgspec.to_builtins(result.markers)
+    changes: list[NodeChange] = []
+    rows: list[Row] = []
+    for node in rig.nodes:
+        if node.node_id in node_settings:
+            before = node_settings[node.node_id]["markers"]
+            changes.append(NodeChange(node.node_id, {"markers": before}, {"markers": markers}))
+            rows.append(Row(f"colours in camera {node.name}", "the rig's" if before == msgspec.to_builtins(rig.markers)
+                            else "not the rig's", "the new ones"))
+        elif not node.text_datagrams:
+            rows.append(Row(f"colours in camera {node.name}", "not known", "not changed: the node does not answer"))
+    made = proposed(COLOURS.reason, Report(result.verdict), rig, msgspec.structs.replace(rig, markers=result.markers),
+                    changes=tuple(changes), rows=tuple(rows))
+    shown = {f"{old.id}: colour": (old.display_rgb, new.display_rgb)
+             for old, new in zip(rig.markers.markers, result.markers.markers, strict=True)}
+    return replace(made, rows=tuple(replace(row, swatches=shown.get(row.what)) for row in made.rows))

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rhot_app.calibration.commands.output import require_folder, show
 from rhot_app.calibration.registry import DEPTH
+from rhot_app.calibration.report import Figure, Report, Table
+from rhot_app.calibration.verdict import with_findings
 from rhot_app.errors import CalibrationError, input_file, positive_number
 from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from rhot_app.calibration.depth.fit import DepthGeometry, DepthReport
-    from rhot_app.calibration.depth.table import DepthRow
+    from rhot_app.calibration.proposal import Proposal
     from rhot_app.project import Rig
 
 
@@ -37,13 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit and report; the rig is written only with ``--out``."""
-    import msgspec
-
-    from rhot_app.calibration.depth.fit import fit_depth, replaced_calibration
+    from rhot_app.calibration.depth.fit import fit_depth
     from rhot_app.calibration.depth.table import read_depth_table
-    from rhot_app.calibration.verdict import with_findings
     from rhot_app.project import load_rig
-    from rhot_app.rig_history import accept
 
     if args.out is not None and args.rig is None:
         raise CalibrationError("--out writes a rig, so --rig must say which one.")
@@ -51,13 +46,9 @@ def run(args: argparse.Namespace) -> int:
     rig = None if args.rig is None else load_rig(args.rig)
     if rig is not None and len(rig.nodes) != 2:
         raise CalibrationError(f"{args.rig}: disparity needs two cameras, the rig has {len(rig.nodes)}.")
-    report = fit_depth(read_depth_table(args.table), _geometry(args, rig))
-    verdict, written = report.verdict, ""
-    if rig is not None and args.out is not None and verdict.acceptable:
-        verdict = with_findings(verdict, replaced_calibration(rig))
-        accept(args.out, msgspec.structs.replace(rig, depth=report.settings), DEPTH.reason)
-        written = str(args.out)
-    return show(_fields(report), _lines(report), verdict, as_json=args.json, written=written)
+    result = fit_depth(read_depth_table(args.table), _geometry(args, rig))
+    written = "" if rig is None else propose(result, rig).save(args.out)
+    return show(report(result, rig if args.out is not None else None), as_json=args.json, written=written)
 
 
 def _geometry(args: argparse.Namespace, rig: Rig | None) -> DepthGeometry:
@@ -80,38 +71,51 @@ def _geometry(args: argparse.Namespace, rig: Rig | None) -> DepthGeometry:
     return geometry
 
 
-def _fields(report: DepthReport) -> dict[str, Any]:
-    def cm(metres: NDArray[np.float64]) -> list[float]:
-        return list((100.0 * metres).tolist())
+def report(result: DepthReport, rig: Rig | None = None) -> Report:
+    """The law and how well each row obeys it; what of `rig` it takes the place of is in the verdict."""
+    import numpy as np
 
-    columns = zip(report.rows, cm(report.corrected_m), cm(report.theory_m), cm(report.error_m), strict=True)
-    chart = report.chart
-    return {
-        "k": 100.0 * report.k_m, "z": report.z, "z_sd": report.z_sd, "k_unit": "cm px^-z",
-        "baseline_mm": 1e3 * report.geometry.baseline_m, "rows_used": len(report.rows),
-        "rows_rejected": [{"row": row.where, "reason": row.reason} for row in report.rejected],
-        "corrected_cm": cm(report.corrected_m), "residuals_cm": cm(report.residuals_m),
-        "rows": [_row(row, *figures) for row, *figures in columns],
-        "chart": {"disparity_px": chart.disparity_px.tolist(), "fitted_cm": cm(chart.fitted_m),
-                  "theory_cm": cm(chart.theory_m), "low_cm": cm(chart.low_m), "high_cm": cm(chart.high_m)},
-    }
+    from rhot_app.calibration.depth.fit import replaced_calibration
+    from rhot_app.charts import Chart, Curve
+
+    verdict = with_findings(result.verdict, replaced_calibration(rig)) if rig is not None else result.verdict
+    chart, geometry = result.chart, result.geometry
+    rows = []
+    for row, *metres in zip(result.rows, result.corrected_m, result.theory_m, result.error_m, strict=True):
+        real = 100.0 * row.distance_m
+        corrected, theory, error = (100.0 * float(one) for one in metres)
+        rows.append((Figure("distance", real, "cm", decimals=1, key="real_cm"),
+                     Figure("disparity", row.disparity_px, "px", key="disparity_px"),
+                     Figure("by the law", corrected, "cm", decimals=3, key="corrected_cm"),
+                     Figure("off", 100.0 * (corrected / real - 1.0), "%", key="corrected_dev_pct"),
+                     Figure("by eq. 6.12", theory, "cm", decimals=3, key="calculated_cm"),
+                     Figure("off", 100.0 * (theory / real - 1.0), "%", key="calculated_dev_pct"),
+                     Figure("one px is", error, "cm", key="theoretical_error_cm")))
+    curves = (Curve("fitted law", chart.disparity_px, 100 * chart.fitted_m),
+              Curve("parallel cameras", chart.disparity_px, 100 * chart.theory_m, "dashes"),
+              Curve("one pixel more or less", chart.disparity_px, 100 * chart.low_m, "band", 100 * chart.high_m),
+              Curve("measured", np.abs([row.disparity_px for row in result.rows]),
+                    100 * np.array([row.distance_m for row in result.rows]), "dots"))
+    return Report(
+        verdict, (Figure("distance from", "disparity alone"), Figure("k", result.k_m, "m", decimals=4),
+                  Figure("z", result.z, sd=result.z_sd, key="z", sd_key="z_sd")),
+        (Table("rows", tuple(rows)),), ("Distance is k · |disparity|^z.",
+                                        *(f"left out: {row.where}: {row.reason}" for row in result.rejected)),
+        {"k": 100.0 * result.k_m, "k_unit": "cm px^-z", "baseline_mm": 1e3 * geometry.baseline_m,
+         "rows_used": len(result.rows), "corrected_cm": 100.0 * result.corrected_m,
+         "residuals_cm": 100.0 * result.residuals_m,
+         "rows_rejected": [{"row": row.where, "reason": row.reason} for row in result.rejected],
+         "chart": {"disparity_px": chart.disparity_px, "fitted_cm": 100.0 * chart.fitted_m,
+                   "theory_cm": 100.0 * chart.theory_m, "low_cm": 100.0 * chart.low_m,
+                   "high_cm": 100.0 * chart.high_m}},
+        (Chart(f"D = {100 * result.k_m:.1f} cm · |x|^{result.z:.4f}", "disparity, px", "distance, cm", curves),))
 
 
-def _row(row: DepthRow, corrected_cm: float, theory_cm: float, error_cm: float) -> dict[str, float]:
-    real_cm = 100.0 * row.distance_m
-    return {"real_cm": real_cm, "disparity_px": row.disparity_px,
-            "corrected_cm": corrected_cm, "corrected_dev_pct": 100.0 * (corrected_cm / real_cm - 1.0),
-            "calculated_cm": theory_cm, "calculated_dev_pct": 100.0 * (theory_cm / real_cm - 1.0),
-            "theoretical_error_cm": error_cm}
+def propose(result: DepthReport, rig: Rig) -> Proposal:
+    """The rig that takes distances from disparity by this law."""
+    import msgspec
 
+    from rhot_app.calibration.proposal import proposed
 
-def _lines(report: DepthReport) -> list[str]:
-    lines = ["", f"D = k |x|^z   k = {100.0 * report.k_m:.3f} cm   z = {report.z:.6f} ± {report.z_sd:.6f}", "",
-             "  real cm  disparity px  corrected cm      %   eq. 6.12 cm      %   one px is cm"]
-    for row, corrected, theory, error in zip(report.rows, report.corrected_m, report.theory_m, report.error_m,
-                                             strict=True):
-        real = row.distance_m
-        lines.append(f"{100 * real:9.1f}{row.disparity_px:14.2f}{100 * corrected:14.3f}"
-                     f"{100 * (corrected / real - 1):+7.2f}{100 * theory:14.3f}{100 * (theory / real - 1):+7.2f}"
-                     f"{100 * error:15.2f}")
-    return lines
+    after = msgspec.structs.replace(rig, depth=result.settings)
+    return proposed(DEPTH.reason, report(result, rig), rig, after)

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from rhot_app.calibration.commands.output import show
 from rhot_app.calibration.registry import FILTERS
+from rhot_app.calibration.report import Figure, Report, Table
 from rhot_app.errors import CalibrationError, input_file, positive_number
 from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.calibration.filters.meters import FilterTargets, MarkerFigures
-    from rhot_app.calibration.filters.tuning import FilterChoice, FilterCurves, FilterReport
+    from rhot_app.calibration.filters.tuning import FilterCurves, FilterReport
+    from rhot_app.calibration.proposal import Proposal
+    from rhot_app.calibration.report import Array
+    from rhot_app.charts import Chart, Curve
+    from rhot_app.progress import Progress
+    from rhot_app.project import Rig
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,18 +48,14 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.calibration.recorded_observations import read_instants
     from rhot_app.progress import ProgressLine
     from rhot_app.project import load_rig
-    from rhot_app.rig_history import accept
 
     targets, rig = _targets(args), load_rig(args.rig)
     still, fast = (read_instants(log, rig)[1] for log in (args.log_still, args.log_fast))
     line = ProgressLine("filters")
-    report = tune_filters(still, fast, rig, targets, line.report)
+    result = tune_filters(still, fast, rig, targets, line.report)
     line.finish()
-    choice, written = report.choice(per_marker=args.per_marker), ""
-    if args.out is not None and choice.verdict.acceptable:
-        accept(args.out, report.apply(rig, per_marker=args.per_marker), FILTERS.reason)
-        written = str(args.out)
-    return show(_fields(report, choice), _lines(report, choice), choice.verdict, as_json=args.json, written=written)
+    proposal = propose(result, rig, per_marker=args.per_marker)
+    return show(report(result, rig, per_marker=args.per_marker), as_json=args.json, written=proposal.save(args.out))
 
 
 def _targets(args: argparse.Namespace) -> FilterTargets:
@@ -68,48 +71,107 @@ def _targets(args: argparse.Namespace) -> FilterTargets:
     return targets
 
 
-def _fields(report: FilterReport, choice: FilterChoice) -> dict[str, Any]:
-    return {
-        "targets": {"jitter_mm": 1e3 * report.targets.jitter_m, "lag_ms": 1e3 * report.targets.lag_s},
-        "pixel": _filter(report.pixel, report), "position": _filter(report.position, report),
-        "markers": {marker.marker_id: _marker(marker) for marker in choice.markers},
-    }
+def solve_logs(still: Path, fast: Path, rig: Rig, targets: FilterTargets, *, progress: Progress) -> FilterReport:
+    """The filters from two recordings. Raises CalibrationError."""
+    from rhot_app.calibration.filters.tuning import tune_filters
+    from rhot_app.calibration.recorded_observations import read_instants
+
+    progress("reading the recordings", 0.0)
+    resting, moving = (read_instants(log, rig)[1] for log in (still, fast))
+    return tune_filters(resting, moving, rig, targets, progress)
 
 
-def _filter(curves: FilterCurves, report: FilterReport) -> dict[str, Any]:
+FilterStage = Literal["pixel", "position"]
+UNITS: dict[FilterStage, str] = {"pixel": "px/s", "position": "m/s"}
+
+
+def report(result: FilterReport, rig: Rig, *, per_marker: bool = False, stage: FilterStage = "position") -> Report:
+    """Both filters, and what they do to every marker; the charts are of one `stage`."""
+    choice, targets = result.choice(per_marker=per_marker), result.targets
+    notes = []
+    for name, unit, curves in (("before depth", UNITS["pixel"], result.pixel),
+                               ("after depth", UNITS["position"], result.position)):
+        chosen = curves.chosen
+        notes.append(f"{name}: min cutoff {chosen.min_cutoff_hz:g} Hz, beta {chosen.beta:g} Hz per {unit}, "
+                     f"derivative cutoff {chosen.derivative_cutoff_hz:g} Hz")
+    return Report(
+        choice.verdict, tables=(Table("markers", tuple(_marker(marker) for marker in choice.markers), by_name=True),),
+        notes=tuple(notes), fields={
+            "targets": {"jitter_mm": 1e3 * targets.jitter_m, "lag_ms": 1e3 * targets.lag_s},
+            "pixel": _filter(result.pixel, result), "position": _filter(result.position, result)},
+        charts=charts_of(result, rig, stage))
+
+
+def _filter(curves: FilterCurves, result: FilterReport) -> dict[str, Any]:
     import msgspec
 
     return {
         **msgspec.to_builtins(curves.chosen),
         "markers": {marker.marker_id: msgspec.to_builtins(own) for marker, own in zip(
-            report.markers, curves.by_marker, strict=True) if marker.known},
-        "curves": {"min_cutoff_hz": curves.min_cutoffs_hz.tolist(), "beta": curves.betas.tolist(), **{
-            name: [[_known(value, 1e3) for value in row] for row in rows.tolist()] for name, rows in (
-                ("still_jitter_mm", curves.still_jitter_m), ("lag_ms", curves.lag_s), ("error_mm", curves.error_m),
-                ("jitter_mm", curves.jitter_m))}},
-    }
+            result.markers, curves.by_marker, strict=True) if marker.known},
+        "curves": {"min_cutoff_hz": curves.min_cutoffs_hz, "beta": curves.betas,
+                   "still_jitter_mm": 1e3 * curves.still_jitter_m, "lag_ms": 1e3 * curves.lag_s,
+                   "error_mm": 1e3 * curves.error_m, "jitter_mm": 1e3 * curves.jitter_m}}
 
 
-def _marker(marker: MarkerFigures) -> dict[str, Any]:
-    return {"known": marker.known, "speed_m_s": _known(marker.speed_m_s), "raw_jitter_px": _known(marker.raw_jitter_px),
-            **{f"{name}_{unit}": _known(getattr(marker, f"{name}_{si}"), 1e3) for name, unit, si in (
-                ("raw_jitter", "mm", "m"), ("jitter", "mm", "m"), ("lag", "ms", "s"), ("error", "mm", "m"),
-                ("jitter_now", "mm", "m"), ("lag_now", "ms", "s"), ("error_now", "mm", "m"))}}
+def _marker(one: MarkerFigures) -> tuple[Figure, ...]:
+    return (Figure("marker", one.marker_id), Figure("", one.known, key="known"),
+            Figure("", one.speed_m_s, key="speed_m_s"), Figure("", one.raw_jitter_px, key="raw_jitter_px"),
+            Figure("jitter at rest, raw", 1e3 * one.raw_jitter_m, "mm", key="raw_jitter_mm"),
+            Figure("now", 1e3 * one.jitter_now_m, "mm", key="jitter_now_mm"),
+            Figure("new", 1e3 * one.jitter_m, "mm", key="jitter_mm"),
+            Figure("lag, now", 1e3 * one.lag_now_s, "ms", decimals=1, key="lag_now_ms"),
+            Figure("new", 1e3 * one.lag_s, "ms", decimals=1, key="lag_ms"),
+            Figure("error, now", 1e3 * one.error_now_m, "mm", key="error_now_mm"),
+            Figure("new", 1e3 * one.error_m, "mm", key="error_mm"))
 
 
-def _known(value: float, scale: float = 1.0) -> float | None:
-    """The value in the unit of the report, None for NaN, which JSON does not have."""
-    return scale * value if value == value else None
+def propose(result: FilterReport, rig: Rig, *, per_marker: bool) -> Proposal:
+    """The rig with the proposed filters, and what they do to every marker."""
+    from rhot_app.calibration.proposal import Row, proposed
+
+    rows = []
+    for one in result.choice(per_marker=per_marker).markers:
+        if one.known:
+            *_, jitter_now, jitter, lag_now, lag, _, _ = _marker(one)
+            rows += [Row(f"{one.marker_id}: jitter at rest", jitter_now.text, jitter.text),
+                     Row(f"{one.marker_id}: lag", lag_now.text, lag.text)]
+    return proposed(FILTERS.reason, report(result, rig, per_marker=per_marker), rig,
+                    result.apply(rig, per_marker=per_marker), rows=tuple(rows))
 
 
-def _lines(report: FilterReport, choice: FilterChoice) -> list[str]:
-    lines = [""]
-    for name, unit, curves in (("before depth", "px/s", report.pixel), ("after depth", "m/s", report.position)):
-        chosen = curves.chosen
-        lines.append(f"{name}: min cutoff {chosen.min_cutoff_hz:g} Hz, beta {chosen.beta:g} Hz per {unit}, derivative "
-                     f"cutoff {chosen.derivative_cutoff_hz:g} Hz")
-    lines += ["", "marker     jitter at rest, mm: raw   now   new     lag, ms: now   new   error, mm: now   new"]
-    for m in choice.markers:
-        lines.append(f"{m.marker_id:<10}{1e3 * m.raw_jitter_m:24.2f}{1e3 * m.jitter_now_m:6.2f}{1e3 * m.jitter_m:6.2f}"
-                     f"{1e3 * m.lag_now_s:17.1f}{1e3 * m.lag_s:6.1f}{1e3 * m.error_now_m:17.2f}{1e3 * m.error_m:6.2f}")
-    return lines
+def charts_of(result: FilterReport, rig: Rig, stage: FilterStage) -> tuple[Chart, ...]:
+    """The thesis's two steps: jitter over min cutoff, lag over beta, with what is allowed and what is chosen."""
+    from rhot_app.charts import Chart
+
+    curves: FilterCurves = getattr(result, stage)
+    targets, half = result.targets, 0.5 if stage == "pixel" else 1.0
+    jitter, lag = 1e3 * curves.still_jitter_m, 1e3 * curves.lag_s
+    return (Chart("Held still: jitter with beta 0", "min cutoff, Hz", "jitter, mm", (
+                *_by_marker(result, rig, curves.min_cutoffs_hz, jitter),
+                *_marks(curves.min_cutoffs_hz, jitter, 1e3 * targets.jitter_m, curves.chosen.min_cutoff_hz)),
+                log_x=True),
+            Chart("Moved fast: lag with that min cutoff", f"beta, Hz per {UNITS[stage]}", "lag, ms", (
+                *_by_marker(result, rig, curves.betas, lag),
+                *_marks(curves.betas, lag, 1e3 * half * targets.lag_s, curves.chosen.beta)), log_x=True))
+
+
+def _by_marker(result: FilterReport, rig: Rig, x: Array, y: Array) -> list[Curve]:
+    """One curve for each marker that has figures, in its own colour."""
+    import numpy as np
+
+    from rhot_app.charts import Curve, hex_of
+
+    colours = {marker.id: hex_of(marker.display_rgb) for marker in rig.markers.markers}
+    return [Curve(marker.marker_id, x, y[:, m], colour=colours[marker.marker_id])
+            for m, marker in enumerate(result.markers) if np.isfinite(y[:, m]).all()]
+
+
+def _marks(x: Array, y: Array, allowed: float, chosen: float) -> tuple[Curve, Curve]:
+    import numpy as np
+
+    from rhot_app.charts import Curve
+
+    top = max(float(np.nanmax(y, initial=0.0)), 1.2 * allowed)
+    return (Curve("allowed", x[[0, -1]], np.full(2, allowed), "dashes"),
+            Curve("chosen", np.full(2, chosen), np.array([0.0, top]), "dashes"))

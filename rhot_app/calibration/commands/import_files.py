@@ -16,6 +16,7 @@ from rhot_app.calibration.commands.output import (
     show,
     unit_of,
 )
+from rhot_app.calibration.report import Report
 from rhot_app.errors import CalibrationError, input_file
 from rhot_app.options import add_json_argument, add_out_argument
 from rhot_node.terminal import add_examples
@@ -89,12 +90,12 @@ def run(args: argparse.Namespace) -> int:
         written.append(str(args.out))
     pairs = [pair for pair in all_pairs(rig) if {pair.first, pair.second} <= chosen.keys()] if posed else []
     heights = _heights_m(rig, chosen) if posed else {}
-    return show({"format": name, "cameras": [_fields(node, chosen[node.name], posed, heights) for node in rig.nodes
-                                             if node.name in chosen],
-                 "baselines_mm": [{"first": pair.first, "second": pair.second, "baseline_mm": 1e3 * pair.baseline_m}
-                                  for pair in pairs]},
-                [*_lens_lines(rig, chosen), *_place_lines(pairs, heights, args.keep_world)], verdict,
-                as_json=args.json, written=", ".join(written))
+    said = Report(verdict, notes=(*_lens_lines(rig, chosen), *_place_lines(pairs, heights, args.keep_world)), fields={
+        "format": name,
+        "cameras": [_fields(node, chosen[node.name], posed, heights) for node in rig.nodes if node.name in chosen],
+        "baselines_mm": [{"first": pair.first, "second": pair.second, "baseline_mm": 1e3 * pair.baseline_m}
+                         for pair in pairs]})
+    return show(said, as_json=args.json, written=", ".join(written))
 
 
 def _chosen(texts: Sequence[str], cameras: list[ForeignCamera], rig: Rig | None) -> dict[str, ForeignCamera]:

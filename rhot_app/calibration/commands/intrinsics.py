@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import add_board_arguments, board_of, require_folder, show
+from rhot_app.calibration.commands.output import (
+    add_board_arguments,
+    board_of,
+    dropped_fields,
+    left_out,
+    require_folder,
+    show,
+)
 from rhot_app.calibration.registry import LENS
+from rhot_app.calibration.report import Figure, Report, Table
 from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
+    from rhot_app.calibration.board.boards import Board
+    from rhot_app.calibration.board.corners import BoardView
     from rhot_app.calibration.lens.intrinsics import IntrinsicsReport
+    from rhot_app.calibration.proposal import Proposal
+    from rhot_app.progress import Progress
     from rhot_app.project import Rig
 
 
@@ -31,12 +45,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate and report; files are written only when the verdict allows it."""
-    from rhot_app.calibration.check.camera_calibration import with_lens
     from rhot_app.calibration.lens.intrinsics import save_intrinsics, solve
     from rhot_app.calibration.lens.views import matching_files, read_views
     from rhot_app.errors import CalibrationError
     from rhot_app.progress import ProgressLine, within
-    from rhot_app.rig_history import accept
 
     require_folder(args.out)
     board = board_of(args)
@@ -47,59 +59,78 @@ def run(args: argparse.Namespace) -> int:
                                "folder is right.")
     line = ProgressLine("intrinsics")
     read = read_views(files, board, progress=within(line.report, 0.0, 0.5))
-    report = solve(read.views, board, square_pixels=args.square_pixels, dropped=read.dropped,
+    result = solve(read.views, board, square_pixels=args.square_pixels, dropped=read.dropped,
                    noticed=[] if read.size is None else [read.size], progress=within(line.report, 0.5, 1.0))
     line.finish()
     written = []
-    if report.verdict.acceptable and args.out is not None:
-        save_intrinsics(args.out, report)
+    if result.verdict.acceptable and args.out is not None:
+        save_intrinsics(args.out, result)
         written.append(str(args.out))
-    if report.verdict.acceptable and rig is not None:
-        accept(args.rig, with_lens(rig, args.node, report.intrinsics), f"{LENS.reason} {args.node}")
-        written.append(str(args.rig))
-    return show(fields_of(report), lines_of(report), report.verdict, as_json=args.json, written=", ".join(written))
+    if rig is not None:
+        written.append(propose(result, rig, args.node).save(args.rig))
+    return show(report(result), as_json=args.json, written=", ".join(filter(None, written)))
 
 
-def fields_of(report: IntrinsicsReport) -> dict[str, Any]:
-    """The JSON's fields."""
-    from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
+def solve_shown(views: Sequence[BoardView], board: Board, *, square_pixels: bool,
+                progress: Progress) -> IntrinsicsReport:
+    """The lens from views of a live camera, which are numbered. Raises CalibrationError."""
+    from rhot_app.calibration.lens.intrinsics import solve
 
-    lens, errors = report.intrinsics, report.board_errors
-    return {
-        "rms_px": report.rms_px, "fx": lens.fx, "fy": lens.fy, "cx": lens.cx, "cy": lens.cy,
-        "distortion": list(lens.distortion), "size": list(report.size),
-        "std": {name: std for name, (_, std) in report.parameters.items()},
-        "disagreement": report.error_inflation,
-        "undetermined": list(report.undetermined),
-        "views_used": len(report.views),
-        "views_rejected": [{"name": each.name, "reason": each.reason, "code": each.code} for each in report.dropped],
-        "views": [{"name": view.source, "rms_px": view.rms_px, "corners": view.corners,
-                   "blur_px": _finite(view.blur_px), "square_px": view.square_px} for view in report.views],
-        "coverage": {**report.coverage.bars, "share": report.coverage.share, "cells": report.coverage.cells.tolist()},
-        "expected_error_mm": {"distance_m": WORKING_DISTANCE_M, "typical": _finite(1e3 * report.errors.typical_m),
-                              "corner": _finite(1e3 * report.errors.worst_m)},
-        "board_errors_mm": None if errors is None else {"in_plane": 1e3 * errors.in_plane_m,
-                                                        "across": 1e3 * errors.across_m},
-    }
+    numbered = [replace(view, source=f"view {number}") for number, view in enumerate(views, 1)]
+    return solve(numbered, board, square_pixels=square_pixels, progress=progress)
 
 
-def lines_of(report: IntrinsicsReport) -> list[str]:
-    """The figures for people."""
+def report(result: IntrinsicsReport, camera: str = "") -> Report:
+    """What the lens of `camera` is, how well it is known, and of which views."""
     from rhot_app.calibration.bundle.robust_error import what_is_reported
     from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
+    from rhot_app.calibration.rig_figures import lens_figures
 
-    lines = [f"left out: {each.name}: {each.reason}" for each in report.dropped]
-    lines += [f"{name:<4}{value:12.4f} ± {std:.4f}" + (" px" if name[0] in "fc" else "")
-              for name, (value, std) in report.parameters.items()]
-    lines.append(what_is_reported(report.error_inflation))
-    cover = report.coverage
-    lines.append(f"coverage, of what is needed: across {100 * cover.x:.0f} %, up and down {100 * cover.y:.0f} %, "
-                 f"nearness {100 * cover.size:.0f} %, tilt {100 * cover.skew:.0f} %; corners in "
-                 f"{100 * cover.share:.0f} % of the picture (55 % and more are good)")
-    lines.append(f"error of a point {WORKING_DISTANCE_M:g} m away by the lens alone (SD): {report.errors}")
-    worst = sorted(report.views, key=lambda view: -view.rms_px)[:3]
-    lines.append("worst views: " + ", ".join(f"{view.source} {view.rms_px:.2f} px" for view in worst))
-    return lines
+    std = {name: std for name, (_, std) in result.parameters.items()}
+    errors, board, cover = result.errors, result.board_errors, result.coverage
+    figures = [
+        *lens_figures(camera, result.intrinsics, std),
+        Figure("corners, rms", result.rms_px, "px", key="rms_px"),
+        Figure("views", len(result.views), decimals=0, key="views_used"),
+        Figure(f"error expected at {WORKING_DISTANCE_M:g} m", 1e3 * errors.typical_m, "mm",
+               key="expected_error_mm.typical"),
+        Figure("the same in the corners", 1e3 * errors.worst_m, "mm", key="expected_error_mm.corner")]
+    if board is not None:
+        figures += [Figure("board, in its plane", 1e3 * board.in_plane_m, "mm", key="board_errors_mm.in_plane"),
+                    Figure("board, across it", 1e3 * board.across_m, "mm", key="board_errors_mm.across")]
+    views = tuple((Figure("view", view.source, key="name"), Figure("rms", view.rms_px, "px", key="rms_px"),
+                   Figure("corners", view.corners, decimals=0, key="corners"),
+                   Figure("blur", view.blur_px, "px", key="blur_px"),
+                   Figure("square", view.square_px, "px", decimals=0, key="square_px")) for view in result.views)
+    coverage = (f"Covered, of what is needed: across {100 * cover.x:.0f} %, up and down {100 * cover.y:.0f} %, "
+                f"nearness {100 * cover.size:.0f} %, tilt {100 * cover.skew:.0f} %; corners in "
+                f"{100 * cover.share:.0f} % of the picture (55 % and more are good).")
+    return Report(
+        result.verdict, tuple(figures), (Table("views", views),),
+        (f"{what_is_reported(result.error_inflation)}.", coverage, *left_out(result.dropped)),
+        {"size": result.size, "std": std, "disagreement": result.error_inflation, "undetermined": result.undetermined,
+         "coverage": {**cover.bars, "share": cover.share, "cells": cover.cells},
+         "expected_error_mm.distance_m": WORKING_DISTANCE_M, "board_errors_mm": None, **dropped_fields(result.dropped)})
+
+
+def propose(result: IntrinsicsReport, rig: Rig, camera: str) -> Proposal:
+    """The rig with this lens of `camera`; poses that were found with the old one are outdated then."""
+    from rhot_app.calibration.check.camera_calibration import with_lens
+    from rhot_app.calibration.proposal import proposed
+
+    after = with_lens(rig, camera, result.intrinsics)
+    return proposed(f"{LENS.reason} {camera}", report(result, camera), rig, after, afterwards=what_follows(rig, after))
+
+
+def what_follows(before: Rig, after: Rig) -> str:
+    """What a new lens leaves to be done, a sentence; "" for nothing."""
+    missing = [node.name for node in after.nodes if node.intrinsics.nominal]
+    if len(after.nodes) == 1:
+        return ""
+    if missing:
+        return f"Next the intrinsics of {' and '.join(missing)}, then stereo."
+    return ("Next stereo: the poses of the cameras were found with the old intrinsics." if all(before.tracked_with) else
+            "Next stereo: how the cameras stand to each other is not known yet.")
 
 
 def _rig(args: argparse.Namespace) -> Rig | None:
@@ -117,7 +148,3 @@ def _rig(args: argparse.Namespace) -> Rig | None:
         raise CalibrationError(f"{args.rig} has no camera {args.node!r}; its cameras are {', '.join(names)}.")
     return rig
 
-
-def _finite(value: float) -> float | None:
-    """The number as JSON may hold it."""
-    return value if value == value and abs(value) != float("inf") else None

@@ -6,17 +6,18 @@ import argparse
 import json
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.board.standard_board import KINDS, SPACING_MM, SQUARE_MM, TAG_SPACING
-from rhot_app.calibration.verdict import Verdict
 from rhot_app.errors import CalibrationError, input_file, positive_number
 from rhot_app.options import add_rig_argument
 
 if TYPE_CHECKING:
     from rhot_app.calibration.board.boards import Board
+    from rhot_app.calibration.board.shared_views import Dropped
+    from rhot_app.calibration.report import Report
 
 
 def add_rig_or_file(parser: argparse.ArgumentParser) -> None:
@@ -51,31 +52,40 @@ def require_folder(out: Path | None) -> None:
             raise CalibrationError(f"{out}: cannot be written ({exc.strerror}).") from exc
 
 
-def tell(fields: dict[str, Any], lines: list[str], verdict: Verdict, *, as_json: bool) -> None:
-    """Print a result and its verdict: one JSON object, or sentences and `lines` for people."""
+def tell(report: Report, *, as_json: bool, **fields: Any) -> None:
+    """Print a report: one JSON object with more `fields`, or sentences and figures for people."""
     if as_json:
-        print(json.dumps({**fields, **verdict.to_json()}))
+        print(json.dumps({**report.to_json(), **fields}))
         return
-    print(verdict.sentence)
-    for finding in verdict.findings:
+    print(report.verdict.sentence)
+    for finding in report.verdict.findings:
         print(f"  [{finding.grade.value}] {finding.sentence}")
-    print(*lines, sep="\n")
+    print(*report.lines(), sep="\n")
 
 
-def show(fields: dict[str, Any], lines: list[str], verdict: Verdict, *, as_json: bool, written: str = "") -> int:
-    """Print a calibration's result and return the exit code: 0, or 2 when the verdict forbids its use.
+def show(report: Report, *, as_json: bool, written: str = "") -> int:
+    """Print a calibration's report and return the exit code: 0, or 2 when the verdict forbids the result's use.
 
-    `fields` are the JSON's, the verdict's own are added; `lines` the figures for people; `written` the file that was
-    written, empty for none.
+    `written` is the file that was written, empty for none.
     """
-    tell({**fields, "written": written or None}, lines, verdict, as_json=as_json)
+    tell(report, as_json=as_json, written=written or None)
     if written and not as_json:
         print(f"Written: {written}")
-    if verdict.acceptable:
+    if report.verdict.acceptable:
         return 0
-    worst = verdict.findings[0].sentence
+    worst = report.verdict.findings[0].sentence
     print(f"rhot: nothing was written, because the result must not be used. {worst}", file=sys.stderr)
     return 2
+
+
+def dropped_fields(dropped: Sequence[Dropped]) -> dict[str, Any]:
+    """What JSON says of pictures that were not used."""
+    return {"views_rejected": [{"name": each.name, "reason": each.reason, "code": each.code} for each in dropped]}
+
+
+def left_out(dropped: Sequence[Dropped]) -> list[str]:
+    """The same for people."""
+    return [f"left out: {each.name}: {each.reason}" for each in dropped]
 
 
 # -- arguments about the files of other programs -----------------------------------------------------------------------

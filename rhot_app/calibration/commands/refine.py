@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rhot_app.calibration.commands.output import require_folder, show
 from rhot_app.calibration.registry import REFINED
+from rhot_app.calibration.report import Report
 from rhot_app.errors import CalibrationError, RecordingError, RhotError, input_file
 from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.compiled import announce_compilation
@@ -66,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
                                                       for what, before, after in rows)]
     if target is not None and found.holds:
         lines.append("Nothing was written: no other calibration is better.")
-    return show(_fields(found, scale), lines, verdict, as_json=args.json, written=written)
+    return show(Report(verdict, notes=tuple(lines), fields=_fields(found, scale)), as_json=args.json, written=written)
 
 
 def _frames(log: Path, rig: Rig) -> list[CameraObservations]:

@@ -4,20 +4,31 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import add_board_arguments, board_of, require_folder, show
+from rhot_app.calibration.commands.output import (
+    add_board_arguments,
+    board_of,
+    dropped_fields,
+    left_out,
+    require_folder,
+    show,
+)
 from rhot_app.calibration.registry import STEREO
+from rhot_app.calibration.report import Figure, Report, Table
 from rhot_app.errors import CalibrationError, finite, positive_number
 from rhot_app.options import add_json_argument, add_offset_argument, add_out_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
+    from rhot_app.calibration.board.shared_views import SharedViews
     from rhot_app.calibration.lens.fit import LensStart
+    from rhot_app.calibration.proposal import Proposal
     from rhot_app.calibration.stereo.calibrate import KnownLengths
-    from rhot_app.calibration.stereo.report import PairFigures, StereoReport
+    from rhot_app.calibration.stereo.report import CameraFigures, PairFigures, StereoReport
     from rhot_app.calibration.stereo.start import WorldFrame
     from rhot_app.progress import Progress
     from rhot_app.project import Rig
@@ -139,26 +150,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate and report; a rig is written when it may be used and passes its own checks."""
-    from rhot_app.calibration.stereo.calibrate import calibrated_rig, require_nodes, rig_verdict
+    from rhot_app.calibration.stereo.calibrate import require_nodes
     from rhot_app.progress import ProgressLine
-    from rhot_app.rig_history import accept
 
     require_folder(args.out)
     files = files_of(args)
     base = _base_rig(args)
     require_nodes(base, list(files))
     line = ProgressLine("stereo calibration")
-    report, frame = _calibrate(args, files, base, line.report)
+    result, frame = _calibrate(args, files, base, line.report)
     line.finish()
-    verdict, rig = report.verdict, None
-    if report.figures is not None:
-        rig = calibrated_rig(base, report.figures, frame)
-        verdict = rig_verdict(report, rig, frame)
-    written = ""
-    if rig is not None and args.out is not None and verdict.acceptable:
-        accept(args.out, rig, STEREO.reason)
-        written = str(args.out)
-    return show(fields_of(report, frame), lines_of(report, frame), verdict, as_json=args.json, written=written)
+    said, proposal, written = report(result, frame), propose(result, base, frame), ""
+    if proposal is not None:
+        said, written = replace(said, verdict=proposal.verdict), proposal.save(args.out)
+    return show(said, as_json=args.json, written=written)
 
 
 def _calibrate(args: argparse.Namespace, files: dict[str, list[Path]], base: Rig,
@@ -176,14 +181,14 @@ def _calibrate(args: argparse.Namespace, files: dict[str, list[Path]], base: Rig
     lenses = [given[name] if name in given else find_lens(read.views.of_camera(camera), board, name)
               for camera, name in enumerate(names)]
     nodes = {node.name: node for node in base.nodes}
-    report = calibrate(
+    result = calibrate(
         read.views, lenses, refine=args.refine_intrinsics, known=known,
         remembered=[None if nodes[name].intrinsics.nominal else lens_of(nodes[name]) for name in names],
         dropped=read.dropped, noticed=[] if read.size is None else [read.size], progress=progress)
-    if not tables or report.figures is None:
-        return report, None
+    if not tables or result.figures is None:
+        return result, None
     views = [read_view(tables[name], board) if name in tables else None for name in names]
-    return report, place_world(views, board, report.figures.state, names)
+    return result, place_world(views, board, result.figures.state, names)
 
 
 def _given_lenses(args: argparse.Namespace, names: list[str]) -> dict[str, LensStart]:
@@ -218,108 +223,110 @@ def _base_rig(args: argparse.Namespace) -> Rig:
     return load_rig(resource_path("rigs", "two_pis.json"))
 
 
-# -- printed report ----------------------------------------------------------------------------------------------------
+# -- what is said of the result, and what it changes -------------------------------------------------------------------
 
-def fields_of(report: StereoReport, frame: WorldFrame | None) -> dict[str, Any]:
-    """The JSON's fields; those of the first pair stand at the top. None where nothing was solved."""
+def solve_shown(views: SharedViews, lenses: Sequence[LensStart | None], *, known: KnownLengths,
+                progress: Progress) -> StereoReport:
+    """Cameras put together by shots of live cameras; `lenses` one per camera, None to find it from the shots. Raises
+    CalibrationError."""
+    from rhot_app.calibration.lens.fit import find_lens
+    from rhot_app.calibration.stereo.calibrate import calibrate
+
+    found = [lens if lens is not None else find_lens(views.of_camera(camera), views.board, views.cameras[camera])
+             for camera, lens in enumerate(lenses)]
+    return calibrate(views, found, known=known, remembered=lenses, progress=progress)
+
+
+def report(result: StereoReport, frame: WorldFrame | None = None) -> Report:
+    """Distances, lenses and errors; where cameras stand above the table of `frame`. The first pair's figures stand at
+    the top of JSON, too."""
+    from rhot_app.calibration.bundle.robust_error import what_is_reported
+    from rhot_app.calibration.rig_figures import distance_figure
     from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M
 
-    rejected = [{"name": each.name, "reason": each.reason, "code": each.code} for each in report.dropped]
-    figures = report.figures
+    figures, fields = result.figures, dropped_fields(result.dropped)
     if figures is None:
         names = ("rms_px", "baseline_mm", "rotation_rad", "translation_mm", "square_mm_triangulated", "epipolar_px")
-        return {**dict.fromkeys(names), "cameras": [{"name": name} for name in report.cameras], "pairs": [],
-                "views_used": 0, "views_rejected": rejected}
-    pairs = [_pair(pair) for pair in figures.pairs]
-    squares, (by_rig, by_noise) = figures.squares, figures.error_m
-    return {
-        "rms_px": figures.rms_px, "noise_px": figures.noise_px, **pairs[0],
-        "square_mm_triangulated": squares.mean_m * 1e3, "square_std_mm": squares.std_m * 1e3,
-        "flatness_mm": squares.flatness_m * 1e3,
-        "board_error_mm": None if figures.board_errors is None else {
-            "in_plane": figures.board_errors.in_plane_m * 1e3, "across": figures.board_errors.across_m * 1e3},
-        "expected_error_mm": {"distance_m": WORKING_DISTANCE_M, "by_calibration": _number(by_rig * 1e3),
-                              "marker_noise_px": MARKER_NOISE_PX, "by_marker_noise": _number(by_noise * 1e3)},
-        "std_method": "inverse of the bundle adjustment's normal equations at the corners' own spread, times the "
-        "disagreement of the shots",
-        "disagreement": figures.error_inflation,
-        "cameras": [_camera(report, i) for i in range(len(figures.cameras))], "pairs": pairs,
-        "views_used": len(figures.shots), "views_rejected": rejected,
-        "shots": [{"name": shot.name, "rms_px": [_number(rms) for rms in shot.rms_px]} for shot in figures.shots],
-        "ruler_mm": None if figures.ruler is None else {
-            "said": figures.ruler.said_m * 1e3, "measured": figures.ruler.measured_m * 1e3,
-            "std": figures.ruler.std_m * 1e3},
-        "lengths": figures.lengths,
-        "table": None if frame is None else _table(frame),
-    }
-
-
-def lines_of(report: StereoReport, frame: WorldFrame | None) -> list[str]:
-    """The figures for people."""
-    from rhot_app.calibration.bundle.robust_error import what_is_reported
-    from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M
-
-    figures = report.figures
-    lines = [f"left out: {each.name}: {each.reason}" for each in report.dropped]
-    if figures is None:
-        return lines
+        return Report(result.verdict, notes=tuple(left_out(result.dropped)), fields={
+            **dict.fromkeys(names), "cameras": [{"name": name} for name in result.cameras], "pairs": [],
+            "views_used": 0, **fields})
+    squares, board, ruler, (by_rig, by_noise) = figures.squares, figures.board_errors, figures.ruler, figures.error_m
+    said = [distance_figure(pair.first, pair.second, pair.baseline_m, pair.baseline_std_m) for pair in figures.pairs]
+    cameras = []
     for camera in figures.cameras:
-        fx, fy, cx, cy = camera.lens[:4]
-        sfx, _, scx, scy = camera.lens_std[:4]
-        lines.append(f"{camera.name}: f {fx:.2f}, {fy:.2f} ± {sfx:.2f} px, centre ({cx:.2f} ± {scx:.2f}, "
-                     f"{cy:.2f} ± {scy:.2f}) px, rms {camera.rms_px:.3f} px")
-    for pair in figures.pairs:
-        shift, shift_std = _listed(pair.translation_m * 1e3), _listed(pair.translation_std_m * 1e3)
-        lines.append(f"{pair.first} to {pair.second}: {pair.baseline_m * 1e3:.2f} mm; T ({shift}) ± ({shift_std}) mm, "
-                     f"R ({_listed(pair.rotation_rad, 4)}) rad, epipolar {pair.epipolar_px:.2f} px")
-    lines.append(what_is_reported(figures.error_inflation))
-    squares = figures.squares
-    lines.append(f"{figures.board.parts} as the cameras see them: {squares.mean_m * 1e3:.3f} ± "
-                 f"{squares.std_m * 1e3:.3f} mm, board flat to {squares.flatness_m * 1e3:.2f} mm")
-    if figures.board_errors is not None:
-        lines.append(f"the board's corners are {figures.board_errors.in_plane_m * 1e3:.2f} mm off in its plane and "
-                     f"{figures.board_errors.across_m * 1e3:.2f} mm across; allowed for")
-    lines.append(f"a marker {WORKING_DISTANCE_M:g} m away: {figures.error_m[0] * 1e3:.1f} mm uncertain by this "
-                 f"calibration, {figures.error_m[1] * 1e3:.1f} mm by {MARKER_NOISE_PX:g} px of noise")
+        shown, row = _lens(camera)
+        said += shown
+        cameras.append(row)
+    said += [
+        Figure("corners, rms", figures.rms_px, "px", key="rms_px"),
+        Figure("shots", len(figures.shots), decimals=0, key="views_used"),
+        Figure(f"{figures.board.parts} of {1e3 * figures.board.square_m:.2f} mm, as seen", 1e3 * squares.mean_m, "mm",
+               1e3 * squares.std_m, key="square_mm_triangulated", sd_key="square_std_mm"),
+        Figure("board, flat to", 1e3 * squares.flatness_m, "mm", key="flatness_mm")]
+    if board is not None:
+        said += [Figure("board, in its plane", 1e3 * board.in_plane_m, "mm", key="board_error_mm.in_plane"),
+                 Figure("board, across it", 1e3 * board.across_m, "mm", key="board_error_mm.across")]
+    if ruler is not None:
+        said.append(Figure(f"ruler of {1e3 * ruler.said_m:.1f} mm, as seen", 1e3 * ruler.measured_m, "mm",
+                           1e3 * ruler.std_m, key="ruler_mm.measured", sd_key="ruler_mm.std"))
+    said += [Figure(f"error expected at {WORKING_DISTANCE_M:g} m", 1e3 * by_rig, "mm",
+                    key="expected_error_mm.by_calibration"),
+             Figure(f"the same by {MARKER_NOISE_PX:g} px of noise", 1e3 * by_noise, "mm",
+                    key="expected_error_mm.by_marker_noise")]
+    tables = [Table("cameras", tuple(cameras)), Table("pairs", tuple(_pair(pair) for pair in figures.pairs))]
     if frame is not None:
-        lines += [f"{each.name}: {each.height_m * 1e3:.0f} mm above the table, looks down by "
-                  f"{math.degrees(each.down_rad):.1f} degrees" for each in frame.stances]
-    return lines
+        fields["table.rms_px"] = frame.rms_px
+        tables.append(Table("table.cameras", tuple((
+            Figure("camera", each.name, key="name"),
+            Figure("above the table", 1e3 * each.height_m, "mm", decimals=0, key="height_mm"),
+            Figure("looks down by", math.degrees(each.down_rad), "degrees", decimals=1, key="down_deg"),
+            Figure("roll", math.degrees(each.roll_rad), "degrees", decimals=1, key="roll_deg"))
+            for each in frame.stances)))
+    return Report(
+        result.verdict, tuple(said), tuple(tables),
+        (f"{what_is_reported(figures.error_inflation)}.", *left_out(result.dropped)), {
+            **tables[1].to_json()[0], "noise_px": figures.noise_px, "board_error_mm": None, "table": None,
+            "expected_error_mm.distance_m": WORKING_DISTANCE_M, "expected_error_mm.marker_noise_px": MARKER_NOISE_PX,
+            "std_method": "inverse of the bundle adjustment's normal equations at the corners' own spread, times the "
+            "disagreement of the shots",
+            "disagreement": figures.error_inflation, "lengths": figures.lengths,
+            "ruler_mm": None if ruler is None else {"said": 1e3 * ruler.said_m},
+            "shots": [{"name": shot.name, "rms_px": shot.rms_px} for shot in figures.shots], **fields})
 
 
-def _camera(report: StereoReport, index: int) -> dict[str, Any]:
+def propose(result: StereoReport, rig: Rig, frame: WorldFrame | None = None) -> Proposal | None:
+    """The rig with these cameras, in the table's `frame` where there is one; judged by the rig's own checks as well.
+    None where the cameras could not be put together."""
+    from rhot_app.calibration.proposal import proposed
+    from rhot_app.calibration.stereo.calibrate import calibrated_rig, rig_verdict
+
+    if result.figures is None:
+        return None
+    after = calibrated_rig(rig, result.figures, frame)
+    judged = replace(report(result, frame), verdict=rig_verdict(result, after, frame))
+    return proposed(STEREO.reason, judged, rig, after)
+
+
+def _lens(camera: CameraFigures) -> tuple[list[Figure], tuple[Figure, ...]]:
+    """A camera's lens for people, and its row of figures."""
+    from rhot_app.calibration.rig_figures import lens_figures
     from rhot_app.geometry.camera import PARAMETERS, own_parameters, rig_intrinsics
 
-    assert report.figures is not None
-    camera = report.figures.cameras[index]
-    lens, own = rig_intrinsics(camera.size, camera.lens), own_parameters(camera.lens)
+    own = own_parameters(camera.lens)
     std = {name: float(std) for name, std, has in zip(PARAMETERS, camera.lens_std, own, strict=True) if has}
-    return {"name": camera.name, "fx": lens.fx, "fy": lens.fy, "cx": lens.cx, "cy": lens.cy,
-            "distortion": list(lens.distortion), "size": list(camera.size), "rms_px": camera.rms_px, "std": std}
+    lens = list(lens_figures(camera.name, rig_intrinsics(camera.size, camera.lens), std))
+    return [replace(one, key="") for one in lens], (
+        Figure("camera", camera.name, key="name"), Figure("corners, rms", camera.rms_px, "px", key="rms_px"),
+        *(replace(one, name="") for one in lens), Figure("", camera.size, key="size"), Figure("", std, key="std"))
 
 
-def _pair(pair: PairFigures) -> dict[str, Any]:
-    return {"first": pair.first, "second": pair.second, "baseline_mm": pair.baseline_m * 1e3,
-            "rotation_rad": _list(pair.rotation_rad), "rotation_std_rad": _list(pair.rotation_std_rad),
-            "translation_mm": _list(pair.translation_m * 1e3),
-            "translation_std_mm": _list(pair.translation_std_m * 1e3),
-            "epipolar_px": _number(pair.epipolar_px), "shared": pair.shared}
+def _pair(pair: PairFigures) -> tuple[Figure, ...]:
 
-
-def _table(frame: WorldFrame) -> dict[str, Any]:
-    return {"rms_px": frame.rms_px,
-            "cameras": [{"name": each.name, "height_mm": each.height_m * 1e3, "down_deg": math.degrees(each.down_rad),
-                         "roll_deg": math.degrees(each.roll_rad)} for each in frame.stances]}
-
-
-def _list(values: Iterable[float]) -> list[float]:
-    return [float(value) for value in values]
-
-
-def _listed(values: Iterable[float], digits: int = 2) -> str:
-    return ", ".join(f"{value:.{digits}f}" for value in values)
-
-
-def _number(value: float) -> float | None:
-    """JSON knows no NaN."""
-    return float(value) if math.isfinite(value) else None
+    return (Figure("from", pair.first, key="first"), Figure("to", pair.second, key="second"),
+            Figure("", 1e3 * pair.baseline_m, key="baseline_mm"),
+            Figure("T", 1e3 * pair.translation_m, "mm", 1e3 * pair.translation_std_m, key="translation_mm",
+                   sd_key="translation_std_mm"),
+            Figure("R", pair.rotation_rad, "rad", pair.rotation_std_rad, key="rotation_rad",
+                   sd_key="rotation_std_rad"),
+            Figure("epipolar", pair.epipolar_px, "px", key="epipolar_px"),
+            Figure("shots", pair.shared, decimals=0, key="shared"))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,22 +111,6 @@ class BonesReport:
     def bone(self, name: str) -> BoneLength:
         """The bone of that name; raises KeyError."""
         return {bone.name: bone for bone in self.bones}[name]
-
-    def to_json(self) -> dict[str, Any]:
-        """All figures by the names of their fields, without the hand and the verdict."""
-        return {
-            "method": self.method, "side": self.hand.side, "size": self.size, "size_std": self.size_std,
-            "bones": {bone.name: {"length_mm": bone.length_mm, "std_mm": bone.std_mm,
-                                  "usual_std_mm": bone.usual_std_mm, "known": bone.known.value}
-                      for bone in self.bones},
-            "reach": {reach.finger: {"length_mm": reach.length_mm, "std_mm": reach.std_mm} for reach in self.reaches},
-            "markers": {spot.marker: {"place": spot.place, "along_mm": spot.along_mm, "across_mm": spot.across_mm,
-                                      "above_mm": spot.above_mm, "std_mm": list(spot.std_mm)} for spot in self.markers},
-            "rigid_distances": [{"markers": [pair.first, pair.second], "distance_mm": pair.distance_mm,
-                                 "std_mm": pair.std_mm} for pair in self.rigid],
-            "residual_mm": self.residual_mm, "noise_mm": self.noise_mm, "error_mm": self.error_mm,
-            "seconds": self.seconds, "instants": self.instants,
-        }
 
 
 def bone_name(finger: int, bone: int) -> str:

@@ -74,6 +74,11 @@ class PairFigures:
         """Distance between the two cameras' centres."""
         return float(np.linalg.norm(self.translation_m))
 
+    @property
+    def baseline_std_m(self) -> float:
+        """Its standard deviation, by those of the parts of T."""
+        return float(np.linalg.norm(self.translation_m * self.translation_std_m) / self.baseline_m)
+
 
 @dataclass(frozen=True, slots=True)
 class ShotFigures:

@@ -27,7 +27,7 @@ _TOLERATED = 0.02  # a ruler held by hand, read in two pictures, shows no less t
 _FAIR = 0.01
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RulerReading:
     """A known distance seen by cameras: `length_m`, and `ends` (C, 2, 2) raw px of its two ends per camera, NaN where a
     camera does not see it."""

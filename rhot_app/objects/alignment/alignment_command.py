@@ -6,18 +6,27 @@ import argparse
 import json
 import math
 import sys
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rhot_app.calibration.commands.output import require_folder, show
+from rhot_app.calibration.registry import ALIGNMENT
+from rhot_app.calibration.report import Figure, Report
 from rhot_app.errors import CalibrationError, input_file, positive_number
 from rhot_app.options import add_json_argument, add_out_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
+    from rhot_app.calibration.proposal import Command, Proposal
+    from rhot_app.calibration.report import Array, Value
+    from rhot_app.charts import Chart
+    from rhot_app.objects.alignment.alignment_file import Alignment
+    from rhot_app.objects.alignment.drift import Drift
+    from rhot_app.objects.alignment.fit import OffsetSearch
     from rhot_app.objects.alignment.motion_stream import MotionStream
-    from rhot_app.objects.alignment.report import AlignmentReport
-
+    from rhot_app.objects.alignment.report import AlignmentReport, Coverage
+    from rhot_app.progress import Progress
 
 LONGEST_SEARCH_S = 60.0
 """s: clocks that differ by more have no common time: correct one of them first."""
@@ -56,13 +65,13 @@ def run(args: argparse.Namespace) -> int:
     if args.check is not None:
         return _check(args.check, foreign, rig, as_json=args.json)
     line = ProgressLine("alignment")
-    report = calibrate_alignment(foreign, rig, args.search, line.report)
+    result = calibrate_alignment(foreign, rig, args.search, line.report)
     line.finish()
     written = ""
-    if args.out is not None and report.verdict.acceptable:
-        save_alignment(args.out, to_alignment(report))
+    if args.out is not None and result.verdict.acceptable:
+        save_alignment(args.out, to_alignment(result))
         written = str(args.out)
-    return show(_fields(report), _lines(report), report.verdict, as_json=args.json, written=written)
+    return show(report(result), as_json=args.json, written=written)
 
 
 def _check(path: Path, foreign: MotionStream, rig: MotionStream, *, as_json: bool) -> int:
@@ -85,30 +94,154 @@ def _check(path: Path, foreign: MotionStream, rig: MotionStream, *, as_json: boo
     return 2 if test.stale else 0
 
 
-def _fields(report: AlignmentReport) -> dict[str, Any]:
+# -- what is said of the result, and what it changes -------------------------------------------------------------------
+
+def report(result: AlignmentReport, search: OffsetSearch | None = None) -> Report:
+    """Where the other world is, how well both agree, and how they moved; of `search` the chart."""
     from rhot_app.estimation.se3 import quaternion_from_rotation
 
-    fit, coverage = report.fit, report.coverage
-    return {
-        "rig_from_foreign": {"rotation_wxyz": quaternion_from_rotation(fit.rig_from_foreign[:3, :3]).tolist(),
-                             "translation_m": fit.rig_from_foreign[:3, 3].tolist()},
-        "point_in_tracker_mm": (1e3 * fit.tracker_from_body[:3, 3]).tolist(), "time_offset_ms": 1e3 * fit.offset_s,
-        "sd": {"position_mm": 1e3 * report.place_sd_m, "rotation_deg": math.degrees(report.rotation_sd_rad),
-               "point_mm": 1e3 * report.point_sd_m, "time_offset_ms": 1e3 * report.offset_sd_s},
-        "rms_mm": 1e3 * fit.rms_m, "inlier_ratio": fit.inlier_ratio, "samples": len(fit.errors),
-        "coverage": {"rotation_deg": [math.degrees(turn) for turn in coverage.turn],
-                     "spread_mm": (1e3 * coverage.spread_m).tolist(), "speed_mm_s": 1e3 * coverage.speed_m_s}}
+    fit, coverage = result.fit, result.coverage
+    return Report(
+        result.verdict, (
+            *_figures(1e3 * fit.rig_from_foreign[:3, 3], 1e3 * fit.tracker_from_body[:3, 3], 1e3 * fit.offset_s,
+                      1e3 * fit.rms_m, (1e3 * result.place_sd_m, 1e3 * result.point_sd_m, 1e3 * result.offset_sd_s)),
+            Figure("turn of the other world, ±", math.degrees(result.rotation_sd_rad), "degrees",
+                   key="sd.rotation_deg"),
+            Figure("samples that agree", 100.0 * fit.inlier_ratio, "%", decimals=0),
+            Figure("motion, along three axes", 1e3 * coverage.spread_m, "mm", decimals=0, key="coverage.spread_mm"),
+            Figure("motion, turns", [math.degrees(turn) for turn in coverage.turn], "degrees", decimals=0,
+                   key="coverage.rotation_deg"),
+            Figure("motion, speed", 1e3 * coverage.speed_m_s, "mm/s", decimals=0, key="coverage.speed_mm_s")),
+        fields={
+            "rig_from_foreign": {"rotation_wxyz": quaternion_from_rotation(fit.rig_from_foreign[:3, :3]),
+                                 "translation_m": fit.rig_from_foreign[:3, 3]},
+            "inlier_ratio": fit.inlier_ratio, "samples": len(fit.errors)},
+        charts=() if search is None else charts_of(result, search))
 
 
-def _lines(report: AlignmentReport) -> list[str]:
-    fit, coverage = report.fit, report.coverage
-    place, point = 1e3 * fit.rig_from_foreign[:3, 3], 1e3 * fit.tracker_from_body[:3, 3]
-    turns = ", ".join(f"{math.degrees(turn):.0f}" for turn in coverage.turn)
-    spreads = ", ".join(f"{1e3 * spread:.0f}" for spread in coverage.spread_m)
-    return ["", f"origin of the other world   {place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f} mm in the rig",
-            f"point on the tracker        {point[0]:.2f}, {point[1]:.2f}, {point[2]:.2f} ± "
-            f"{1e3 * report.point_sd_m:.2f} mm in its frame",
-            f"time offset                 {1e3 * fit.offset_s:+.2f} ± {1e3 * report.offset_sd_s:.2f} ms, added to its "
-            "times",
-            f"motion                      {spreads} mm along three axes, turns of {turns} degrees, "
-            f"{1e3 * coverage.speed_m_s:.0f} mm/s"]
+def _figures(place_mm: Value, point_mm: Value, offset_ms: float | None,
+             rms_mm: float | None, sd: tuple[float | None, float | None, float | None] = (None,) * 3) -> list[Figure]:
+    """The figures that an alignment in use has as well; `sd` of the first three."""
+    return [Figure("its origin in the rig", place_mm, "mm", sd[0], 1, sd_key="sd.position_mm"),
+            Figure("fingertip on the tracker", point_mm, "mm", sd[1], 1, "point_in_tracker_mm", "sd.point_mm"),
+            Figure("time offset", offset_ms, "ms", sd[2], 1, "time_offset_ms", "sd.time_offset_ms"),
+            Figure("what is left, rms", rms_mm, "mm", key="rms_mm")]
+
+
+def charts_of(result: AlignmentReport, search: OffsetSearch) -> tuple[Chart, ...]:
+    """The residuals over the speed, and the time offsets tried."""
+    import numpy as np
+
+    from rhot_app.charts import Chart, Curve
+
+    fit = result.fit
+    speed, error = np.linalg.norm(fit.velocity, axis=1), np.linalg.norm(fit.errors, axis=1)
+    tried = np.isfinite(search.median_m)
+    return (Chart("What is left between both; a delay is a slope", "speed, mm/s", "distance, mm",
+                  (Curve("agree", 1e3 * speed[fit.inlier], 1e3 * error[fit.inlier], "faint dots"),
+                   Curve("do not", 1e3 * speed[~fit.inlier], 1e3 * error[~fit.inlier], "faint dots"))),
+            Chart("Time offsets tried", "offset, ms", "median distance, mm",
+                  (Curve("median", 1e3 * search.offsets_s[tried], 1e3 * search.median_m[tried]),)))
+
+
+@dataclass(frozen=True, eq=False)
+class StreamRecording:
+    """A movement of both: the other tracker's `foreign` poses (N, 4, 4) m at `foreign_s` (N,) s, and `places` (M, 3) m
+    of the marker in the rig at `rig_s` (M,) s, both by the master's clock. Equal only to itself."""
+
+    foreign_s: Array
+    foreign: Array
+    rig_s: Array
+    places: Array
+
+    @property
+    def coverage(self) -> Coverage | None:
+        """The motion so far; None of too few samples."""
+        import numpy as np
+
+        from rhot_app.objects.alignment.motion_stream import SAMPLES
+        from rhot_app.objects.alignment.report import coverage_of_motion
+
+        if len(self.foreign_s) < SAMPLES or len(self.rig_s) < SAMPLES:
+            return None
+        velocity = np.gradient(self.places, self.rig_s, axis=0)
+        calm = np.linalg.norm(velocity, axis=1)
+        calm_enough = calm <= np.quantile(calm, 0.98)  # a jump of a marker is no speed
+        return coverage_of_motion(self.foreign[:, :3, :3], self.places, velocity[calm_enough])
+
+
+@dataclass(frozen=True, eq=False)
+class AlignmentResult:
+    """A solved alignment, its search, and the test of the one that was in use; None when there was none."""
+
+    report: AlignmentReport
+    search: OffsetSearch
+    drift: Drift | None
+
+
+def solve_recording(recording: StreamRecording, before: Alignment | None, *, progress: Progress) -> AlignmentResult:
+    """What ``rhot calibrate alignment`` does with two files. Raises CalibrationError as `align` does."""
+    from rhot_app.objects.alignment.drift import DriftMonitor
+    from rhot_app.objects.alignment.fit import SEARCH_S, align
+    from rhot_app.objects.alignment.motion_stream import MotionStream
+    from rhot_app.objects.alignment.report import judge_alignment
+
+    foreign = MotionStream.of_poses(recording.foreign_s, recording.foreign)
+    rig = MotionStream(recording.rig_s, recording.places)
+    fit, search = align(foreign, rig, SEARCH_S, progress)
+    drift = None if before is None else DriftMonitor.test_streams(before, foreign, rig)
+    return AlignmentResult(judge_alignment(fit, search), search, drift)
+
+
+@dataclass(frozen=True, slots=True)
+class AlignmentChange:
+    """Another alignment in the file beside the rig."""
+
+    before: Alignment | None
+    after: Alignment
+    path: Path | None
+
+    def use(self, command: Command) -> None:
+        """Write it; raises CalibrationError."""
+        from rhot_app.objects.alignment.alignment_file import save_alignment
+
+        if self.path is None:
+            raise CalibrationError("This rig came from no file, so there is no place beside it. Save the rig first.")
+        save_alignment(self.path, self.after)
+
+    def restore(self, command: Command) -> None:
+        """What was there before, or no file; raises CalibrationError."""
+        from rhot_app.objects.alignment.alignment_file import save_alignment
+
+        assert self.path is not None
+        if self.before is not None:
+            save_alignment(self.path, self.before)
+            return
+        try:
+            self.path.unlink(missing_ok=True)
+        except OSError as exc:
+            raise CalibrationError(f"{self.path}: cannot be removed ({exc.strerror}).") from exc
+
+    @property
+    def way_back(self) -> str:
+        """The file is replaced."""
+        return "The alignment in use can be brought back here, until this window closes."
+
+
+def propose(result: AlignmentResult, before: Alignment | None, path: Path | None) -> Proposal:
+    """The new alignment beside the one that is in use, for the file `path` beside the rig."""
+    from rhot_app.calibration.proposal import Proposal, Row
+    from rhot_app.objects.alignment.alignment_file import to_alignment
+
+    old = _figures(None, None, None, None) if before is None else _figures(
+        [1e3 * value for value in before.rig_from_foreign.translation_m],
+        [1e3 * value for value in before.tracker_from_body.translation_m], 1e3 * before.time_offset_s,
+        None if before.rms_m is None else 1e3 * before.rms_m)
+    said, known = report(result.report), {one.name: one.text for one in old}
+    drift = result.drift
+    state = ("none" if before is None else "not tested" if drift is None else
+             f"stale: {1e3 * drift.distance_m:.1f} mm off" if drift.stale else "holds")
+    rows = tuple(Row(one.name, known.get(one.name, ""), one.text) for one in said.figures if one.name)
+    return Proposal(ALIGNMENT.reason, said.verdict, (Row("alignment in use", state, "just solved"), *rows),
+                    changes=(AlignmentChange(before, to_alignment(result.report), path),),
+                    afterwards="" if path is None else f"It is in {path.name}, beside the rig.")

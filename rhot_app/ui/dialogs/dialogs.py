@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.charts import hex_of
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig, RigNode
@@ -39,7 +40,7 @@ from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
 from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
 from rhot_app.ui.dialogs.settings_dialog import SettingsDialog
 from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
-from rhot_app.ui.models.palette import Scheme, hex_of
+from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.mouse.window import MouseWindow
 
 if TYPE_CHECKING:  # they bring numerical code, which waits until it is wanted

@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.calibration.rig_figures import tracker_text
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.mouse.model import LOCKED_DEG, table_plane, with_mouse_model
 from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, estimator_obstacle, observation_obstacle
@@ -41,7 +42,6 @@ from rhot_app.ui.models.words import (
     OBSERVED,
     SIZE_MEANING,
     VARIANTS,
-    settings_text,
     size_settled,
     size_text,
 )
@@ -188,7 +188,7 @@ class TrackerDialog(QDialog):
             if obstacle is not None:
                 self._failed(f"{obstacle.why} {obstacle.remedy}")
                 return
-            self._change(rig, f"choosing the tracker {settings_text(settings)}")
+            self._change(rig, f"choosing the tracker {tracker_text(settings)}")
 
     def _tracked_by(self, settings: TrackerSettings) -> Rig:
         """The rig tracked so. Of the classic tracker, which leads on from markers only, a rig without markers on its

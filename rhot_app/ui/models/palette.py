@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from rhot_app.charts import hex_of
+
 SchemeName = Literal["dark", "light"]
 
 
@@ -80,11 +82,6 @@ def contrast(first: str, second: str) -> float:
 def rgb_of(colour: str) -> tuple[int, int, int]:
     """Three bytes of ``#rrggbb``."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
-
-
-def hex_of(rgb: tuple[int, int, int]) -> str:
-    """``#rrggbb`` of three bytes."""
-    return "#{:02x}{:02x}{:02x}".format(*rgb)
 
 
 def visible_on(colour: str, background: str, ratio: float = 1.8) -> str:

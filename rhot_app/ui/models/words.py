@@ -16,7 +16,7 @@ import numpy as np
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import RigError
 from rhot_app.hand.anthropometry import hand_length
-from rhot_app.project import Rig, TrackerSettings
+from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_node.files import read_json, resource_path
 from rhot_node.wire.messages import MarkerFlag
@@ -244,18 +244,6 @@ SIZE_MEANING: Final = ("The hand's size is estimated as it moves, so that a hand
 
 SETTLED_SD = 0.02
 """A size that is not known to 2 % is no better than a hand chosen by its length."""
-
-
-def settings_text(settings: TrackerSettings) -> str:
-    """One line, e.g. "estimator, full, anatomical limits, size estimated"."""
-    if settings.kind == "classic":
-        return "classic" if settings.ik == "fabrik" else f"classic, {IK_METHODS[settings.ik][0]}"
-    size = ", size estimated" if settings.float_scale else ""
-    if settings.contours:
-        return f"estimator, {OBSERVED[settings.observe][0].lower()}{size}"
-    if settings.landmarks:
-        return f"estimator, landmarks, {settings.variant}, {settings.limits} limits{size}"
-    return f"estimator, {settings.variant}, {settings.limits} limits{size}"
 
 
 def size_known(state: HandState | None) -> bool:

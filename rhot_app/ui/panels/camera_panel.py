@@ -10,13 +10,14 @@ from PySide6.QtCore import QEvent, QLineF, QPointF, QRectF, QSize, QSizeF, Qt
 from PySide6.QtGui import QColor, QEnterEvent, QFontMetricsF, QImage, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
 
+from rhot_app.charts import hex_of
 from rhot_app.engine.status import Preview
 from rhot_app.project import Rig
 from rhot_app.state import Knowledge, SeenContour
 from rhot_app.ui.backend.live import Live
 from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.label_layout import place_at_sides
-from rhot_app.ui.models.palette import Scheme, hex_of, visible_on
+from rhot_app.ui.models.palette import Scheme, visible_on
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.panels.empty_state import EmptyState
 from rhot_app.ui.scene.hand_mesh import BONES

@@ -7,10 +7,11 @@ from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibration_error
+from rhot_app.charts import hex_of
 from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.common.shapes import ShapeMark
-from rhot_app.ui.models.palette import Scheme, hex_of
+from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import MarkerRow, marker_rows, short_name
 from rhot_app.ui.models.words import Look, tip
 from rhot_app.ui.panels.empty_state import EmptyState

@@ -9,11 +9,12 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPen
 from PySide6.QtWidgets import QWidget
 
+from rhot_app.charts import hex_of
 from rhot_app.latency import STACKED
 from rhot_app.project import Rig
 from rhot_app.ui.backend.live import LATENCY_COLUMNS, LOST
 from rhot_app.ui.models.meters import BUDGET_S
-from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme, hex_of, visible_on
+from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme, visible_on
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.models.words import STAGES, tip
 from rhot_app.ui.plots.plot_panel import DASHES, LegendEntry, Line, PlotPanel, newest, number

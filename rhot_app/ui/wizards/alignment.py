@@ -3,30 +3,48 @@
 from __future__ import annotations
 
 import contextlib
+import shlex
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QLineEdit, QPushButton
 
 from rhot_app.calibration.registry import ALIGNMENT
-from rhot_app.errors import EngineError
+from rhot_app.errors import CalibrationError, EngineError
+from rhot_app.objects.alignment.alignment_command import StreamRecording, propose, report, solve_recording
+from rhot_app.objects.alignment.alignment_file import Alignment, alignment_path, load_alignment
+from rhot_app.objects.alignment.fit import LASTING_M, SEARCH_S
+from rhot_app.objects.alignment.report import FAIR_M, FAST_M_S, REACH_M, Coverage
+from rhot_app.state import HandState
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
-from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext
-from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page
-from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep, StepView
-from rhot_app.ui.wizards.steps.alignment_steps import (
-    KINDS,
-    AlignmentSolver,
-    SourceStep,
-    TogetherStep,
-    charts_of,
-    simulated_kind,
-)
+from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext, accept_result
+from rhot_app.ui.wizards.framework.page import ChartPage, Page
+from rhot_app.ui.wizards.models.step import Bar, SolveStep, Step, StepView, Task
 
 _KIND, _DETAIL, _TRACKER = "pose source", "pose source detail", "pose tracker"  # as they are remembered
+
+Array = NDArray[np.float64]
+
+SECONDS = 20.0
+
+ENOUGH_RAD = LASTING_M / FAIR_M
+ENOUGH_M = LASTING_M * REACH_M / FAIR_M
+ENOUGH_M_S = LASTING_M * FAST_M_S / FAIR_M
+"""rad, m and m/s: of the verdict's "good" (`objects.alignment.report`)."""
+
+LEAST_HZ = 20.0
+"""Hz: hands move at up to 5 Hz, and a cubic needs four samples a period."""
+
+_RECENT_NS = 1_000_000_000
 
 
 def make_wizard(context: WizardContext, poses: PoseFeed | None = None,
@@ -38,19 +56,209 @@ def make_wizard(context: WizardContext, poses: PoseFeed | None = None,
     simulated = simulated_kind(context.rig_path)
     source = SourceStep(KINDS if simulated is None else (simulated, *KINDS), poses)
     together = TogetherStep(context.rig.markers.ids, poses, states.recent, now_ns)
-    solver = AlignmentSolver(together, context.rig_path)
-    solve = SolveStep(solver.task, lambda result: result.report.verdict, charts_of)
-    accept = AcceptStep(lambda: solver.propose(solve.report), "Record a movement of both first.")
+    path = None if context.rig_path is None else alignment_path(context.rig_path)
+    before = in_use(path)
+    solve = SolveStep(lambda: None if together.recording is None else Task(
+        "Aligning both trackers …", solve_recording, (together.recording, before)),
+        lambda result: report(result.report, result.search))
+    accept = accept_result(context, solve, lambda result: propose(result, before, path),
+                           "Record a movement of both first.")
 
     def end() -> None:
         poses.stop()
         states.stop()
 
     pages = (SourcePage(source, context.memory), TogetherPage(together, states, context),
-             ChartPage(solve, context.scheme), AcceptPage(accept, context.scheme))
-    return Definition(ALIGNMENT.title, pages, solver="rhot_app.ui.wizards.steps.alignment_steps",
-                      put_back=end)
+             ChartPage(solve, context.scheme), accept)
+    return Definition(ALIGNMENT.title, pages, solver="rhot_app.objects.alignment.fit", put_back=end)
 
+
+def in_use(path: Path | None) -> Alignment | None:
+    """The alignment beside the rig; one that cannot be read counts as none: the new one replaces it."""
+    if path is None or not path.exists():
+        return None
+    try:
+        return load_alignment(path)
+    except CalibrationError:
+        return None
+
+
+# -- steps -------------------------------------------------------------------------------------------------------------
+
+@dataclass(frozen=True, slots=True)
+class SourceKind:
+    """A kind of source: the `name` of `open_source` with the detail in place of {}, and what is said of it."""
+
+    label: str
+    name: str
+    meaning: str
+    detail: str = ""
+
+
+KINDS: tuple[SourceKind, ...] = (
+    SourceKind("SteamVR", "openvr", "A Vive tracker, by SteamVR on this machine."),
+    SourceKind("libsurvive", "libsurvive", "A Vive tracker, by survive-cli on this machine."),
+    SourceKind("Program", "run:{}", "A program that prints a line for each pose.", "program and arguments"),
+    SourceKind("UDP", "udp:{}", "Lines that a program sends to this port.", "port"),
+    SourceKind("TCP", "tcp:{}", "A program that serves lines.", "host:port"))
+
+
+def simulated_kind(rig_path: Path | None) -> SourceKind | None:
+    """The simulated rig's own tracker; None on another rig."""
+    if rig_path is None:
+        return None
+    from rhot_app.simulator.nodes.remote import SERVER_NAME  # with OpenCV
+
+    if not (rig_path.parent / SERVER_NAME).exists():
+        return None
+    command = shlex.join([sys.executable, "-m", "rhot_app.simulator.nodes.tracker", str(rig_path.parent)])
+    return SourceKind("Simulated", f"run:{command}", "A tracker on the simulated index fingertip.")
+
+
+class SourceStep(Step):
+    """A source is chosen and listened to. `kind`, `detail` and `tracker` are as entered."""
+
+    title = "The tracker"
+
+    def __init__(self, kinds: Sequence[SourceKind], feed: PoseFeed) -> None:
+        self.kinds, self.feed = tuple(kinds), feed
+        self.kind, self.detail, self.tracker = self.kinds[0], "", ""
+
+    def connect(self) -> None:
+        """Listen to what was entered."""
+        self.feed.open(self.kind.name.replace("{}", self.detail.strip()), self.tracker.strip())
+
+    def view(self) -> StepView:
+        """Whether poses come."""
+        if not self.feed.opened:
+            return StepView("Choose the other tracker, switch it on, then connect.")
+        rate_hz = self.feed.rate_hz
+        bars = (Bar("poses", min(rate_hz / LEAST_HZ, 1.0), f"{LEAST_HZ:.0f} or more a second"),)
+        if rate_hz >= LEAST_HZ:
+            return StepView(f"{rate_hz:.0f} poses a second. Go on.", done=True, bars=bars, hint=self.feed.notice)
+        return StepView("Waiting for poses.", bars=bars, hint=self.feed.notice)
+
+
+Phase = Literal["waiting", "recording", "recorded"]
+
+
+class TogetherStep(Step):
+    """Tracker and fingertip are moved together; Space begins and ends. `marker` is the number of the fingertip's."""
+
+    title = "Move both"
+    captures = True
+
+    def __init__(self, markers: Sequence[str], feed: PoseFeed, recent: Callable[[float], Sequence[HandState]],
+                 now_ns: Callable[[], int] = time.monotonic_ns) -> None:
+        """`recent` gives the hand's states of the last seconds."""
+        self.markers, self.feed = tuple(markers), feed
+        self.marker = self.markers.index("index") if "index" in self.markers else 0
+        self.seconds = SECONDS
+        self.phase: Phase = "waiting"
+        self.recording: StreamRecording | None = None
+        self.problem = ""
+        self._recent, self._now_ns = recent, now_ns
+        self._began_ns = self._ended_ns = 0
+        self._places: list[tuple[int, Array]] = []
+        self._coverage: Coverage | None = None
+
+    @property
+    def keeps(self) -> bool:
+        """A movement costs a person a minute."""
+        return self.recording is not None
+
+    def capture(self) -> bool:
+        """Begin, or end."""
+        now_ns = self._now_ns()
+        if self.phase == "recording":
+            self._gather(now_ns)
+            self.phase, self._ended_ns, self.recording = "recorded", now_ns, self._recorded(now_ns)
+            return True
+        self.problem = self._missing()
+        if self.problem:
+            return False
+        self.phase, self._began_ns, self.recording = "recording", now_ns, None
+        self._places, self._coverage = [], None
+        return True
+
+    def seen(self) -> bool:
+        """Whether the marker was measured within the last second."""
+        return any(np.isfinite(state.marker_raw_positions[self.marker]).all() for state in self._recent(1.0))
+
+    def _missing(self) -> str:
+        if not self.feed.between(self._now_ns() - _RECENT_NS, self._now_ns()):
+            return self.feed.notice or "The tracker gives no poses. Go back and connect it."
+        if not self.seen():
+            return (f"The marker {self.markers[self.marker]} is not seen by two cameras. Hold it before them, or "
+                    "choose another one.")
+        return ""
+
+    def _gather(self, now_ns: int) -> None:
+        """The marker's places, unfiltered: a filter's lag would be taken for the tracker's delay."""
+        last_ns = self._places[-1][0] if self._places else self._began_ns
+        for state in self._recent(4.0):
+            place = state.marker_raw_positions[self.marker]
+            if last_ns < state.t_master_ns <= now_ns and np.isfinite(place).all():
+                self._places.append((state.t_master_ns, np.array(place)))
+                last_ns = state.t_master_ns
+
+    def _recorded(self, now_ns: int) -> StreamRecording:
+        # the other clock may be off by as much as is searched
+        poses = self.feed.between(self._began_ns - round(1e9 * SEARCH_S), now_ns)
+        return StreamRecording(np.array([1e-9 * (pose.t_master_ns - self._began_ns) for pose in poses]),
+                               np.array([pose.world_from_body for pose in poses]).reshape(-1, 4, 4),
+                               np.array([1e-9 * (t_ns - self._began_ns) for t_ns, _ in self._places]),
+                               np.array([place for _, place in self._places]).reshape(-1, 3))
+
+    def view(self) -> StepView:
+        """Coverage and what is missing."""
+        now_ns = self._now_ns()
+        if self.phase == "recording":
+            self._gather(now_ns)
+            self._coverage = self._recorded(now_ns).coverage
+            if now_ns - self._began_ns >= 1e9 * self.seconds:
+                self.capture()
+        elapsed_s = 1e-9 * ((now_ns if self.phase == "recording" else self._ended_ns) - self._began_ns)
+        recorded = self.phase == "recorded"
+        missing = advice(self._coverage)
+        return StepView(self._say(elapsed_s, missing), done=recorded and not missing, passable=recorded,
+                        hint=self.problem or ("" if self.phase != "recording" or self.seen() else self._missing()),
+                        bars=(Bar("time", min(elapsed_s / self.seconds, 1.0) if self._began_ns else 0.0,
+                                  f"of {self.seconds:.0f} s recorded"), *bars_of(self._coverage)),
+                        kept=int(recorded))
+
+    def _say(self, elapsed_s: float, missing: str) -> str:
+        if self.phase == "recording":
+            return f"{missing or 'Good, go on.'} {max(0.0, self.seconds - elapsed_s):.0f} s left."
+        if self.phase == "recorded":
+            return f"{missing} Record again." if missing else "Recorded. Go on, or record again."
+        return "Tie the tracker to the finger. Press Record, then move and turn both, irregularly."
+
+
+def bars_of(coverage: Coverage | None) -> tuple[Bar, ...]:
+    """How much of what an alignment needs the motion shows."""
+    turn, reach, speed = (0.0, 0.0, 0.0) if coverage is None else (
+        float(coverage.turn[0]) / ENOUGH_RAD, float(np.linalg.norm(coverage.spread_m[1:])) / ENOUGH_M,
+        coverage.speed_m_s / ENOUGH_M_S)
+    return (Bar("turn", min(turn, 1.0), f"of the tracker about two axes, {np.degrees(ENOUGH_RAD):.0f} degrees rms"),
+            Bar("reach", min(reach, 1.0), f"of the finger across its longest way, {1e3 * ENOUGH_M:.0f} mm rms"),
+            Bar("speed", min(speed, 1.0), f"of the finger, {1e3 * ENOUGH_M_S:.0f} mm/s rms"))
+
+
+def advice(coverage: Coverage | None) -> str:
+    """Which motion is missing most; "" when none is."""
+    if coverage is None:
+        return "Keep the marker in view."
+    if coverage.turn[2] < ENOUGH_RAD:
+        return "Turn the tracker while you move it."
+    if coverage.turn[0] < ENOUGH_RAD:
+        return "Turn it about a second axis, too."
+    if np.linalg.norm(coverage.spread_m[1:]) < ENOUGH_M:
+        return "Move farther: up and down, left and right, near and far."
+    return "" if coverage.speed_m_s >= ENOUGH_M_S else "Move faster."
+
+
+# -- pages -------------------------------------------------------------------------------------------------------------
 
 class SourcePage(Page):
     """Chooses the source and shows whether its poses come."""

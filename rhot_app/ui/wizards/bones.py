@@ -2,51 +2,214 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+import msgspec
+import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QBrush, QColor
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QComboBox,
-    QDoubleSpinBox,
-    QGridLayout,
-    QHeaderView,
-    QLabel,
-    QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
-    QWidget,
-)
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QLabel, QPushButton, QWidget
 
-from rhot_app.calibration.hand.bones import BONE_NAMES
+from rhot_app.calibration.commands.bones import propose, report, roles_of, solve_log
+from rhot_app.calibration.hand.bones import BONE_NAMES, enter_bones
 from rhot_app.calibration.hand.bones_report import BoneLength, BonesReport
-from rhot_app.calibration.registry import BONES
-from rhot_app.hand.skeleton import FINGERS
+from rhot_app.calibration.hand.marker_places import tracks_of
+from rhot_app.calibration.registry import BONES as HAND_BONES
+from rhot_app.errors import CalibrationError
+from rhot_app.hand.anatomy import HandAnatomy
+from rhot_app.hand.skeleton import BONES, FINGERS
+from rhot_app.project import Rig
+from rhot_app.state import HandState
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.movement_page import Movements
-from rhot_app.ui.wizards.framework.page import AcceptPage, Page
-from rhot_app.ui.wizards.models.step import AcceptStep, StepView
-from rhot_app.ui.wizards.steps.bones_steps import SECONDS, EntryStep, HandStep, knowledge_of, make_guide, propose
+from rhot_app.ui.wizards.framework.page import FigureTable, Page
+from rhot_app.ui.wizards.models.movement import Guide, QuietGuide
+from rhot_app.ui.wizards.models.step import Bar, Done, SolveStep, Step, StepView, Task
+
+if TYPE_CHECKING:
+    from rhot_app.calibration.hand.bones_collector import BonesCollector
+
+SECONDS = 60.0
 
 
 def make_wizard(context: WizardContext) -> Definition:
     """Which hand, a minute of movement, the bones, use them."""
-    movements = Movements(context)
-    entry = EntryStep(context.rig.hand)
+    movements, rig = Movements(context), context.rig
+    entry = EntryStep(rig.hand)
     page = movements.page("Move freely", "Press Record, then bend and stretch every finger and turn the hand.", SECONDS,
-                          lambda: make_guide(context.rig))
+                          lambda: make_guide(rig))
     page.twin_facts = "Moves every joint: all of them within the minute."
-    page.movement.unneeded = lambda: "Press Next: the bones were entered." if entry.report is not None else ""
-    hand = HandStep(entry, page.movement, context.rig)
-    accept = AcceptStep(lambda: propose(hand.report, context.rig, context.rig_path), "Record the movement first.")
-    return Definition(BONES.title, (EntryPage(entry), page, HandPage(hand, context.scheme),
-                                      AcceptPage(accept, context.scheme)),
+    page.movement.unneeded = lambda: "Press Next: the bones were entered." if entry.result is not None else ""
+
+    def fitting() -> Task | Done | None:
+        if entry.result is not None:
+            return Done(entry.result)
+        log = page.movement.log
+        return None if log is None else Task("Fitting the hand …", solve_log, (log, rig, entry.base))
+
+    hand = SolveStep(fitting, report)
+    accept = accept_result(context, hand, lambda result: propose(result, rig), "Record the movement first.")
+    return Definition(HAND_BONES.title, (EntryPage(entry), page, HandPage(hand, context.scheme), accept),
                       solver="rhot_app.calibration.hand.bones", put_back=movements.end)
+
+
+# -- steps -------------------------------------------------------------------------------------------------------------
+
+Side = Literal["right", "left"]
+
+
+class EntryStep(Step):
+    """The first page: which hand, and the bones that were measured with a ruler, in mm; none means: by movement."""
+
+    title = "Your hand"
+
+    def __init__(self, hand: HandAnatomy) -> None:
+        self._hand = hand
+        self._lengths: dict[str, float] = {}
+        self._side: Side = hand.side
+        self._undone: list[tuple[dict[str, float], Side]] = []
+        self.result: BonesReport | None = None
+        self.problem = ""
+
+    @property
+    def base(self) -> HandAnatomy:
+        """The hand to begin from, of the side chosen."""
+        return msgspec.structs.replace(self._hand, side=self._side)
+
+    @property
+    def lengths(self) -> dict[str, float]:
+        """What was entered, by bone, mm."""
+        return dict(self._lengths)
+
+    @property
+    def keeps(self) -> bool:
+        """Measuring takes a person minutes."""
+        return bool(self._lengths)
+
+    @property
+    def undoable(self) -> bool:
+        """Whether something was entered."""
+        return bool(self._undone)
+
+    def usual(self, name: str) -> float:
+        """A bone's length in the hand to begin from, mm."""
+        finger, _, bone = name.partition(".")
+        return float(self._hand.fingers[finger].bones_mm[BONES[FINGERS.index(finger)].index(bone)])
+
+    def enter_length(self, name: str, length_mm: float | None) -> None:
+        """A bone's length; None for one that was not measured."""
+        lengths = {bone: value for bone, value in self._lengths.items() if bone != name}
+        if length_mm is not None:
+            lengths[name] = length_mm
+        self._change(lengths, self._side)
+
+    def choose_side(self, side: Side) -> None:
+        """Left or right."""
+        self._change(self._lengths, side)
+
+    def undo(self) -> bool:
+        """Back to what was entered before."""
+        if not self._undone:
+            return False
+        self._lengths, self._side = self._undone.pop()
+        self._judge()
+        return True
+
+    def _change(self, lengths: dict[str, float], side: Side) -> None:
+        if (lengths, side) != (self._lengths, self._side):
+            self._undone.append((self._lengths, self._side))
+            self._lengths, self._side = lengths, side
+            self._judge()
+
+    def _judge(self) -> None:
+        self.result, self.problem = None, ""
+        if self._lengths:
+            try:
+                self.result = enter_bones(self.base, {name: self._lengths[name] for name in BONE_NAMES
+                                                      if name in self._lengths})
+            except CalibrationError as exc:
+                self.problem = str(exc)
+
+    def view(self) -> StepView:
+        """Either way is right."""
+        if self.problem:
+            return StepView("Mend what was entered.", hint=self.problem)
+        if self.result is None:
+            return StepView("Press Next to measure by movement.", done=True,
+                            hint="Or enter bones that you have measured with a ruler, joint to joint.")
+        return StepView("Press Next: the bones are as entered.", done=True, verdict=self.result.verdict)
+
+
+class SweepGuide:
+    """Which fingers have bent and stretched enough, by the collector that the command uses."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._collector: BonesCollector | None = None
+        self._columns: list[int] = []
+        self._last = -1
+        self._first_s = 0.0
+
+    def watch(self, states: Sequence[HandState]) -> None:
+        """Take every state once."""
+        for state in states:
+            if state.t_master_ns > self._last:
+                self._last = state.t_master_ns
+                if self._collector is None:
+                    self._begin(state)
+                if self._collector is not None:
+                    self._collector.add(1e-9 * state.t_master_ns - self._first_s,
+                                        state.marker_raw_positions[self._columns])
+
+    def _begin(self, state: HandState) -> None:
+        from rhot_app.calibration.hand.bones_collector import BonesCollector
+
+        self._first_s = 1e-9 * state.t_master_ns
+        positions, (roles, painted) = state.marker_raw_positions[None], roles_of(self._rig)
+        tracks = tracks_of(np.zeros(1), np.nan_to_num(positions), state.marker_ids, roles, painted=painted)
+        self._columns = [state.marker_ids.index(place.name) for place in tracks.places]
+        self._collector = BonesCollector(tracks.places)
+
+    def bars(self) -> tuple[Bar, ...]:
+        """One for each finger with a marker at its end."""
+        if self._collector is None:
+            return ()
+        from rhot_app.calibration.hand.bones_collector import LEAST_S
+
+        progress = self._collector.progress
+        fingers = (Bar(finger.finger, finger.fraction, f"bent and stretched {finger.sweeps} times; how far shows when "
+                       "the hand is fitted") for finger in progress.fingers if finger.seen)
+        return (Bar("in sight", min(progress.seconds / LEAST_S, 1.0), f"of {LEAST_S:.0f} s in which the cameras see "
+                    "the markers together"), *fingers)
+
+    def sentence(self) -> str:
+        """What to do next."""
+        return self._collector.progress.sentence if self._collector is not None else "Show the hand to both cameras."
+
+    def shortfall(self) -> str:
+        """What has not moved enough."""
+        return "" if self._collector is not None and self._collector.progress.done else self.sentence()
+
+
+def make_guide(rig: Rig) -> Guide:
+    """A guide for the markers of the rig; a quiet one when none of them names its place on the hand."""
+    roles, painted = roles_of(rig)
+    try:
+        tracks_of(np.zeros(1), np.zeros((1, len(rig.markers.ids), 3)), rig.markers.ids, roles, painted=painted)
+    except CalibrationError:
+        return QuietGuide("Bend and stretch every finger.")
+    return SweepGuide(rig)
+
+
+def knowledge_of(bone: BoneLength) -> str:
+    """``measured``, ``inferred`` or ``guessed``: shown solid, translucent and hatched, as everywhere."""
+    return {"observed": "measured", "entered": "measured", "partly": "inferred"}.get(bone.known.value, "guessed")
 
 
 # -- the pages of the bones wizard -------------------------------------------------------------------------------------
 
-_HEADS = ("bone", "length, mm", "± mm", "known")
 _SIDES = (("right", "Right hand"), ("left", "Left hand"))
 _ROW_PX = 30
 _BOX_PX = 120
@@ -141,22 +304,13 @@ class EntryPage(Page):
 class HandPage(Page):
     """Every bone: solid what was measured, translucent what follows from it, hatched what is only usual."""
 
-    def __init__(self, step: HandStep, scheme: Scheme) -> None:
+    def __init__(self, step: SolveStep, scheme: Scheme) -> None:
         super().__init__(step)
         self._hand = step
         self._scheme = scheme
         self._shown: BonesReport | None = None
-        self.table = QTableWidget(0, len(_HEADS))
-        self.table.setHorizontalHeaderLabels(list(_HEADS))
-        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        for column in (1, 2):
-            self.table.horizontalHeader().setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
-        self.table.verticalHeader().setVisible(False)
+        self.table = FigureTable()
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
-        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        self.table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.table.setShowGrid(False)
         self.centre = self.table
         self.reaches = QLabel()
         self.reaches.setWordWrap(True)
@@ -170,27 +324,16 @@ class HandPage(Page):
         self.column.addStretch(1)
 
     def show_view(self, view: StepView) -> None:
-        """The newest report."""
-        report: BonesReport | None = self._hand.report
-        if report is self._shown:
+        """The newest result."""
+        result: BonesReport | None = self._hand.result
+        if result is self._shown:
             return
-        self._shown = report
-        bones = report.bones if report is not None else ()
-        self.table.setRowCount(len(bones))
-        for r, bone in enumerate(bones):
-            self._fill(r, bone)
-        self.reaches.setText("" if report is None else "Reach: " + ", ".join(
-            f"{reach.finger} {reach.length_mm:.0f} ± {reach.std_mm:.0f}" for reach in report.reaches) + " mm")
-
-    def _fill(self, r: int, bone: BoneLength) -> None:
-        texts = (bone.name.replace(".", " "), f"{bone.length_mm:.1f}", f"{bone.std_mm:.1f}", bone.known.word)
-        for c, text in enumerate(texts):
-            item = QTableWidgetItem(text)
-            if c in (1, 2):
-                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            if c == len(texts) - 1:
-                item.setBackground(self._brush(knowledge_of(bone)))
-            self.table.setItem(r, c, item)
+        self._shown = result
+        self.table.show_table(None if self._hand.report is None else self._hand.report.tables[0])
+        for r, bone in enumerate(result.bones if result is not None else ()):
+            self.table.cell(r, self.table.columnCount() - 1).setBackground(self._brush(knowledge_of(bone)))
+        self.reaches.setText("" if result is None else "Reach: " + ", ".join(
+            f"{reach.finger} {reach.length_mm:.0f} ± {reach.std_mm:.0f}" for reach in result.reaches) + " mm")
 
     def _brush(self, knowledge: str) -> QBrush:
         guessed = knowledge == "guessed"

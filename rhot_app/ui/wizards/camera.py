@@ -11,16 +11,16 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
+from rhot_app.calibration.proposal import NodeChange
 from rhot_app.calibration.registry import CAMERA
 from rhot_app.errors import RhotError
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.models.proposal import NodeChange
 from rhot_app.ui.wizards.framework.control_row import ControlRow
-from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
-from rhot_app.ui.wizards.framework.page import AcceptPage, Page, shrinkable
-from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
+from rhot_app.ui.wizards.framework.page import Page, shrinkable
+from rhot_app.ui.wizards.models.step import StepView
 from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, Control, SettingsStep, Value
 
 
@@ -29,8 +29,8 @@ def make_wizard(context: WizardContext) -> Definition:
     choices = CameraChoices(context.rig.nodes, context.node_settings)
     step = SettingsStep(choices, context.rig.markers)
     tryout = Tryout(context.connect)
-    accept = AcceptStep(lambda: step.propose(context.rig_path),
-                        missing="No picture shows these settings yet, or they cannot be used: go back.")
+    last = accept_page(context, step.propose, "No picture shows these settings yet, or they cannot be used: go back.")
+    accept = last.accept
     page = CameraPage(step, tryout)
     tryout.setParent(page)
 
@@ -44,7 +44,7 @@ def make_wizard(context: WizardContext) -> Definition:
                     in_force[change.node_id]["camera"].update(change.after["camera"])
         tryout.put_back(in_force)
 
-    return Definition(CAMERA.title, (page, AcceptPage(accept, context.scheme)), put_back=put_back)
+    return Definition(CAMERA.title, (page, last), put_back=put_back)
 
 
 # -- the knobs of the camera wizard ------------------------------------------------------------------------------------

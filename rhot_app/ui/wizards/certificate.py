@@ -27,10 +27,9 @@ from rhot_app.ui.wizards.steps.certificate_steps import (
     KeepStep,
     RulerDistances,
     Statements,
-    charts_of,
     propose,
+    report,
     task_of,
-    verdict_of,
 )
 
 _FLASH_STEP_MS = 4  # a quarter of a 60 Hz screen's frame
@@ -63,8 +62,9 @@ def make_wizard(context: WizardContext) -> Definition:
              RodPage(made["rod"], context.connect, movements.states, said),
              FlashPage(made["flash"], context.connect, movements.states, said),
              MovementPage(made["plumb"], context.connect, movements.states))
-    solve = SolveStep(lambda: task_of(said, made), verdict_of, charts_of)
-    keep = KeepStep(lambda: propose(solve.report, lambda: _place(context.rig.name)), "Record a step first.")
+    solve = SolveStep(lambda: task_of(said, made), report)
+    keep = KeepStep(lambda: propose(solve.result, lambda: _place(context.rig.name)), context.rig_path,
+                    "Record a step first.")
     return Definition(CERTIFICATE.title, (*pages, ChartPage(solve, context.scheme), KeepPage(keep, context.scheme)),
                       solver="rhot_app.certificate.certify", put_back=movements.end)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
@@ -20,18 +22,20 @@ from PySide6.QtWidgets import (
 from rhot_app.calibration.colour.colours import ColourReport
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.colour.verdict import OVERLAP
+from rhot_app.calibration.commands.colours import propose
+from rhot_app.calibration.proposal import Proposal
 from rhot_app.calibration.registry import COLOURS
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.colour_list import PaintList, PaintRow
 from rhot_app.ui.wizards.framework.control_row import ControlRow
-from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
-from rhot_app.ui.wizards.framework.page import AcceptPage, ChartView, Page, shrinkable
-from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
+from rhot_app.ui.wizards.framework.page import ChartView, Page, shrinkable
+from rhot_app.ui.wizards.models.step import StepView
 from rhot_app.ui.wizards.steps.camera_steps import Control, Value
 from rhot_app.ui.wizards.steps.colour_pick import PickStep
-from rhot_app.ui.wizards.steps.colour_result import BOUNDS, BoundsStep, SeparationStep, matrix_cells, propose
+from rhot_app.ui.wizards.steps.colour_result import BOUNDS, BoundsStep, SeparationStep
 
 
 def make_wizard(context: WizardContext) -> Definition:
@@ -40,10 +44,14 @@ def make_wizard(context: WizardContext) -> Definition:
     picks = PickStep(context.rig.markers, cameras)
     bounds = BoundsStep(picks)
     apart = SeparationStep(bounds)
-    accept = AcceptStep(lambda: propose(apart.judged, context.rig, context.rig_path, context.node_settings),
-                        "Pick the markers' colours first.")
+
+    def propose_colours(result: ColourReport) -> Proposal:
+        assert apart.report is not None
+        return propose(replace(result, verdict=apart.report.verdict), context.rig, context.node_settings)
+
+    accept = accept_result(context, apart, propose_colours, "Pick the markers' colours first.")
     pages = (PickPage(picks, context.scheme), BoundsPage(bounds, context.scheme), SeparationPage(apart, context.scheme),
-             AcceptPage(accept, context.scheme))
+             accept)
     return Definition(COLOURS.title, pages, solver="rhot_app.calibration.colour.colours")
 
 
@@ -87,25 +95,26 @@ class SeparationPage(Page):
         self.column.addStretch(1)
 
     def show_view(self, view: StepView) -> None:
-        """The newest report."""
-        report = self._apart.report
-        if report is not self._shown:
-            self._shown = report
+        """The newest result."""
+        result = self._apart.result
+        if result is not self._shown:
+            self._shown = result
             self.charts.show_charts(self._apart.charts)
-            if report is not None:
-                self._fill(*matrix_cells(report))
+            if result is not None:
+                self._fill(result)
 
-    def _fill(self, heads: tuple[str, ...], rows: list[tuple[str, list[float]]]) -> None:
+    def _fill(self, result: ColourReport) -> None:
+        names, heads = result.names, (*result.names, *result.separability.others)
         self.table.setColumnCount(len(heads))
-        self.table.setRowCount(len(rows))
+        self.table.setRowCount(len(names))
         self.table.setHorizontalHeaderLabels(list(heads))
-        self.table.setVerticalHeaderLabels([name for name, _ in rows])
-        for r, (name, shares) in enumerate(rows):
+        self.table.setVerticalHeaderLabels(list(names))
+        for r, shares in enumerate(result.separability.matrix):
             for c, share in enumerate(shares):
-                self.table.setItem(r, c, self._cell(share, own=heads[c] == name))
+                self.table.setItem(r, c, self._cell(float(share), own=r == c))
             self.table.setRowHeight(r, _ROW_PX)
         header = self.table.horizontalHeader().sizeHint().height()
-        self.table.setFixedHeight(header + _ROW_PX * len(rows) + 4)
+        self.table.setFixedHeight(header + _ROW_PX * len(names) + 4)
 
     def _cell(self, share: float, *, own: bool) -> QTableWidgetItem:
         item = QTableWidgetItem(f"{100 * share:.0f}" if own or share >= _LEAST else "–")
@@ -250,7 +259,7 @@ class BoundsPage(Page):
         self.list.show_rows(tuple(self._row(name) for name in step.names), step.chosen)
         for row in self.rows.values():
             row.fill(step.value(row.control))
-            row.setEnabled(step.report is not None)
+            row.setEnabled(step.result is not None)
         self.again.setEnabled(step.chosen in step.given)
         self.undo_button.setEnabled(step.undoable)
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -18,27 +20,158 @@ from PySide6.QtWidgets import (
     QTableWidgetItem,
 )
 
-from rhot_app.calibration.depth.table import DepthRow
+from rhot_app.calibration.commands.depth import propose, report
+from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthReport, fit_depth, geometry_of, replaced_calibration
+from rhot_app.calibration.depth.table import DepthRow, DepthTable
 from rhot_app.calibration.registry import DEPTH
-from rhot_app.errors import EngineError
-from rhot_app.ui.backend.feed import StateFeed
-from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
-from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page, shrinkable
-from rhot_app.ui.wizards.models.step import AcceptStep, StepView
-from rhot_app.ui.wizards.steps.depth_steps import DistanceStep, LawStep, propose
+from rhot_app.errors import CalibrationError, EngineError
+from rhot_app.project import Rig
+from rhot_app.state import HandState
+from rhot_app.ui.backend.feed import Picture, StateFeed
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
+from rhot_app.ui.wizards.framework.page import ChartPage, Page, shrinkable
+from rhot_app.ui.wizards.models.drawing import Callout, Dots
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Done, Pictures, SolveStep, Step, StepView
+from rhot_node.detect.fast import FastDetector
+from rhot_node.detect.image import from_bgr
+from rhot_node.wire.messages import MarkerObservation
 
 
 def make_wizard(context: WizardContext, clock: Callable[[], float] = time.monotonic) -> Definition:
     """Measure, look at the law, use it."""
     if context.listen is None:
         raise EngineError("this window cannot hear the markers; open the wizard from the main window.")
-    states = StateFeed(context.listen, clock)
-    distances = DistanceStep(context.rig, states.recent)
-    law = LawStep(distances)
-    accept = AcceptStep(lambda: propose(distances.report, context.rig, context.rig_path),
-                        "Measure some distances first.")
-    pages = (DistancePage(distances, states), ChartPage(law, context.scheme), AcceptPage(accept, context.scheme))
-    return Definition(DEPTH.title, pages, put_back=states.stop)
+    states, rig = StateFeed(context.listen, clock), context.rig
+    distances = DistanceStep(rig, states.recent)
+    law = SolveStep(lambda: None if distances.result is None else Done(distances.result),
+                    lambda result: report(result, rig), "The law",
+                    f"Go back and measure at least {LEAST_ROWS} distances.")
+    law.advice = "The points should lie on the line, inside the band."
+    accept = accept_result(context, law, lambda result: propose(result, rig), "Measure some distances first.")
+    return Definition(DEPTH.title, (DistancePage(distances, states), ChartPage(law, context.scheme), accept),
+                      put_back=states.stop)
+
+
+# -- the step of the distances -----------------------------------------------------------------------------------------
+
+ENOUGH = 8
+LOOK_S = 1.0
+
+_LEAST_STATES = 5
+_STILL_PX = 1.0
+
+
+class DistanceStep(Step):
+    """A marker is held at a distance that a person has measured; Space takes what the cameras see in a second."""
+
+    title = "Measure"
+    watches = captures = True
+
+    def __init__(self, rig: Rig, recent: Callable[[float], Sequence[HandState]]) -> None:
+        """`recent` gives the states of the last seconds."""
+        self.rig = rig
+        self.marker = 0
+        self.distance_m = 0.3
+        self.rows: list[DepthRow] = []
+        self.result: DepthReport | None = None
+        self.problem = ""
+        self._recent = recent
+        self._detectors: dict[str, FastDetector] = {}
+        self._seen: Mapping[str, tuple[Picture, tuple[MarkerObservation, ...]]] = {}
+        self._warning = " ".join(finding.sentence for finding in replaced_calibration(rig))
+
+    @property
+    def keeps(self) -> bool:
+        """Measuring takes a person minutes."""
+        return bool(self.rows)
+
+    def disparities(self) -> NDArray[np.float64]:
+        """(N,) px, left minus right, of the chosen marker over the last second."""
+        pixels = [state.camera_pixels[:2, self.marker, 0] for state in self._recent(LOOK_S)]
+        seen = np.array([x[0] - x[1] for x in pixels], dtype=np.float64)
+        return seen[np.isfinite(seen)]
+
+    def see(self, pictures: Pictures) -> dict[str, tuple[Picture, tuple[MarkerObservation, ...]]]:
+        """The markers in each picture."""
+        return {name: (picture, self._detectors.setdefault(name, FastDetector(self.rig.markers)).detect(
+            from_bgr(picture.bgr))) for name, picture in pictures.items()}
+
+    def take(self, seen: dict[str, tuple[Picture, tuple[MarkerObservation, ...]]]) -> None:
+        """The markers seen last."""
+        self._seen = seen
+
+    def capture(self) -> bool:
+        """Take the distance entered with the disparity seen; whether it could be."""
+        seen = self.disparities()
+        name = self.rig.markers.ids[self.marker]
+        self.problem = ""
+        if len(seen) < _LEAST_STATES:
+            self.problem = (f"The marker {name} is not seen by both cameras. Start tracking, and hold it into both "
+                            "pictures.")
+        elif seen.std() > _STILL_PX:
+            self.problem = (f"The marker moves ({seen.std():.1f} px). Lay it down or rest the hand, then press Space "
+                            "again.")
+        else:
+            table = DepthTable()
+            row = table.add(self.distance_m, seen)
+            if row is not None:
+                self.rows.append(row)
+                self._fit()
+                return True
+            self.problem = f"This cannot be measured: {table.rejected[0].reason}."
+        return False
+
+    def remove(self, index: int) -> None:
+        """Take one row out."""
+        del self.rows[index]
+        self._fit()
+
+    def undo(self) -> bool:
+        """Take the last row out."""
+        if not self.rows:
+            return False
+        self.remove(len(self.rows) - 1)
+        return True
+
+    def _fit(self) -> None:
+        table = DepthTable()
+        for row in self.rows:
+            table.take(row)
+        self.result = None
+        if len(self.rows) >= LEAST_ROWS:
+            try:
+                self.result = fit_depth(table, geometry_of(self.rig))
+            except CalibrationError as exc:
+                self.problem = str(exc)
+
+    def view(self) -> StepView:
+        """What to do next, and how many distances there are."""
+        bars = (Bar("distances", min(len(self.rows) / ENOUGH, 1.0), f"{len(self.rows)} of {ENOUGH} or more"),
+                Bar("spread", self._spread(), "from near to far: the farthest three times the nearest"))
+        enough = all(bar.full for bar in bars)
+        return StepView(self._sentence(), done=self.result is not None and enough,
+                        hint=self.problem or ("" if self.rows else self._warning), bars=bars,
+                        passable=self.result is not None, kept=len(self.rows),
+                        annotated={name: self._annotated(*seen) for name, seen in self._seen.items()})
+
+    def _annotated(self, picture: Picture, seen: tuple[MarkerObservation, ...]) -> AnnotatedPicture:
+        """The chosen marker where it is in this picture."""
+        mark = seen[self.marker]
+        if not mark.found:
+            return AnnotatedPicture(picture)
+        return AnnotatedPicture(picture, (Dots(np.array([[mark.x, mark.y]])),
+                                          Callout(mark.x, mark.y, self.rig.markers.ids[self.marker])))
+
+    def _sentence(self) -> str:
+        if not self.rows:
+            return "Hold the marker straight before the cameras, enter its distance, press Space."
+        if len(self.rows) < ENOUGH:
+            return "Now at another distance."
+        return "Enough. Go on, or measure more." if self._spread() >= 1.0 else "Now much nearer, or much farther away."
+
+    def _spread(self) -> float:
+        distances = [row.distance_m for row in self.rows]
+        return min((max(distances) / min(distances) - 1.0) / 2.0, 1.0) if distances else 0.0
 
 
 # -- the page of the distances -----------------------------------------------------------------------------------------

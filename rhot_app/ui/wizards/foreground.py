@@ -9,9 +9,9 @@ from PySide6.QtWidgets import QPushButton
 from rhot_app.calibration.registry import FOREGROUND
 from rhot_app.errors import RhotError
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
-from rhot_app.ui.wizards.framework.page import AcceptPage, Page
-from rhot_app.ui.wizards.models.step import AcceptStep, StepView
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
+from rhot_app.ui.wizards.framework.page import Page
+from rhot_app.ui.wizards.models.step import StepView
 from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, LearningStep, SkinStep, ask_node, propose
 
 
@@ -19,15 +19,15 @@ def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand."""
     cameras = {node.name: node.node_id for node in context.rig.nodes if node.node_id in context.node_settings}
     empty, skin = EmptyStep(cameras), SkinStep(cameras, context.connect)
-    accept = AcceptStep(lambda: propose(empty, skin), missing="Learn the empty scene and your hand first.")
+    last = accept_page(context, lambda: propose(empty, skin), "Learn the empty scene and your hand first.")
     pages = (LearnPage(empty, context, "Learn the empty scene"), LearnPage(skin, context, "Learn my skin"),
-             AcceptPage(accept, context.scheme))
+             last)
 
     def put_back() -> None:
         """What was only tried out goes, and what is being learnt is given up."""
         for step in (empty, skin):
             step.stop()
-        if accept.state != "used" and (empty.tried or skin.tried):
+        if last.accept.state != "used" and (empty.tried or skin.tried):
             with contextlib.closing(context.connect()) as asker:
                 for node_id in cameras.values():
                     with contextlib.suppress(RhotError):  # a node that is gone has forgotten it anyway

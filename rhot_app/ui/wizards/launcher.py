@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from PySide6.QtGui import QAction, QIcon
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QMenu, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app import rig_history
+from rhot_app.calibration.proposal import Proposal, rows_of
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import Rig, parse_rig
 from rhot_app.rig_history import Version
@@ -25,8 +26,7 @@ from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import shape_icon
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.models.proposal import Proposal, age_text, in_force, set_rig
-from rhot_app.ui.models.rows import rig_rows
+from rhot_app.ui.models.proposal import set_rig
 from rhot_app.ui.wizards.framework.definition import WIZARDS, SettingsStore, Wizard, WizardContext
 from rhot_app.ui.wizards.framework.page import RowTable
 from rhot_app.ui.wizards.framework.window import WizardWindow
@@ -87,7 +87,7 @@ class Launcher(QObject):
 
     def in_force(self, path: str) -> dict[str, datetime]:
         """When each thing of the rig at `path` was made that is in force, by its reason."""
-        return {**self._noted(path), **in_force(Path(path))} if path else {}
+        return {**self._noted(path), **rig_history.in_force(Path(path))} if path else {}
 
     def open(self, wizard: Wizard) -> None:
         """Ask engine and nodes how things stand, then show the wizard."""
@@ -268,7 +268,7 @@ class VersionsDialog(QDialog):
         if not 0 <= number < len(self._versions):
             return
         try:
-            rows = rig_rows(self._rig, rig_history.load_version(self._path, self._versions[number]))
+            rows = rows_of(self._rig, rig_history.load_version(self._path, self._versions[number]))
         except RhotError as exc:
             self.table.show_rows(())
             self.sentence.setText(str(exc))
@@ -306,3 +306,15 @@ class VersionsDialog(QDialog):
         self._job = None
         self.back_button.setEnabled(True)
         self.sentence.setText(sentence)
+
+
+def age_text(when: datetime, now: datetime | None = None) -> str:
+    """How long ago in words: "today", "yesterday", "5 days ago", "3 months ago"."""
+    days = ((now or datetime.now(UTC)).astimezone().date() - when.astimezone().date()) // timedelta(days=1)
+    if days <= 0:
+        return "today"
+    if days == 1:
+        return "yesterday"
+    if days < 60:
+        return f"{days} days ago"
+    return f"{days // 30} months ago"

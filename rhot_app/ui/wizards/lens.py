@@ -1,45 +1,292 @@
-"""The wizard of a camera's intrinsics: camera and board, views, solve, before and after."""
+"""The wizard of a camera's intrinsics: camera and board, views all over its picture, solve, before and after."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractItemView, QCheckBox, QComboBox, QHeaderView, QTableWidget, QTableWidgetItem
+from dataclasses import replace
 
+import cv2
+import numpy as np
+from PySide6.QtWidgets import QCheckBox, QComboBox
+
+from rhot_app.calibration.board.boards import Board, same_pattern
+from rhot_app.calibration.board.corners import BoardView
+from rhot_app.calibration.board.shared_views import BoardShot
+from rhot_app.calibration.commands.intrinsics import propose, report, solve_shown
+from rhot_app.calibration.lens.coverage import CaptureGuide, Coverage
+from rhot_app.calibration.lens.intrinsics import IntrinsicsReport
+from rhot_app.calibration.proposal import Proposal
 from rhot_app.calibration.registry import LENS
-from rhot_app.ui.models.proposal import Proposal
+from rhot_app.project import Intrinsics
+from rhot_app.ui.backend.feed import Image, Picture
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
-from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext
+from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.films_page import FilmsPage
-from rhot_app.ui.wizards.framework.page import AcceptPage, Page, shrinkable
-from rhot_app.ui.wizards.models.board_form import fields_from
-from rhot_app.ui.wizards.models.step import AcceptStep, StepView
-from rhot_app.ui.wizards.steps.lens_steps import LensBoardStep, LensShowStep, LensSolveStep, lens_proposal
-from rhot_app.ui.wizards.steps.stereo_steps import chosen_nodes
+from rhot_app.ui.wizards.framework.page import FigureTable, Page, shrinkable
+from rhot_app.ui.wizards.models.board_form import (
+    OTHER_BOARD,
+    BoardFields,
+    BoardObservation,
+    BoardSearch,
+    BoardStep,
+    fields_from,
+)
+from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Mark, Overlay, Tag
+from rhot_app.ui.wizards.models.films import FilmedStep, Films
+from rhot_app.ui.wizards.models.step import Bar, Pictures, SolveStep, StepView, Task
 
 LAST = "lens camera"
 
 
 def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand; it begins with the camera after the one that was done last."""
-    cameras = tuple(node.name for node in chosen_nodes(context.rig))
+    cameras = tuple(node.name for node in context.rig.nodes if not node.text_datagrams)
     board = LensBoardStep(fields_from(context.memory.remembered(MEMORY)), cameras,
                           _next(cameras, context.memory.remembered(LAST)))
     show = LensShowStep(board)
     solve = LensSolveStep(show)
 
-    def propose() -> Proposal | None:
-        if solve.report is None:
-            return None
+    def propose_lens(result: IntrinsicsReport) -> Proposal:
         context.memory.remember(LAST, board.camera)
-        return lens_proposal(context.rig, context.rig_path, board.camera, solve.report)
+        return propose(result, context.rig, board.camera)
 
     pages = (LensBoardPage(board, context.memory), FilmsPage(show), LensResultPage(solve),
-             AcceptPage(AcceptStep(propose), context.scheme))
+             accept_result(context, solve, propose_lens))
     return Definition(LENS.title, pages, solver="rhot_app.calibration.lens.intrinsics")
 
 
 def _next(cameras: tuple[str, ...], done: str) -> str:
     return cameras[(cameras.index(done) + 1) % len(cameras)] if done in cameras else cameras[0]
+
+
+# -- steps -------------------------------------------------------------------------------------------------------------
+
+FEWEST = 5  # views that a solve can do anything with
+_VOUCHED_S = 0.03  # a person who presses Space says that the board has not moved since the last picture
+_CELL_FULL = 12  # corners in a part of the picture that tint it wholly
+_BARS = {"x": ("X", "from the left to the right edge"), "y": ("Y", "from the upper to the lower edge"),
+         "size": ("size", "near enough to fill much of the picture"),
+         "skew": ("skew", "tilted, which tells the focal length")}
+
+
+class LensBoardStep(BoardStep):
+    """Which camera, and which board."""
+
+    title = "Camera and board"
+
+    def __init__(self, fields: BoardFields, cameras: tuple[str, ...], first: str) -> None:
+        """`first` is chosen to begin with, if there is such a camera."""
+        self.choices = cameras
+        self.camera = first if first in cameras else cameras[0]
+        super().__init__(fields, (self.camera,))
+
+    def choose(self, camera: str) -> None:
+        """Another camera."""
+        self.camera, self.cameras = camera, (camera,)
+        self.forget_views()
+
+
+class LensShowStep(FilmedStep):
+    """Views of the board, taken by themselves when it is still, sharp and somewhere new, or with Space."""
+
+    title = "Show the board"
+    watches = captures = True
+
+    def __init__(self, board_step: LensBoardStep) -> None:
+        self._board_step = board_step
+        self._guide: CaptureGuide | None = None
+        self._of: tuple[str, Board] | None = None
+        self._search = BoardSearch()
+        self._seen: tuple[BoardView | None, float] = (None, 0.0)
+        self._sentence = ""
+        self.films = Films(())
+        self._covered: tuple[int, Coverage, bool] | None = None  # by the number of views: it takes milliseconds
+
+    def enter(self) -> None:
+        """Another board or camera makes the views useless; a corrected size of the squares does not."""
+        board, camera = self._board_step.board, self._board_step.camera
+        assert board is not None, "the first step is not done without a board"
+        self.cameras = (camera,)
+        if self._of is None or self._guide is None or self._of[0] != camera or not same_pattern(self._of[1], board):
+            if self.films.cameras != (camera,):
+                self.films = Films((camera,))
+            self.begin()
+        elif self._of[1] != board:
+            self._of = camera, board
+            self._guide.resize(board)
+
+    def begin(self) -> None:
+        """Forget what was taken."""
+        board, camera = self._board_step.board, self._board_step.camera
+        assert board is not None, "the first step is not done without a board"
+        self._of, self._guide = (camera, board), CaptureGuide(board)
+        self._seen, self._sentence, self._covered = (None, 0.0), "", None
+        self._search.forget()
+        self.films.forget_read()
+
+    def keep(self, shot: BoardShot) -> None:
+        """Take what a film shows at one moment."""
+        if self._guide is not None:
+            for view in (view for view in shot.views if view is not None):
+                self._guide.keep(view)
+
+    @property
+    def camera(self) -> str:
+        """Whose lens it is."""
+        return self._board_step.camera
+
+    @property
+    def board(self) -> Board:
+        """The board that is shown."""
+        assert self._of is not None
+        return self._of[1]
+
+    @property
+    def views(self) -> tuple[BoardView, ...]:
+        """What was taken so far."""
+        return self._guide.views if self._guide is not None else ()
+
+    @property
+    def seen(self) -> BoardView | None:
+        """The board in the last picture."""
+        return self._seen[0]
+
+    @property
+    def keeps(self) -> bool:
+        """Whether anything was taken."""
+        return bool(self.views)
+
+    def see(self, pictures: Pictures) -> tuple[str, BoardObservation, float]:
+        """The board in the picture, and when that was taken, s of the node's clock."""
+        camera = self.camera
+        return (camera, self._search.look({camera: pictures[camera]}, self.board),
+                1e-9 * pictures[camera].t_node_ns)
+
+    def take(self, seen: tuple[str, BoardObservation, float]) -> None:
+        """Offer what is seen; the guide decides and says what to do."""
+        camera, look, t_s = seen
+        if self._guide is not None and (camera, look.board) == self._of and not self.films.paths:
+            self._search.take(look)
+            view = look.views[camera]
+            self._seen = view, t_s
+            if self._search.size_finding(self.board) is None:
+                self._sentence = self._guide.offer(view, t_s).sentence
+
+    def capture(self) -> bool:
+        """Space: take what is seen now, unless it adds nothing or is blurred."""
+        view, t_s = self._seen
+        if self._guide is None or view is None or self.films.paths or self._search.size_finding(self.board) is not None:
+            return False
+        decision = self._guide.offer(view, t_s + _VOUCHED_S)
+        self._sentence = decision.sentence
+        return decision.capture
+
+    def undo(self) -> bool:
+        """Forget the view taken last."""
+        if self._guide is None or not self.views:
+            return False
+        self._guide.discard_last()
+        return True
+
+    def view(self) -> StepView:
+        """What to do with the board, and what is covered."""
+        shown = self._live_view()
+        return self.films.view(shown) if self.films.paths else shown
+
+    def _live_view(self) -> StepView:
+        if self._guide is None:
+            return StepView("Show the whole board to the camera.")
+        count = len(self.views)
+        if self._covered is None or count != self._covered[0]:
+            self._covered = count, self._guide.coverage, self._guide.complete
+        _, coverage, complete = self._covered
+        bars = [Bar(_BARS[key][0], share, _BARS[key][1]) for key, share in coverage.bars.items()]
+        bars.append(Bar("picture", min(coverage.share / 0.7, 1.0), "parts of the picture in which corners were seen"))
+        overlay: Overlay = (Cells(coverage.cells / _CELL_FULL),)
+        annotated = self._search.annotated(self.board)
+        wrong = self._search.size_finding(self.board)
+        if wrong is not None:
+            return StepView(OTHER_BOARD, hint=f"{wrong.figure} {wrong.cause}", bars=tuple(bars),
+                            annotated=annotated, overlays={self.camera: overlay}, kept=count)
+        sentence = "Enough: press Next." if complete else self._sentence or "Show the whole board to the camera."
+        taken = f"{count} pictures taken." if count else ""
+        return StepView(sentence, done=complete, hint=self._search.missing or taken, bars=tuple(bars),
+                        annotated=annotated, overlays={self.camera: overlay}, kept=count, passable=count >= FEWEST)
+
+
+ARROW_PX = 20.0
+"""Residuals are hundredths or tenths of a pixel; the longest arrow should be about so long in the picture."""
+
+
+class LensSolveStep(SolveStep):
+    """The solve; then the picture with the residuals, or straightened by the new lens."""
+
+    watches = True
+    result: IntrinsicsReport | None
+
+    def __init__(self, show: LensShowStep) -> None:
+        super().__init__(self._solving, report)
+        self._show = show
+        self._straight: dict[str, Picture] = {}
+        self.straighten = False
+        self.square_pixels = False
+
+    def _solving(self) -> Task:
+        return Task("Estimating the intrinsics", solve_shown, (self._show.views, self._show.board),
+                    {"square_pixels": self.square_pixels})
+
+    def set_square_pixels(self, on: bool) -> None:
+        """Force fx = fy, and solve again."""
+        self.square_pixels = on
+        self.enter()
+
+    def enter(self) -> None:
+        """Of the camera whose views were taken."""
+        self.cameras = (self._show.camera,)
+        super().enter()
+
+    def see(self, pictures: Pictures) -> dict[str, Picture]:
+        """The pictures as the new lens straightens them, when that is asked for."""
+        result = self.result
+        if result is None or not self.straighten:
+            return {}
+        return {name: replace(picture, bgr=straightened(picture.bgr, result.intrinsics))
+                for name, picture in pictures.items() if picture.bgr.shape[1::-1] == result.size}
+
+    def take(self, seen: dict[str, Picture]) -> None:
+        """The straightened pictures."""
+        self._straight = seen
+
+    def view(self) -> StepView:
+        """The verdict, and the residuals over the picture."""
+        view = super().view()
+        if self.result is None:
+            return view
+        if self.straighten:
+            return replace(view, pictures=self._straight)
+        return replace(view, overlays={self._show.camera: residual_marks(self.result)})
+
+
+def straightened(bgr: Image, lens: Intrinsics) -> Image:
+    """The picture as a lens without distortion would show it: what is straight in the room becomes straight."""
+    matrix = np.array([[lens.fx, 0.0, lens.cx], [0.0, lens.fy, lens.cy], [0.0, 0.0, 1.0]])
+    return np.asarray(cv2.undistort(bgr, matrix, np.array(lens.distortion)), np.uint8)
+
+
+def residual_marks(result: IntrinsicsReport) -> Overlay:
+    """Where corners were, and the mean residual of each part of the picture as an arrow, exaggerated as stated."""
+    field, (width, height) = result.field, result.size
+    rows, cols = field.count.shape
+    longest = float(np.nanmax(np.linalg.norm(field.mean, axis=-1), initial=0.0))
+    times = 10.0 ** np.floor(np.log10(ARROW_PX / longest)) if longest > 0.0 else 1.0
+    marks: list[Mark] = [Dots(field.places, "accent", radius=1.2, filled=True)]
+    for row in range(rows):
+        for col in range(cols):
+            mean = field.mean[row, col]
+            if np.isfinite(mean).all():
+                start = np.array([(col + 0.5) * width / cols, (row + 0.5) * height / rows])
+                marks += [Line(np.array([start, start + times * mean]), "caution", width=2.5),
+                          Dots(start[None], "caution", radius=2.5, filled=True)]
+    return (*marks, Tag(6.0, height - 24.0, f"arrows: residuals × {times:,.0f}"))
 
 
 # -- the pages of the lens wizard --------------------------------------------------------------------------------------
@@ -77,20 +324,13 @@ class LensResultPage(Page):
         self.square.setToolTip("Forces one focal length for both directions, as nearly every sensor has it. Fewer "
                                "numbers to find need fewer views.")
         self.square.toggled.connect(self._square)
-        self.table = QTableWidget(0, 3)
-        self.table.setHorizontalHeaderLabels(["view", "rms [px]", "corners"])
-        self.table.verticalHeader().setVisible(False)
-        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        self.table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self.table = FigureTable()
         self.table.setToolTip("How well each view fits. Arrows in the picture are the mean residual of each part: "
                               "a pattern in them is something that the lens model does not explain.")
         self.column.addWidget(self.straighten)
         self.column.addWidget(self.square)
         self.column.addWidget(self.table, 1)
         shrinkable(self.table)
-        self._shown: object = None
 
     def _straighten(self, on: bool) -> None:
         self._lens.straighten = on
@@ -102,14 +342,4 @@ class LensResultPage(Page):
 
     def show_view(self, view: StepView) -> None:
         """The errors of the newest solve."""
-        report = self._lens.report
-        if report is self._shown:
-            return
-        self._shown = report
-        views = report.views if report is not None else ()
-        self.table.setRowCount(len(views))
-        for row, one in enumerate(views):
-            for column, text in enumerate((one.source.removeprefix("view "), f"{one.rms_px:.2f}", str(one.corners))):
-                item = QTableWidgetItem(text)
-                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-                self.table.setItem(row, column, item)
+        self.table.show_table(None if self._lens.report is None else self._lens.report.tables[0])

@@ -2,113 +2,248 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout, QPushButton
+from typing import Any
 
+import numpy as np
+
+from rhot_app.calibration.board.boards import Board, same_pattern
+from rhot_app.calibration.board.corners import BoardView
+from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
+from rhot_app.calibration.commands.stereo import propose, report, solve_shown
 from rhot_app.calibration.registry import STEREO
-from rhot_app.simulator.scene.scene_description import RulerShow
-from rhot_app.ui.backend.feed import Picture
-from rhot_app.ui.models.proposal import Proposal
+from rhot_app.calibration.stereo.calibrate import lens_of
+from rhot_app.calibration.stereo.collector import Guidance, Offer, StereoCollector
+from rhot_app.calibration.stereo.report import StereoReport
+from rhot_app.calibration.stereo.start import WorldFrame, place_world
+from rhot_app.errors import CalibrationError
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
-from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.films_page import FilmsPage
-from rhot_app.ui.wizards.framework.page import AcceptPage, Page
-from rhot_app.ui.wizards.models.board_form import BoardStep, fields_from
-from rhot_app.ui.wizards.models.step import AcceptStep, StepView
-from rhot_app.ui.wizards.steps.lengths_step import LengthsStep
-from rhot_app.ui.wizards.steps.stereo_steps import (
-    ShowStep,
-    StereoSolveStep,
-    TableStep,
-    chosen_nodes,
-    known_lenses,
-    stereo_proposal,
-)
+from rhot_app.ui.wizards.framework.page import Page
+from rhot_app.ui.wizards.known_length import LengthsPage, LengthsStep
+from rhot_app.ui.wizards.models.board_form import OTHER_BOARD, BoardObservation, BoardSearch, BoardStep, fields_from
+from rhot_app.ui.wizards.models.drawing import Dots, Overlay
+from rhot_app.ui.wizards.models.films import FilmedStep, Films
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Pictures, SolveStep, Step, StepView, Task
 
 
 def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand."""
-    nodes = chosen_nodes(context.rig)
+    nodes = [node for node in context.rig.nodes if not node.text_datagrams]
     cameras = tuple(node.name for node in nodes)
+    lenses = tuple(None if node.intrinsics.nominal else lens_of(node) for node in nodes)
     board = BoardStep(fields_from(context.memory.remembered(MEMORY)), cameras)
     show = ShowStep(board, cameras)
     known = LengthsStep(cameras)
-    solve = StereoSolveStep(show, known_lenses(nodes), lambda: known.known)
+    solve = SolveStep(lambda: Task("Calibrating the cameras", solve_shown, (show.views, lenses),
+                                   {"known": known.known}), report)
     table = TableStep(board, solve, cameras)
-
-    def propose() -> Proposal | None:
-        report = solve.report
-        return None if report is None else stereo_proposal(context.rig, context.rig_path, report, table.world)
-
-    accept = AcceptPage(AcceptStep(propose), context.scheme)
+    accept = accept_result(context, solve, lambda result: propose(result, context.rig, table.world))
     pages = (BoardPage(board, context.memory), FilmsPage(show), LengthsPage(known), Page(solve), Page(table), accept)
-    return Definition(STEREO.title, pages, solver="rhot_app.ui.wizards.steps.stereo_steps")
+    return Definition(STEREO.title, pages, solver="rhot_app.calibration.stereo.calibrate")
 
 
-# -- the fields of the second known length, and clicks on the ruler's ends ---------------------------------------------
+# -- steps: captures, world frame --------------------------------------------------------------------------------------
 
-SKIP = "Skip: lengths stay unproven"
-
-
-class LengthsPage(Page):
-    """Two lengths in mm; 0 says that it was not measured. With neither, a person must say so."""
-
-    def __init__(self, step: LengthsStep) -> None:
-        super().__init__(step)
-        self._known = step
-        self.pickable = True
-        self.twin_facts = f"Shows a ruler: its crosses are {RulerShow().length_mm:g} mm apart."
-        self.baseline = _length("The distance between the middles of the two lenses, measured by hand. 75 mm on the "
-                                "frame that the thesis describes.")
-        self.ruler = _length("The distance between two marks on a ruler, 200 mm for instance, that both cameras see.")
-        form = QFormLayout()
-        form.setSpacing(8)
-        form.addRow("Lens to lens", self.baseline)
-        form.addRow("Ruler", self.ruler)
-        self.hold = QPushButton("Hold the pictures")
-        self.hold.setToolTip("Space. Then click both ends of the ruler in each picture.")
-        self.hold.setAutoDefault(False)
-        self.hold.clicked.connect(self._hold)
-        self.column.addLayout(form)
-        self.skip = QPushButton(SKIP)
-        self.skip.setToolTip("If the size of the squares was typed wrong, every length is wrong by the same factor "
-                             "and nothing will tell.")
-        self.skip.setAutoDefault(False)
-        self.skip.clicked.connect(self._skip)
-        self.column.addWidget(self.hold)
-        self.column.addWidget(self.skip)
-        self.column.addStretch(1)
-        for box in (self.baseline, self.ruler):
-            box.valueChanged.connect(self._take)
-
-    def _take(self) -> None:
-        self._known.set_lengths(self.baseline.value(), self.ruler.value())
-        self.changed.emit()
-
-    def _skip(self) -> None:
-        self._known.skip(not self._known.skipped)
-        self.changed.emit()
-
-    def _hold(self) -> None:
-        self._known.capture()
-        self.changed.emit()
-
-    def pick(self, picture: Picture, x: float, y: float, width: float, height: float) -> None:
-        """An end of the ruler; a drag is a click that slipped."""
-        self._known.pick(picture.camera, x, y)
-
-    def show_view(self, view: StepView) -> None:
-        """The button says what it would do; there is nothing to skip once a length is known."""
-        self.skip.setEnabled(not view.done)
-        self.skip.setText("Do not skip" if self._known.skipped and not view.done else SKIP)
-        self.hold.setEnabled(self.ruler.value() > 0.0)
-        self.hold.setText("Let the pictures go on" if view.pictures else "Hold the pictures")
+Views = dict[str, BoardView | None]
+FEWEST = 4  # shots; with fewer the solve refuses
 
 
-def _length(meaning: str) -> QDoubleSpinBox:
-    box = QDoubleSpinBox()
-    box.setRange(0.0, 5000.0)
-    box.setDecimals(1)
-    box.setSuffix(" mm")
-    box.setSpecialValueText("not measured")
-    box.setToolTip(meaning)
-    return box
+class BoardFinder(Step):
+    """Base of the steps that look for the chosen board in all cameras."""
+
+    watches = True
+
+    def __init__(self, board_step: BoardStep, cameras: tuple[str, ...]) -> None:
+        self.cameras = cameras
+        self._board_step = board_step
+        self.search = BoardSearch()
+        self.seen: Views = dict.fromkeys(cameras)
+
+    @property
+    def board(self) -> Board:
+        """The board that the person holds."""
+        board = self._board_step.board
+        assert board is not None, "the first step is not done without a board"
+        return board
+
+    def see(self, pictures: Pictures) -> BoardObservation:
+        """The board in each picture."""
+        return self.search.look(pictures, self.board)
+
+    def take(self, seen: BoardObservation) -> None:
+        """What the cameras see now; a camera without a picture sees nothing."""
+        if seen.board == self.board:
+            self.search.take(seen)
+            self.seen = {name: seen.views.get(name) for name in self.cameras or ()}
+
+
+class ShowStep(BoardFinder, FilmedStep):
+    """Shared captures: kept by themselves when the board is still and somewhere new, or with Space."""
+
+    title = "Show the board"
+    captures = True
+
+    def __init__(self, board_step: BoardStep, cameras: tuple[str, ...]) -> None:
+        super().__init__(board_step, cameras)
+        self._collector: StereoCollector | None = None
+        self._of: Board | None = None
+        self._offer = Offer(False, "")
+        self.films = Films(cameras)
+        self._guidance: Guidance | None = None  # of the first `_guided` shots: it takes milliseconds to find
+        self._guided = 0
+
+    def enter(self) -> None:
+        """Another board makes what was kept useless; a corrected size of its squares does not."""
+        if self._collector is None or self._of is None or not same_pattern(self._of, self.board):
+            self.begin()
+        elif self._of != self.board:
+            self._of = self.board
+            self._collector.resize(self.board)
+
+    def begin(self) -> None:
+        """Forget what was kept."""
+        self._of, self._collector = self.board, StereoCollector(self.cameras or (), self.board)
+        self._offer, self._guidance = Offer(False, ""), None
+        self.search.forget()
+        self.films.forget_read()
+
+    def keep(self, shot: BoardShot) -> None:
+        """Take what films show at one moment."""
+        if self._collector is not None:
+            self._collector.keep(shot)
+
+    @property
+    def views(self) -> SharedViews:
+        """Everything kept."""
+        assert self._collector is not None
+        return self._collector.views()
+
+    @property
+    def keeps(self) -> bool:
+        """Whether anything was kept."""
+        return self._collector is not None and bool(self.views.shots)
+
+    def take(self, seen: BoardObservation) -> None:
+        """Offer what is seen; the collector decides."""
+        if not self.films.paths:
+            super().take(seen)
+            self._put(still=False)
+
+    def capture(self) -> bool:
+        """Space: the person vouches that the board is still."""
+        return not self.films.paths and self._put(still=True)
+
+    def _put(self, *, still: bool) -> bool:
+        if self._collector is None or self.search.size_finding(self.board) is not None:
+            return False
+        self._offer = self._collector.offer([self.seen[name] for name in self.cameras or ()], still=still)
+        return self._offer.taken
+
+    def undo(self) -> bool:
+        """Forget the shot kept last."""
+        if self._collector is None or not self.keeps:
+            return False
+        self._collector.discard_last()
+        return True
+
+    def view(self) -> StepView:
+        """What to do with the board, and how far it is."""
+        shown = self._live_view()
+        return self.films.view(shown) if self.films.paths else shown
+
+    def _live_view(self) -> StepView:
+        if self._collector is None:
+            return StepView("Show the board to both cameras.")
+        shots = self.views.shots
+        wrong = self.search.size_finding(self.board)
+        if wrong is not None:
+            return StepView(OTHER_BOARD, hint=f"{wrong.figure} {wrong.cause}", annotated=self._annotated(),
+                            overlays=self._overlays(shots), kept=len(shots))
+        if self._guidance is None or len(shots) != self._guided:
+            self._guidance, self._guided = self._collector.guidance(), len(shots)
+        guidance = self._guidance
+        bars = [Bar(f"{pair.first} + {pair.second}", pair.shared / (pair.shared + pair.missing),
+                    "shots that both cameras share") for pair in guidance.pairs]
+        if not guidance.pairs:
+            bars.append(Bar(f"{len(shots)} shots", 1.0, "every camera shares enough shots with another"))
+        bars += [Bar(f"{name} covered", share, "part of the picture where the board was") for name, share
+                 in zip(self.cameras or (), guidance.covered, strict=True)]
+        bars += [Bar("tilted", float(guidance.tilted), "the board was seen tilted: this tells the focal length"),
+                 Bar("near and far", float(guidance.near_and_far), "the board was seen large and small")]
+        hint = self.search.missing or self._offer.why.removesuffix(guidance.advice).strip()
+        return StepView(self._sentence(guidance.advice), done=guidance.complete, hint=hint,
+                        bars=tuple(bars), annotated=self._annotated(), overlays=self._overlays(shots),
+                        kept=len(shots), passable=len(shots) >= FEWEST)
+
+    def _sentence(self, advice: str) -> str:
+        if not advice:
+            return "Enough: press Next."
+        if self._offer.why == "Hold still.":
+            return "Hold the board still."
+        return advice
+
+    def _annotated(self) -> dict[str, AnnotatedPicture]:
+        return self.search.annotated(self.board, "good" if self._offer.taken else "accent")
+
+    def _overlays(self, shots: tuple[Any, ...]) -> dict[str, Overlay]:
+        """Where the board has been, dimly."""
+        overlays: dict[str, Overlay] = {}
+        for camera, name in enumerate(self.cameras or ()):
+            been = [shot.views[camera].pixels[::3] for shot in shots if shot.views[camera] is not None]
+            if been:
+                overlays[name] = (Dots(np.concatenate(been), "good", radius=1.5, filled=True),)
+        return overlays
+
+
+class TableStep(BoardFinder):
+    """Where the world is: at the first camera, or on the table under the board."""
+
+    title = "The table"
+    captures = True
+
+    def __init__(self, board_step: BoardStep, solve: SolveStep, cameras: tuple[str, ...]) -> None:
+        super().__init__(board_step, cameras)
+        self._solve = solve
+        self._of: StereoReport | None = None
+        self.world: WorldFrame | None = None
+        self.problem = ""
+
+    def enter(self) -> None:
+        """A new solve makes an old table useless."""
+        if self._solve.result is not self._of:
+            self._of, self.world, self.problem = self._solve.result, None, ""
+
+    def capture(self) -> bool:
+        """Space: the board lies on the table now."""
+        if self._of is None or self._of.figures is None:
+            return False
+        try:
+            self.world = place_world([self.seen[name] for name in self.cameras or ()], self.board,
+                                     self._of.figures.state, self._of.cameras)
+        except CalibrationError as exc:
+            self.world, self.problem = None, str(exc)
+            return False
+        self.problem = ""
+        return True
+
+    def undo(self) -> bool:
+        """Leave the world at the first camera after all."""
+        had, self.world = self.world is not None, None
+        return had
+
+    def view(self) -> StepView:
+        """Optional, so Next is always possible but after a table that cannot be."""
+        wrong = self.world is not None and not self.world.verdict.acceptable
+        if self.world is None:
+            first = (self.cameras or ("first",))[0]
+            sentence = "Lay the board flat on the table and press Space, or press Next."
+            hint = self.problem or self.search.missing or (
+                f"Without a table the world begins at camera {first}, and the scene is not level.")
+        else:
+            sentence = "Lay the board flat and press Space again." if wrong else "The table is known: press Next."
+            hint = ""
+        return StepView(sentence, done=not wrong and self.world is not None, hint=hint,
+                        annotated=self.search.annotated(self.board),
+                        verdict=self.world.verdict if self.world is not None else None,
+                        kept=int(self.world is not None), passable=not wrong)

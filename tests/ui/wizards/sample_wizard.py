@@ -7,12 +7,12 @@ import numpy as np
 import slow_work
 from PySide6.QtWidgets import QSpinBox
 
+from rhot_app.calibration.proposal import Proposal, Row
 from rhot_app.calibration.verdict import Finding, Grade, judge
-from rhot_app.ui.models.proposal import Proposal, RigChange, Row
-from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
-from rhot_app.ui.wizards.framework.page import AcceptPage, Page
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
+from rhot_app.ui.wizards.framework.page import Page
 from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Tag
-from rhot_app.ui.wizards.models.step import AcceptStep, AnnotatedPicture, Bar, Step, StepView, Task
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Step, StepView, Task
 
 
 class FormStep(Step):
@@ -131,7 +131,7 @@ def make_wizard(context: WizardContext, steps: int = 3) -> Definition:
         after = msgspec.structs.replace(context.rig, name="calibrated")
         return Proposal("lens calibration", solve.verdict(), (Row("focal length", "530.0 px", "535.9 ± 0.4 px"),
                                                               Row("picture", "640 × 480", "640 × 480")),
-                        (RigChange(context.rig, after, context.rig_path, "lens calibration"),))
+                        context.rig, after)
 
     form, collect = FormPage(FormStep()), Page(CollectStep())
-    return Definition("Sample", (form, collect, Page(solve), AcceptPage(AcceptStep(propose), context.scheme)))
+    return Definition("Sample", (form, collect, Page(solve), accept_page(context, propose)))

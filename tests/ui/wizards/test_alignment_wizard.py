@@ -14,11 +14,13 @@ from wizard_hand import RecordingAsker
 
 from rhot_app.calibration.verdict import Grade
 from rhot_app.geometry.transforms import inverse
+from rhot_app.objects.alignment.alignment_command import propose, solve_recording
 from rhot_app.objects.alignment.alignment_file import alignment_path, load_alignment, save_alignment
 from rhot_app.sources.poses.open_source import open_source
 from rhot_app.ui.backend.pose_feed import PoseFeed
+from rhot_app.ui.models.proposal import use_all
 from rhot_app.ui.wizards import alignment
-from rhot_app.ui.wizards.steps.alignment_steps import AlignmentSolver, TogetherStep, solve_recording
+from rhot_app.ui.wizards.alignment import TogetherStep, in_use
 
 MARKERS = synthetic_rig().markers.ids
 
@@ -92,10 +94,11 @@ class Movement:
         assert self.step.phase == "recorded"
 
     def solve(self, rig_path):
-        solver = AlignmentSolver(self.step, rig_path)
-        task = solver.task()
-        assert task.function is solve_recording
-        return solver, task.function(*task.arguments, progress=lambda text, fraction: None)
+        """The result, and what is proposed for the file beside the rig."""
+        path = None if rig_path is None else alignment_path(rig_path)
+        before = in_use(path)
+        result = solve_recording(self.step.recording, before, progress=lambda text, fraction: None)
+        return result, propose(result, before, path), path
 
 
 def test_parallel_motion_is_refused_with_the_reason():
@@ -103,27 +106,27 @@ def test_parallel_motion_is_refused_with_the_reason():
     movement.record(6.0)
     view = movement.step.view()
     assert "Turn" in view.sentence and view.may_go_on and not view.done
-    solver, result = movement.solve(None)
+    result, proposal, _ = movement.solve(None)
     verdict = result.report.verdict
     assert verdict.grade is Grade.POOR and "no_rotation" in verdict.codes
-    assert solver.propose(result).verdict is verdict, "which forbids its use"
+    assert proposal.verdict is verdict, "which forbids its use"
 
 
 def test_an_alignment_that_holds_no_longer_is_called_stale(tmp_path):
     movement = Movement(MovedTracker())
     movement.record(9.0)
-    solver, result = movement.solve(tmp_path / "desk.json")
+    result, proposal, path = movement.solve(tmp_path / "desk.json")
     assert result.drift is None
-    solver.propose(result).use(None)
-    saved = load_alignment(solver.path)
+    use_all(proposal.changes, None)
+    saved = load_alignment(path)
     check(saved)
     x, y, z = saved.rig_from_foreign.translation_m
-    save_alignment(solver.path, replace(saved, rig_from_foreign=replace(
+    save_alignment(path, replace(saved, rig_from_foreign=replace(
         saved.rig_from_foreign, translation_m=(x + 0.02, y, z))))
     movement.record(9.0)
-    solver, result = movement.solve(tmp_path / "desk.json")
+    result, proposal, _ = movement.solve(tmp_path / "desk.json")
     assert result.drift.stale and result.drift.distance_m == pytest.approx(0.02, rel=0.2)
-    assert "stale" in solver.propose(result).rows[0].before
+    assert "stale" in proposal.rows[0].before
 
 
 def test_what_is_missing_is_said():

@@ -15,15 +15,15 @@ from PySide6.QtTest import QTest
 from synthetic_rig import WIDE, Viewing, make_rig, observe
 from wizard_hand import HeldMarker, RecordingAsker
 
+from rhot_app.calibration.commands.bones import propose
 from rhot_app.calibration.hand.bones import solve_bones
 from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import load_rig
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
-from rhot_app.ui.wizards.bones import make_wizard
+from rhot_app.ui.wizards.bones import SweepGuide, make_guide, make_wizard
 from rhot_app.ui.wizards.models.movement import QuietGuide
 from rhot_app.ui.wizards.models.step import Bar
-from rhot_app.ui.wizards.steps.bones_steps import SweepGuide, make_guide, propose
 
 SECONDS = 8.0
 SIZE = 1.06
@@ -89,7 +89,7 @@ def test_bones_entered_by_hand_need_no_movement(hands):
     hands.next()
     table = hands.window.page.table
     known = {table.item(row, 0).text(): table.item(row, 3).text() for row in range(15)}
-    assert known["index proximal"] == "entered" and known["ring medial"].startswith(("not observed", "partly"))
+    assert known["index.proximal"] == "entered" and known["ring.medial"].startswith(("not observed", "partly"))
     hands.next()
     hands.use()
     saved = load_rig(hands.path).hand
@@ -145,5 +145,5 @@ def test_bones_by_landmarks_are_proposed():
     places = moving_hand(rig, "grasp", 4.0, 30.0, 1, 0.05).joints()
     roles = {marker.id: marker.role for marker in rig.markers.markers}
     report = solve_bones(tracks_of(np.arange(len(places)) / 30.0, places, rig.markers.ids, roles), rig.hand)
-    proposal = propose(report, rig, None)
+    proposal = propose(report, rig)
     assert "landmarks" in proposal.rig.hand.name and proposal.rig.hand.fingers == report.hand.fingers

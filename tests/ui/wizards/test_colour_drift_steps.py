@@ -3,6 +3,7 @@ a marker is not found."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,11 +13,12 @@ from fake_engine import synthetic_rig
 from paint_scene import PaintScene
 
 from rhot_app.calibration.colour.colours import solve_colours
+from rhot_app.calibration.commands.colours import propose
 from rhot_app.calibration.verdict import Grade
 from rhot_app.project import Rig
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards.steps.colour_pick import PickStep
-from rhot_app.ui.wizards.steps.colour_result import BoundsStep, SeparationStep, propose
+from rhot_app.ui.wizards.steps.colour_result import BoundsStep, SeparationStep
 from rhot_node.detect.illuminant import gains_of
 from rhot_node.detect.image import to_bgr
 
@@ -85,7 +87,7 @@ def test_a_light_that_has_changed_since_the_picking_is_said_on_the_mask_and_in_t
     assert verdict.grade is Grade.FAIR and "6 colours" in verdict.sentence
     (finding,) = [one for one in verdict.findings if one.code == "temperature"]
     assert "left" in finding.figure and "colder" in finding.figure
-    proposal = propose(apart.judged, rig, None, {})
+    proposal = propose(replace(apart.result, verdict=verdict), rig, {})
     assert proposal is not None and proposal.verdict == verdict
     look(apart, 2 * MOST)  # the colder pictures are remembered for a while
     assert apart.view().verdict == calm
@@ -101,7 +103,7 @@ def test_the_masks_page_says_why_the_chosen_marker_is_not_found_or_in_doubt(
         steps: tuple[BoundsStep, SeparationStep], change: dict, said: tuple) -> None:
     bounds = BoundsStep(steps[0].picks)
     bounds.enter()
-    bounds.take_result(steps[0].report)
+    bounds.take_result(steps[0].result)
     bounds.chosen = "ring"
     paints = {name: rgb for name, rgb in {**PAINTS, **change}.items() if rgb is not None}
     image = to_bgr(picture(paints, background=(60, 62, 66)))

@@ -14,6 +14,7 @@ from PySide6.QtTest import QTest
 from wizard_rig import FakeRigAsker
 
 from rhot_app.calibration.colour.separability import SKIN
+from rhot_app.calibration.commands.colours import hue_chart, propose
 from rhot_app.project import load_rig
 from rhot_app.ui.common.theme import apply_theme
 from rhot_app.ui.models.palette import DARK, SCHEMES, contrast
@@ -21,7 +22,7 @@ from rhot_app.ui.wizards.colours import MaskChoice, make_wizard
 from rhot_app.ui.wizards.framework.picture_painter import callout_boxes, fit
 from rhot_app.ui.wizards.models.drawing import Callout, Layer
 from rhot_app.ui.wizards.steps.colour_pick import PickStep
-from rhot_app.ui.wizards.steps.colour_result import BoundsStep, SeparationStep, hue_chart, propose
+from rhot_app.ui.wizards.steps.colour_result import BoundsStep, SeparationStep
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
 
@@ -293,7 +294,7 @@ def test_clicks_one_finger_too_far_are_refused_with_the_skin_and_the_exchanged_c
     assert not verdict.acceptable and "index has the colour of skin" in said(verdict)
     for name, other in zip(NAMES[2:], NAMES[1:], strict=False):
         assert f"{name} now has the colour that {other} had" in said(verdict)
-    assert not propose(apart.judged, rig, None, {}).verdict.acceptable
+    assert not propose(apart.result, rig, {}).verdict.acceptable
 
 
 def test_two_markers_of_one_colour_are_refused_and_undo_mends_it(picks):
@@ -343,6 +344,6 @@ def test_alike_paints_are_said_to_be_alike(rig):
     pick_all(picks)
     apart = learnt(SeparationStep(learnt(BoundsStep(picks))))
     assert not apart.view().verdict.acceptable
-    bands = [curve for curve in hue_chart(apart.report).curves if curve.style == "band"]
+    bands = [curve for curve in hue_chart(apart.result).curves if curve.style == "band"]
     assert {curve.name for curve in bands if curve.name} == set(PAINTS)
     assert all(-180.0 <= curve.x[0] < curve.x[1] <= 180.0 for curve in bands)

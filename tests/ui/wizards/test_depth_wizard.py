@@ -16,8 +16,8 @@ from rhot_app.calibration.verdict import Grade
 from rhot_app.project import CameraCalibration, load_rig
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards import depth
+from rhot_app.ui.wizards.depth import DistanceStep
 from rhot_app.ui.wizards.models.drawing import Dots
-from rhot_app.ui.wizards.steps.depth_steps import DistanceStep
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
 

@@ -174,5 +174,5 @@ def test_films_that_began_apart_are_not_put_together_as_they_are(open_wizard, fi
         hands.next()
         hands.click(hands.window.page.skip)
         hands.next()
-        hands.until(lambda: hands.window.step.report is not None or hands.window.step.problem)
+        hands.until(lambda: hands.window.step.result is not None or hands.window.step.view().hint)
         assert not hands.frame.next_button.isEnabled()

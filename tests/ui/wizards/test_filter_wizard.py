@@ -17,8 +17,7 @@ from waving import waving
 from wizard_hand import RecordingAsker
 
 from rhot_app.project import FilterSettings, OneEuroSettings, load_rig
-from rhot_app.ui.wizards.filters import make_wizard
-from rhot_app.ui.wizards.steps.filter_steps import FastGuide, LiveMeters, StillGuide
+from rhot_app.ui.wizards.filters import FastGuide, LiveMeters, StillGuide, make_wizard
 
 SECONDS = 5.0
 LAZY = FilterSettings(pixel=OneEuroSettings(0.3, 0.0001, 1.0), position=OneEuroSettings(0.3, 0.001, 1.0))
@@ -74,8 +73,8 @@ def test_from_two_movements_to_a_rig_with_other_filters(hands):
     page.jitter.selectAll()
     QTest.keyClicks(page.jitter, "2.00")
     QTest.keyClick(page.jitter, Qt.Key.Key_Tab)
-    hands.until(lambda: step.report is not None and step.report is not first)
-    assert step.report.pixel.chosen.min_cutoff_hz > first.pixel.chosen.min_cutoff_hz, "more jitter is allowed"
+    hands.until(lambda: step.result is not None and step.result is not first)
+    assert step.result.pixel.chosen.min_cutoff_hz > first.pixel.chosen.min_cutoff_hz, "more jitter is allowed"
     page.own.setChecked(True)
     hands.next()
     table = hands.window.page.table
@@ -83,7 +82,7 @@ def test_from_two_movements_to_a_rig_with_other_filters(hands):
     assert "filter of positions" in words and "index: jitter at rest" in words and "index: lag" in words
     hands.use()
     saved = load_rig(hands.path).filters
-    assert saved.position == step.report.position.chosen and set(saved.position_markers) == set(make_rig().markers.ids)
+    assert saved.position == step.result.position.chosen and set(saved.position_markers) == set(make_rig().markers.ids)
     hands.restore()
     assert load_rig(hands.path).filters == LAZY
 

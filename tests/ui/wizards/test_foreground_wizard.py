@@ -10,6 +10,7 @@ from patience import PATIENCE_S, eventually, settled
 from wizard_rig import FakeRigAsker
 
 from rhot_app.errors import EngineError
+from rhot_app.ui.models.proposal import restore_all, use_all
 from rhot_app.ui.wizards.foreground import make_wizard
 from rhot_app.ui.wizards.steps import foreground_steps
 from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, SceneWatch, SkinStep, findings_of, mask_of, propose
@@ -201,14 +202,14 @@ def test_what_one_node_cannot_keep_no_node_keeps_and_it_can_be_used_again(nodes)
     proposal = both_learnt(nodes)
     nodes.failing = [(2, "save_foreground")]
     with pytest.raises(EngineError, match="node 2 does not answer"):
-        proposal.use(nodes.command)
+        use_all(proposal.changes, nodes.command)
     nodes.failing = []
     assert not nodes.stores[1].report(640, 480)["background"]
-    proposal.use(nodes.command)
+    use_all(proposal.changes, nodes.command)
     assert known(nodes) == [(True, True), (True, True)]
-    proposal.restore(nodes.command)
+    restore_all(proposal.changes, nodes.command)
     assert [background for background, _ in known(nodes)] == [False, False]
-    proposal.use(nodes.command)  # the old one was not better
+    use_all(proposal.changes, nodes.command)  # the old one was not better
     assert [background for background, _ in known(nodes)] == [True, True]
 
 
@@ -216,15 +217,15 @@ def test_a_node_that_cannot_take_it_back_is_named_and_the_others_do(nodes):
     proposal = both_learnt(nodes)
     nodes.failing = [(2, "save_foreground"), (1, "revert_foreground")]
     with pytest.raises(EngineError, match="left still has what was learnt now"):
-        proposal.use(nodes.command)
+        use_all(proposal.changes, nodes.command)
     nodes.failing = []
-    proposal.use(nodes.command)
+    use_all(proposal.changes, nodes.command)
     nodes.failing = [(1, "revert_foreground")]
     with pytest.raises(EngineError, match="left still has what was learnt now"):
-        proposal.restore(nodes.command)
+        restore_all(proposal.changes, nodes.command)
     nodes.failing = []
     assert [background for background, _ in known(nodes)] == [True, False]
-    proposal.restore(nodes.command)
+    restore_all(proposal.changes, nodes.command)
     assert [background for background, _ in known(nodes)] == [False, False]
 
 

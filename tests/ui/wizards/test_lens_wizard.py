@@ -10,11 +10,11 @@ from fake_engine import synthetic_rig
 from wizard_rig import FakeRigAsker
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
+from rhot_app.calibration.commands.intrinsics import what_follows
 from rhot_app.project import Intrinsics, Rig, RigNode, load_rig
-from rhot_app.ui.wizards.lens import LAST, make_wizard
+from rhot_app.ui.wizards.lens import LAST, LensBoardStep, LensShowStep, make_wizard, straightened
 from rhot_app.ui.wizards.models.board_form import BoardFields
 from rhot_app.ui.wizards.models.drawing import Cells, Line
-from rhot_app.ui.wizards.steps.lens_steps import LensBoardStep, LensShowStep, straightened, what_follows
 
 TRUE_F = 530.0
 PLACES = [((0.0, 0.0, 0.0), (0.0, 0.0, 0.417)), ((0.0, 0.0, 0.0), (-0.142, -0.083, 0.417)),

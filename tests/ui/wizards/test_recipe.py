@@ -8,7 +8,7 @@ import sys
 
 import pytest
 import toy
-import toy_steps
+import toy_calibration
 from PySide6.QtCore import Qt
 from wizard_hands import Hands
 from wizard_rig import RigBackend
@@ -20,7 +20,7 @@ from rhot_app.ui.wizards import launcher
 from rhot_app.ui.wizards.framework import definition
 from rhot_app.ui.wizards.framework.definition import WIZARDS, Wizard
 
-ROW = Wizard(*toy_steps.TOY)
+ROW = Wizard(*toy_calibration.TOY)
 
 
 @pytest.fixture
@@ -35,10 +35,10 @@ def bench(make_bench, tmp_path, monkeypatch):
 
 
 def test_a_step_is_tested_without_a_window():
-    step = toy_steps.GreyStep()
+    step = toy.GreyStep()
     step.take(80.0)
     assert [step.capture() for _ in range(3)] == [True] * 3
-    assert step.view().done and toy_steps.mean_level(step.levels, progress=lambda text, fraction: None) == 80.0
+    assert step.view().done and toy_calibration.mean_level(step.levels, progress=lambda text, fraction: None) == 80.0
 
 
 def test_a_calibration_by_the_recipe_is_in_the_menu_and_works(bench):
@@ -50,18 +50,26 @@ def test_a_calibration_by_the_recipe_is_in_the_menu_and_works(bench):
     bench.until(lambda: window.wizards.wizard is not None)
     hands = Hands(window.wizards.wizard)
     hands.until(lambda: hands.window.step.now is not None)
-    for _ in range(toy_steps.ENOUGH):
+    for _ in range(toy.ENOUGH):
         hands.key(Qt.Key.Key_Space)
     hands.next()
     level = hands.solved()
     hands.next()
+    table = hands.window.page.table
+    assert [table.item(0, column).text() for column in (0, 2)] == ["grey level", f"{level:.0f}"], "the report's figure"
     hands.use()
     hands.next()
     bench.until(lambda: window.wizards.wizard is None)
     window.toolbar.calibrate_menu.aboutToShow.emit()
     assert action.text() == "Toy …\ttoday"
     assert load_rig(bench.backend.path).name == f"grey {level:.0f}"
-    assert [one.replaced_by for one in rig_history.versions(bench.backend.path)] == [toy_steps.TOY.reason]
+    assert [one.replaced_by for one in rig_history.versions(bench.backend.path)] == [toy_calibration.TOY.reason]
+
+
+def test_what_the_wizard_shows_is_what_a_command_would_print():
+    said = toy_calibration.report(80.0)
+    assert said.lines() == ["grey level  80"] and said.to_json()["level"] == 80.0
+    assert said.to_json()["verdict"] == "Good: grey level 80"
 
 
 def test_every_module_and_class_of_the_recipe_is_there():

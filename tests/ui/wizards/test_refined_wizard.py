@@ -13,6 +13,7 @@ from knocked_rig import moved
 from wizard_hands import Hands
 from wizard_rig import FakeRigAsker, RigBackend
 
+from rhot_app.calibration.tracked_results import propose_hand, propose_poses
 from rhot_app.calibration.verdict import Finding, Grade, judge
 from rhot_app.engine.status import Advice
 from rhot_app.project import load_rig
@@ -20,8 +21,7 @@ from rhot_app.rig_history import versions
 from rhot_app.ui.status_words import _advice_notice
 from rhot_app.ui.wizards import adapted, measured, refined
 from rhot_app.ui.wizards.framework.definition import OPEN_WIZARD
-from rhot_app.ui.wizards.steps.adapted_steps import ShowBonesStep, propose_hand
-from rhot_app.ui.wizards.steps.refined_steps import EngineFeed, MoveStep, propose
+from rhot_app.ui.wizards.refined import EngineFeed, MoveStep, ShowBonesStep
 
 
 class RefiningAsker(FakeRigAsker):
@@ -83,11 +83,11 @@ def test_what_holds_or_is_not_determined_leads_nowhere(stale, grade):
 def test_only_poses_are_proposed():
     rig = synthetic_rig()
     edited = msgspec.structs.replace(rig, name="edited since")
-    proposal = propose(answer_of(rig), edited, None)
+    proposal = propose_poses(answer_of(rig), edited)
     assert proposal is not None and proposal.rig is not None
     assert proposal.rig.name == "edited since" and proposal.rows[0].after == "0.02 px"
-    assert propose({"known": False}, rig, None) is None
-    assert propose(answer_of(rig, stale=False), rig, None) is None
+    assert propose_poses({"known": False}, rig) is None
+    assert propose_poses(answer_of(rig, stale=False), rig) is None
 
 
 def test_the_engines_sentence_has_the_button():
@@ -113,10 +113,10 @@ def test_a_learnt_hand_is_used_only_when_asked(hands, reason):
 def test_only_the_hand_is_proposed():
     rig = synthetic_rig()
     edited = msgspec.structs.replace(rig, name="edited since")
-    proposal = propose_hand("by contours")(hand_answer(rig), edited, None)
+    proposal = propose_hand(hand_answer(rig), edited, "by contours")
     assert proposal is not None and proposal.rig is not None
     assert proposal.rig.name == "edited since" and proposal.rig.nodes == rig.nodes and proposal.rig.hand != rig.hand
-    assert propose_hand("by contours")({"known": False}, rig, None) is None
+    assert propose_hand({"known": False}, rig, "by contours") is None
 
 
 def test_bones_that_must_not_be_used_lead_nowhere():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import msgspec
 import numpy as np
@@ -17,14 +16,15 @@ from wizard_rig import FakeRigAsker
 from rhot_app.calibration.board.boards import STANDARD_BOARD, Chessboard
 from rhot_app.calibration.board.size_check import Beyond
 from rhot_app.calibration.check.checks import check_rig
+from rhot_app.calibration.commands.stereo import propose, solve_shown
+from rhot_app.calibration.stereo.calibrate import lens_of
 from rhot_app.estimation.se3 import rotation_from_quaternion
 from rhot_app.project import CameraPose, load_rig
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards.framework.definition import Definition
+from rhot_app.ui.wizards.known_length import LengthsPage, LengthsStep
 from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep
-from rhot_app.ui.wizards.steps.lengths_step import LengthsStep
-from rhot_app.ui.wizards.steps.stereo_steps import ShowStep, StereoSolveStep, known_lenses, stereo_proposal
-from rhot_app.ui.wizards.stereo import LengthsPage, make_wizard
+from rhot_app.ui.wizards.stereo import ShowStep, make_wizard
 
 CAMERAS = ("left", "right")
 replace_fields = msgspec.structs.replace
@@ -158,13 +158,10 @@ def shown(compiled):
 
 
 def solved(shown, rig, known, board=STANDARD_BOARD):
-    """The solve's step with its report; `board` is what the person says of the squares."""
-    show = SimpleNamespace(cameras=shown.cameras, views=replace(shown.views, board=board))
-    step = StereoSolveStep(show, known_lenses(rig.nodes), lambda: known.known)
-    step.enter()
-    task = step.task()
-    step.take_result(task.function(*task.arguments, progress=lambda text, fraction: None, **task.options))
-    return step
+    """The result of the shots; `board` is what the person says of the squares."""
+    lenses = [None if node.intrinsics.nominal else lens_of(node) for node in rig.nodes]
+    return solve_shown(replace(shown.views, board=board), lenses, known=known.known,
+                       progress=lambda text, fraction: None)
 
 
 def test_a_corrected_square_keeps_the_shots(compiled):
@@ -195,26 +192,25 @@ def test_a_wrong_board_is_named_where_it_is_shown_and_gives_no_shots(compiled, c
     assert said in show.view().hint and not show.capture() and not show.view().may_go_on
 
 
-def test_a_length_check_is_skipped_knowingly_and_the_rig_says_so(shown, wrong_rig, tmp_path):
+def test_a_length_check_is_skipped_knowingly_and_the_rig_says_so(shown, wrong_rig):
     known = LengthsStep(CAMERAS)
     assert not known.view().may_go_on and "Skip" in known.view().hint
     known.skip(True)
     assert known.view().passable and not known.view().done and "unproven" in known.view().sentence
-    step = solved(shown, wrong_rig, known)
-    assert "lengths_unproven" in step.view().verdict.codes
-    proposal = stereo_proposal(wrong_rig, tmp_path / "desk.json", step.report, None)
+    result = solved(shown, wrong_rig, known)
+    assert "lengths_unproven" in result.verdict.codes
+    proposal = propose(result, wrong_rig)
     assert any("never checked" in row.after for row in proposal.rows)
     assert (proposal.rig.calibration.method, proposal.rig.calibration.lengths) == ("board", "skipped")
     assert "lengths_unproven" in check_rig(proposal.rig).verdict.codes
 
 
-def test_a_wrong_square_size_is_found_by_the_baseline(shown, wrong_rig):
+def test_a_wrong_square_size_is_found_by_the_baseline_and_writes_nothing(shown, wrong_rig, tmp_path):
     known = LengthsStep(CAMERAS)
     known.set_lengths(75.0, 0.0)
-    step = solved(shown, wrong_rig, known, Chessboard(9, 6, 0.025 / 1.1))  # printed too large, and not measured
-    view = step.view()
-    assert not view.verdict.acceptable and "baseline" in view.verdict.codes
-    assert not view.may_go_on
+    result = solved(shown, wrong_rig, known, Chessboard(9, 6, 0.025 / 1.1))  # printed too large, and not measured
+    assert not result.verdict.acceptable and "baseline" in result.verdict.codes
+    assert propose(result, wrong_rig).save(tmp_path / "desk.json") == "" and not list(tmp_path.iterdir())
 
 
 def test_undo_forgets_the_last_shot_and_another_board_all(scene):

@@ -64,16 +64,16 @@ def test_closing_while_it_records_ends_the_recording(hands):
 
 
 def test_a_wrong_row_time_is_told_to_its_node():
+    from rhot_app.calibration.commands.time import propose
     from rhot_app.calibration.observations import ObservationCollector
+    from rhot_app.calibration.proposal import NodeChange
     from rhot_app.calibration.time.offset import calibrate_times
-    from rhot_app.ui.models.proposal import NodeChange
-    from rhot_app.ui.wizards.steps.time_steps import propose
 
     rig = synthetic_rig()
     collector = ObservationCollector(tuple(node.name for node in rig.nodes), rig.markers.ids)
     for frame in see(rig, waving(rig, 12.0), 12.0, late_s=(0.0, LATE_S), row_times_ns=(ROW_NS, ROW_NS), said_ns=(0, 0)):
         collector.add(frame)
-    proposal = propose(calibrate_times(collector.table(), rig), rig, None, {1: {}, 2: {}})
+    proposal = propose(calibrate_times(collector.table(), rig), rig, {1: {}, 2: {}})
     assert proposal is not None
     told = [change for change in proposal.changes if isinstance(change, NodeChange)]
     assert [change.node_id for change in told] == [1, 2]

@@ -16,10 +16,11 @@ from wizard_hands import Hands
 from wizard_rig import RigBackend
 
 from rhot_app import rig_history
+from rhot_app.calibration.proposal import rows_of
+from rhot_app.calibration.rig_figures import place_figures
 from rhot_app.engine.status import Advice
 from rhot_app.project import CameraPose, load_rig
 from rhot_app.ui import actions, main_window
-from rhot_app.ui.models.rows import place_figures, rig_rows
 from rhot_app.ui.wizards import launcher
 from rhot_app.ui.wizards.framework import definition
 from rhot_app.ui.wizards.framework.definition import Wizard
@@ -122,11 +123,11 @@ def test_two_rigs_are_compared_in_figures_for_people():
     rig = synthetic_rig()
     lens = msgspec.structs.replace(rig.nodes[0].intrinsics, fx=540.04)
     other = msgspec.structs.replace(rig, nodes=(msgspec.structs.replace(rig.nodes[0], intrinsics=lens), rig.nodes[1]))
-    assert rig_rows(rig, rig) == ()
-    assert [(row.what, row.before, row.after) for row in rig_rows(rig, other)] == [
+    assert rows_of(rig, rig) == ()
+    assert [(row.what, row.before, row.after) for row in rows_of(rig, other)] == [
         ("left: focal length", "530.0, 530.0 px", "540.0, 530.0 px")]
 
 
 def test_a_figure_has_no_negative_zero():
     node = msgspec.structs.replace(synthetic_rig().nodes[0], pose=CameraPose(translation_m=(-1e-6, 0.0, 0.1)))
-    assert place_figures(node)["left: place"] == "0.0, 0.0, 100.0 mm"
+    assert next(place_figures(node)).text == "0.0, 0.0, 100.0 mm"

@@ -10,11 +10,14 @@ from fake_engine import synthetic_rig
 from wizard_rig import FakeRigAsker
 
 from rhot_app import rig_history
+from rhot_app.calibration.proposal import NodeChange, Proposal, Row
+from rhot_app.calibration.report import Report
 from rhot_app.calibration.verdict import Finding, Grade, judge
 from rhot_app.errors import EngineError, RigError
 from rhot_app.project import load_rig, save_rig
-from rhot_app.ui.models.proposal import NodeChange, Proposal, RigChange, Row, age_text, in_force
+from rhot_app.ui.models.proposal import RigChange, changes_of, use_all, ways_back
 from rhot_app.ui.models.words import Remaining
+from rhot_app.ui.wizards.launcher import age_text
 from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep, StepView
 
 
@@ -78,11 +81,19 @@ def test_a_proposal_is_put_into_force_whole_or_not_at_all(asker, tmp_path):
 
         way_back = ""
 
-    proposal = Proposal("lens calibration", judge("rms 0.3 px", []), (), (change_of(path, "new"), Refusing()))
     with pytest.raises(EngineError):
-        proposal.use(asker.command)
+        use_all((change_of(path, "new"), Refusing()), asker.command)
     assert load_rig(path).name == "desk" and asker.rig.name == "desk"
-    assert proposal.rig.name == "new" and proposal.rig_before.name == "desk"
+
+
+def test_a_proposal_changes_the_rig_and_what_it_names(tmp_path):
+    path, node = rig_file(tmp_path), NodeChange(2, {"camera": {"gain": None}}, {"camera": {"gain": 2.5}})
+    rig = load_rig(path)
+    new = msgspec.structs.replace(rig, name="new")
+    proposal = Proposal("lens calibration", judge("rms 0.3 px", []), (), rig, new, (node,))
+    assert changes_of(proposal, path) == (node, RigChange(rig, new, path, "lens calibration"))
+    assert proposal.save(path) == str(path) and load_rig(path).name == "new"
+    assert changes_of(Proposal("camera settings", judge("good", []), (), changes=(node,)), path) == (node,)
 
 
 def test_a_node_change_goes_to_the_node_and_back(asker):
@@ -97,14 +108,11 @@ def test_only_what_a_rigs_file_keeps_is_said_to_come_back_at_any_time(tmp_path):
     change = change_of(rig_file(tmp_path), "new")
     node = NodeChange(2, {"camera": {"gain": None}}, {"camera": {"gain": 2.5}})
 
-    def ways_back(*changes):
-        return Proposal("calibration", judge("rms 0.3 px", []), (), changes).ways_back
-
-    assert "any time" in ways_back(change) and ways_back(change, change) == ways_back(change)
-    assert "any time" in ways_back(change, node) and "until this window closes" in ways_back(change, node)
+    assert "any time" in ways_back((change,)) and ways_back((change, change)) == ways_back((change,))
+    assert "any time" in ways_back((change, node)) and "until this window closes" in ways_back((change, node))
     unsaved = [RigChange(change.before, change.after, path, "calibration") for path in (None, tmp_path / "gone.json")]
     for nothing_kept in ((), (node,), *((one,) for one in unsaved)):
-        assert "any time" not in ways_back(*nothing_kept)
+        assert "any time" not in ways_back(nothing_kept)
 
 
 @pytest.mark.parametrize("grade", list(Grade))
@@ -112,17 +120,17 @@ def test_no_step_is_done_or_says_next_beside_a_verdict_that_forbids(grade):
     verdict = judge("rms 9 px", [Finding("rms", grade, "rms 9 px")])
     view = StepView("Enough: press Next.", done=True, verdict=verdict)
     assert view.done == view.may_go_on == ("Next" in view.sentence) == verdict.acceptable
-    solve = SolveStep(lambda: None, lambda report: verdict)
+    solve = SolveStep(lambda: None, lambda result: Report(verdict))
     solve.take_result(object())
     assert solve.view().done == ("go on" in solve.view().sentence) == verdict.acceptable
 
 
 def test_the_last_step_refuses_a_poor_result_and_comes_back(asker):
     poor = judge("rms 9 px", [Finding("rms", Grade.POOR, "rms 9 px", "The board moved.", "Hold it still.")])
-    step = AcceptStep(lambda: Proposal("lens calibration", poor, (Row("rms", "0.3 px", "9 px"),)))
+    step = AcceptStep(lambda: Proposal("lens calibration", poor, (Row("rms", "0.3 px", "9 px"),)), None)
     step.enter()
     assert not step.usable and "must not be used" in step.view().sentence
-    step = AcceptStep(lambda: Proposal("lens calibration", judge("rms 0.3 px", []), ()))
+    step = AcceptStep(lambda: Proposal("lens calibration", judge("rms 0.3 px", []), ()), None)
     step.enter()
     assert step.usable and step.keeps and not step.view().done
     step.begin()
@@ -134,16 +142,16 @@ def test_the_last_step_refuses_a_poor_result_and_comes_back(asker):
 
 def test_what_is_in_force_follows_restores(tmp_path):
     path = rig_file(tmp_path)
-    assert in_force(path) == {}
+    assert rig_history.in_force(path) == {}
     one = msgspec.structs.replace(load_rig(path), name="one")
     rig_history.accept(path, one, "lens calibration")
     rig_history.accept(path, msgspec.structs.replace(one, name="two"), "stereo calibration")
-    assert set(in_force(path)) == {"lens calibration", "stereo calibration"}
+    assert set(rig_history.in_force(path)) == {"lens calibration", "stereo calibration"}
     before_stereo = rig_history.versions(path)[0]
     rig_history.restore(path, before_stereo)
-    assert set(in_force(path)) == {"lens calibration"}
+    assert set(rig_history.in_force(path)) == {"lens calibration"}
     rig_history.restore(path, rig_history.versions(path)[0])
-    assert set(in_force(path)) == {"lens calibration", "stereo calibration"}
+    assert set(rig_history.in_force(path)) == {"lens calibration", "stereo calibration"}
 
 
 def test_age_in_words():

@@ -1,17 +1,48 @@
-"""A toy calibration by the recipe of `rhot_app.ui.wizards`, second part: its pages."""
+"""A toy calibration by the recipe of `rhot_app.ui.wizards`, second file: its wizard."""
 
 from __future__ import annotations
 
-from toy_steps import TOY, GreyStep, mean_level, propose, verdict_of
+from toy_calibration import TOY, mean_level, propose, report
 
-from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
-from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage, Page
-from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep, Task
+from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
+from rhot_app.ui.wizards.framework.page import ChartPage, Page
+from rhot_app.ui.wizards.models.step import Bar, SolveStep, Step, StepView, Task
+
+ENOUGH = 3
 
 
 def make_wizard(context: WizardContext) -> Definition:
     """Take pictures, look at the level, use it."""
     grey = GreyStep()
-    solve = SolveStep(lambda: Task("Averaging …", mean_level, (grey.levels,)) if grey.levels else None, verdict_of)
-    accept = AcceptStep(lambda: propose(solve.report, context))
-    return Definition(TOY.title, (Page(grey), ChartPage(solve, context.scheme), AcceptPage(accept, context.scheme)))
+    solve = SolveStep(lambda: Task("Averaging …", mean_level, (grey.levels,)) if grey.levels else None, report)
+    return Definition(TOY.title, (Page(grey), ChartPage(solve, context.scheme),
+                                  accept_result(context, solve, lambda level: propose(level, context.rig))))
+
+
+class GreyStep(Step):
+    """How bright the pictures are, three times."""
+
+    title = "Take pictures"
+    watches = captures = True
+
+    def __init__(self):
+        self.now = None
+        self.levels = ()
+
+    def see(self, pictures):
+        return float(sum(picture.bgr.mean() for picture in pictures.values()) / len(pictures))
+
+    def take(self, seen):
+        self.now = seen
+
+    def capture(self):
+        self.levels += () if self.now is None else (self.now,)
+        return self.now is not None
+
+    @property
+    def keeps(self):
+        return bool(self.levels)
+
+    def view(self):
+        count = len(self.levels)
+        return StepView("Press Space.", done=count >= ENOUGH, bars=(Bar("pictures", count / ENOUGH),), kept=count)

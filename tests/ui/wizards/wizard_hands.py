@@ -60,11 +60,11 @@ class Hands(Person):
         self.until(lambda: step.phase == "recorded", seconds + PATIENCE_S)
 
     def solved(self, timeout_s=PATIENCE_S):
-        """Wait for the report of a step that solves."""
+        """Wait for the result of a step that solves."""
         step = self.window.step
-        self.until(lambda: step.report is not None or step.view().hint, timeout_s)
-        assert step.report is not None, step.view().hint
-        return step.report
+        self.until(lambda: step.result is not None or step.view().hint, timeout_s)
+        assert step.result is not None, step.view().hint
+        return step.result
 
     def use(self):
         """On the last page: use what is proposed, once that is allowed."""

@@ -8,12 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from rhot_app.calibration.proposal import Proposal
 from rhot_app.calibration.registry import CALIBRATIONS, Calibration
 from rhot_app.project import Rig
 from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.framework.page import Page
+from rhot_app.ui.wizards.framework.page import AcceptPage, Page
+from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep
 
 # -- What wizards remember between runs --------------------------------------------------------------------------------
 
@@ -60,6 +62,18 @@ class Definition:
     guide: str = "calibration"
     solver: str = ""
     put_back: Callable[[], None] | None = None
+
+
+def accept_page(context: WizardContext, propose: Callable[[], Proposal | None],
+                missing: str = "There is no result yet.") -> AcceptPage:
+    """The last page of a wizard: what `propose` gives, beside what is in force."""
+    return AcceptPage(AcceptStep(propose, context.rig_path, missing), context.scheme)
+
+
+def accept_result(context: WizardContext, solve: SolveStep, propose: Callable[[Any], Proposal | None],
+                  missing: str = "There is no result yet.") -> AcceptPage:
+    """The same with what `propose` makes of the result of `solve`."""
+    return accept_page(context, lambda: None if solve.result is None else propose(solve.result), missing)
 
 
 # -- All wizards -------------------------------------------------------------------------------------------------------

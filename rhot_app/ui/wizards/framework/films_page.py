@@ -8,8 +8,8 @@ from pathlib import Path
 from PySide6.QtWidgets import QComboBox, QFileDialog, QPushButton, QWidget
 
 from rhot_app.ui.wizards.framework.page import Page
+from rhot_app.ui.wizards.models.films import FilmedStep
 from rhot_app.ui.wizards.models.step import StepView
-from rhot_app.ui.wizards.steps.film_steps import FilmedStep
 from rhot_node.pictures import VIDEO_SUFFIXES
 
 _BEGAN = (("together", "Films began together"), ("sound", "Align by sound"), ("flash", "Align by a flash"))

@@ -24,6 +24,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.calibration.proposal import Row
+from rhot_app.calibration.report import Table
 from rhot_app.calibration.verdict import Finding, Verdict
 from rhot_app.charts import Chart, Curve, Span, ticks
 from rhot_app.ui.backend.feed import Picture
@@ -31,7 +33,7 @@ from rhot_app.ui.common.disposal import plot_widget
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.common.theme import CELL_PADDING_PX, app_font
 from rhot_app.ui.models.palette import Scheme, visible_on
-from rhot_app.ui.models.proposal import Row
+from rhot_app.ui.models.proposal import ways_back
 from rhot_app.ui.models.words import GRADES
 from rhot_app.ui.wizards.framework.colour_list import swatch
 from rhot_app.ui.wizards.models.step import AcceptStep, ChartedStep, Step, StepView
@@ -83,7 +85,7 @@ class AcceptPage(Page):
 
     def __init__(self, step: AcceptStep, scheme: Scheme) -> None:
         super().__init__(step)
-        self._accept = step
+        self.accept = step
         self._rows: tuple[Row, ...] | None = None
         self.table = RowTable(scheme)
         self.centre = self.table
@@ -103,14 +105,15 @@ class AcceptPage(Page):
 
     def show_view(self, view: StepView) -> None:
         """The rows of the proposal, and the way back while there is one."""
-        proposal = self._accept.proposal
+        proposal = self.accept.proposal
         rows = proposal.rows if proposal is not None else ()
         if rows != self._rows:
             self._rows = rows
             self.table.show_rows(rows)
-        self.note.setText(f"Nothing was saved so far. {proposal.ways_back}" if proposal is not None else "")
-        self.note.setVisible(self._accept.state == "proposed")
-        self.restore_button.setVisible(self._accept.restorable)
+        self.note.setText(f"Nothing was saved so far. {ways_back(self.accept.changes)}" if proposal is not None else
+                          "")
+        self.note.setVisible(self.accept.state == "proposed")
+        self.restore_button.setVisible(self.accept.restorable)
 
 
 def shrinkable(part: QWidget, least_px: int = 96) -> None:
@@ -157,6 +160,42 @@ class RowTable(QTableWidget):
                 item.setForeground(QColor(self._scheme.muted if c == 0 else self._scheme.text))
                 if row.swatches is not None and c:
                     item.setIcon(swatch(row.swatches[c - 1], self._scheme))
+                self.setItem(r, c, item)
+
+
+class FigureTable(QTableWidget):
+    """The figures of a report's table; its first column is what they are of."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.verticalHeader().setVisible(False)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setShowGrid(False)
+        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self._shown: Table | None = None
+
+    def cell(self, row: int, column: int) -> QTableWidgetItem:
+        """A cell that is filled."""
+        item = self.item(row, column)
+        assert item is not None
+        return item
+
+    def show_table(self, table: Table | None) -> None:
+        """Show it instead of the last one; the same object is not filled in again."""
+        if table is self._shown:
+            return
+        self._shown = table
+        heads, texts = (table.heads, table.texts) if table is not None else ((), [])
+        self.setColumnCount(len(heads))
+        self.setHorizontalHeaderLabels(list(heads))
+        self.setRowCount(len(texts))
+        for r, row in enumerate(texts):
+            for c, text in enumerate(row):
+                item = QTableWidgetItem(text)
+                item.setTextAlignment((Qt.AlignmentFlag.AlignRight if c else Qt.AlignmentFlag.AlignLeft)
+                                      | Qt.AlignmentFlag.AlignVCenter)
                 self.setItem(r, c, item)
 
 

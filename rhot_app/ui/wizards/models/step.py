@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
+from rhot_app.calibration.proposal import Change, Command, Proposal
+from rhot_app.calibration.report import Report
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.charts import Chart
 from rhot_app.ui.backend.feed import Picture
-from rhot_app.ui.models.proposal import Command, Proposal
+from rhot_app.ui.models.proposal import changes_of, restore_all, use_all
 from rhot_app.ui.wizards.models.drawing import Overlay
 
 Pictures = Mapping[str, Picture]
@@ -137,44 +140,74 @@ class Step:
 class ChartedStep(Step):
     """A step with charts instead of pictures."""
 
-    charts: tuple[Chart, ...] = ()
+    @property
+    def charts(self) -> tuple[Chart, ...]:
+        """What is shown; the same objects until something changes."""
+        return ()
 
 
 # -- Step: solve -------------------------------------------------------------------------------------------------------
 
-class SolveStep(ChartedStep):
-    """Asks `make_task` for its work whenever it is entered with other input than before; `report` is the result."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Done:
+    """A result for which no work is needed."""
 
-    def __init__(self, make_task: Callable[[], Task | None], verdict_of: Callable[[Any], Verdict],
-                 charts_of: Callable[[Any], tuple[Chart, ...]] = lambda report: (), title: str = "Result") -> None:
-        """`make_task` gives None while something is missing; tasks with equal arguments are the same work."""
+    result: Any
+
+
+class SolveStep(ChartedStep):
+    """Does the work that `make_work` asks for whenever the step is entered with other input than before.
+
+    `result` is what came of it, `report` what the calibration says of it. Subclasses show it over pictures.
+    """
+
+    advice = "Look at the result, then go on."
+
+    def __init__(self, make_work: Callable[[], Task | Done | None], report_of: Callable[[Any], Report],
+                 title: str = "Result", missing: str = "Go back: nothing was recorded yet.") -> None:
+        """`make_work` gives None while something is `missing`; tasks with equal arguments are the same work."""
         self.title = title
-        self.report: Any = None
-        self.charts: tuple[Chart, ...] = ()
-        self._make_task = make_task
-        self._verdict_of = verdict_of
-        self._charts_of = charts_of
-        self._task: Task | None = None
+        self.result: Any = None
+        self.report: Report | None = None
+        self._make_work = make_work
+        self._report_of = report_of
+        self._missing = missing
+        self._work: Task | Done | None = None
         self._problem = ""
 
     @property
+    def charts(self) -> tuple[Chart, ...]:
+        """Of the report."""
+        return self.report.charts if self.report is not None else ()
+
+    @property
     def keeps(self) -> bool:
-        """A report is worth a question."""
-        return self.report is not None
+        """A result is worth a question."""
+        return self.result is not None
 
     def enter(self) -> None:
         """What was collected may have changed."""
-        task = self._make_task()
-        if task != self._task:
-            self._task, self.report, self.charts, self._problem = task, None, (), ""
+        if self._make_work() != self._work:
+            self.begin()
+
+    def begin(self) -> None:
+        """Do the work anew."""
+        self._work, self.result, self.report, self._problem = self._make_work(), None, None, ""
+        if isinstance(self._work, Done):
+            self.take_result(self._work.result)
 
     def task(self) -> Task | None:
-        """The work, until there is a report."""
-        return self._task if self.report is None else None
+        """The work, until there is a result."""
+        return self._work if self.result is None and isinstance(self._work, Task) else None
 
     def take_result(self, result: Any) -> None:
-        """The report."""
-        self.report, self.charts, self._problem = result, self._charts_of(result), ""
+        """What came of it."""
+        self.result, self.report, self._problem = result, self._report_of(result), ""
+
+    def report_again(self) -> None:
+        """The same result is to be said in another way."""
+        if self.result is not None:
+            self.report = self._report_of(self.result)
 
     def take_failure(self, sentence: str) -> None:
         """Why there is none."""
@@ -183,11 +216,11 @@ class SolveStep(ChartedStep):
     def view(self) -> StepView:
         """The verdict, once there is one."""
         if self.report is None:
-            return StepView("Go back: nothing was recorded yet." if self._task is None else
-                            "It did not work out." if self._problem else "One moment.", hint=self._problem)
-        verdict = self._verdict_of(self.report)
-        sentence = "Look at the result, then go on." if verdict.acceptable else "Read what is wrong, then go back."
-        return StepView(sentence, done=verdict.acceptable, verdict=verdict)
+            return StepView(self._missing if self._work is None else "It did not work out." if self._problem else
+                            "One moment.", hint=self._problem)
+        verdict = self.report.verdict
+        return StepView(self.advice if verdict.acceptable else "Read what is wrong, then go back.",
+                        done=verdict.acceptable, verdict=verdict)
 
 
 # -- Step: accept or restore, the last of every wizard -----------------------------------------------------------------
@@ -202,9 +235,11 @@ class AcceptStep(Step):
     title = "Before and after"
     use_label = "Use this calibration"
 
-    def __init__(self, propose: Callable[[], Proposal | None], missing: str = "There is no result yet.") -> None:
-        """`missing` is shown while `propose` gives None."""
+    def __init__(self, propose: Callable[[], Proposal | None], path: Path | None,
+                 missing: str = "There is no result yet.") -> None:
+        """`path` is the rig's file. `missing` is shown while `propose` gives None."""
         self._propose = propose
+        self._path = path
         self._missing = missing
         self.proposal: Proposal | None = None
         self.state: State = "proposed"
@@ -215,6 +250,11 @@ class AcceptStep(Step):
         proposal = self._propose()
         if proposal != self.proposal:
             self.proposal, self.state, self.problem = proposal, "proposed", ""
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What the proposal changes."""
+        return changes_of(self.proposal, self._path) if self.proposal is not None else ()
 
     @property
     def usable(self) -> bool:
@@ -242,13 +282,11 @@ class AcceptStep(Step):
 
     def apply(self, command: Command) -> None:
         """Put the proposal into force; raises RhotError."""
-        assert self.proposal is not None
-        self.proposal.use(command)
+        use_all(self.changes, command)
 
     def take_back(self, command: Command) -> None:
         """Bring back what was before; raises RhotError."""
-        assert self.proposal is not None
-        self.proposal.restore(command)
+        restore_all(self.changes, command)
 
     def view(self) -> StepView:
         """One sentence for each state."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -12,12 +11,12 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.check.camera_advice import CameraAdvice, CameraAdvisor
 from rhot_app.calibration.check.exposure import BRIGHT, DARK
+from rhot_app.calibration.proposal import NodeChange, Proposal, Row
 from rhot_app.calibration.registry import CAMERA
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.project import RigNode
 from rhot_app.ui.backend.feed import Picture
-from rhot_app.ui.models.proposal import NodeChange, Proposal, Row
 from rhot_app.ui.wizards.models.drawing import Layer, Line, Overlay
 from rhot_app.ui.wizards.models.step import AnnotatedPicture, Pictures, Step, StepView
 from rhot_node.config import CameraSettings
@@ -334,7 +333,7 @@ class SettingsStep(Step):
         return StepView(sentence, done=good, hint=self._problem, verdict=verdict,
                         annotated={name: look.annotated for name, look in self._looks.items()}, passable=self._current)
 
-    def propose(self, rig_path: Path | None) -> Proposal | None:
+    def propose(self) -> Proposal | None:
         """All changed cameras' settings, or those in force when they may be used; None for neither.
 
         Poor light does not forbid to save what is no worse than the settings in force: a lamp is not a setting.
@@ -348,8 +347,8 @@ class SettingsStep(Step):
         if verdict.grade is Grade.POOR and self._before is Grade.POOR:
             verdict = judge(f"{verdict.sentence.partition(': ')[2]} The settings in force are no better.",
                             [replace(finding, grade=Grade.FAIR) for finding in verdict.findings])
-        return Proposal(CAMERA.reason, verdict, self.choices.rows(self.choices.changed),
-                        tuple(NodeChange(node.node_id, *self.choices.differences(node.node_id))
+        return Proposal(CAMERA.reason, verdict, self.choices.rows(self.choices.changed), changes=tuple(
+                            NodeChange(node.node_id, *self.choices.differences(node.node_id))
                               for node in self.choices.changed))
 
 

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from rhot_app.calibration.proposal import Command, Proposal, Row
 from rhot_app.calibration.registry import CERTIFICATE
+from rhot_app.calibration.report import Report
 from rhot_app.calibration.verdict import Finding, Grade, Verdict
 from rhot_app.certificate.collect import SECONDS
 from rhot_app.certificate.document import Certificate, Line, in_words
@@ -21,10 +23,8 @@ from rhot_app.certificate.recordings import (
     RulerStep,
     StaticStep,
 )
-from rhot_app.charts import Chart
 from rhot_app.progress import Progress
 from rhot_app.project import Rig
-from rhot_app.ui.models.proposal import Command, Proposal, Row
 from rhot_app.ui.wizards.models.movement import MovementStep, Request
 from rhot_app.ui.wizards.models.step import AcceptStep, StepView, Task
 
@@ -140,22 +140,23 @@ def task_of(statements: Statements, steps: dict[str, CertificateStep]) -> Task |
 _GRADES = {"agrees": Grade.GOOD, "not measured": Grade.FAIR, "differs": Grade.POOR}
 
 
-def verdict_of(report: tuple[ProtocolFile, Certificate]) -> Verdict:
+def verdict_of(result: tuple[ProtocolFile, Certificate]) -> Verdict:
     """One finding for each line, the differing ones first. A certificate may always be kept, so none forbids it: what
     differs is said, and graded fair."""
-    certificate = report[1]
+    certificate = result[1]
     lines = sorted(certificate.lines, key=lambda line: -_GRADES[line.verdict].rank)
     return Verdict(certificate.summary, tuple(
         Finding(line.code, min(_GRADES[line.verdict], Grade.FAIR, key=lambda grade: grade.rank),
                 f"{line.title}, {line.verdict}: {line.sentence}", line.cause, line.remedy) for line in lines))
 
 
-def charts_of(report: tuple[ProtocolFile, Certificate]) -> tuple[Chart, ...]:
-    """The certificate's own charts of what was moved through the volume."""
+def report(result: tuple[ProtocolFile, Certificate]) -> Report:
+    """The lines as findings, and the certificate's own charts of what was moved through the volume."""
     from rhot_app.certificate.charts import chart_of
 
-    charts = (chart_of(line) for line in report[1].lines if line.code in _CHARTED)
-    return tuple(chart for chart in charts if chart is not None)
+
+    charts = (chart_of(line) for line in result[1].lines if line.code in _CHARTED)
+    return Report(verdict_of(result), charts=tuple(chart for chart in charts if chart is not None))
 
 
 # -- keeping it --------------------------------------------------------------------------------------------------------
@@ -215,13 +216,13 @@ def _headline(line: Line) -> str:
     return f"{chief.name} {in_words(chief.interval, chief.unit)}"
 
 
-def propose(report: tuple[ProtocolFile, Certificate] | None, folder: Callable[[], Path]) -> Proposal | None:
+def propose(result: tuple[ProtocolFile, Certificate] | None, folder: Callable[[], Path]) -> Proposal | None:
     """The lines of the certificate as rows: title, verdict, and the figure that it rests on or what to do."""
-    if report is None:
+    if result is None:
         return None
-    rows = tuple(Row(line.title, line.verdict, _headline(line)) for line in report[1].lines)
+    rows = tuple(Row(line.title, line.verdict, _headline(line)) for line in result[1].lines)
     place = folder()
-    return Proposal(CERTIFICATE.reason, verdict_of(report), rows, (WriteCertificate(place, report),),
-                    f"It stands in {place}: certificate.html, .pdf and .json, with the recordings.")
+    return Proposal(CERTIFICATE.reason, verdict_of(result), rows, changes=(WriteCertificate(place, result),),
+                    afterwards=f"It stands in {place}: certificate.html, .pdf and .json, with the recordings.")
 
 

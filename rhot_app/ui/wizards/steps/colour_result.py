@@ -1,25 +1,17 @@
-"""How far the colours can be told apart: the judged report, its histogram and matrix, and what is proposed."""
+"""How far the colours can be told apart: bounds that a person moves, and the judged result."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 
 from rhot_app.calibration.colour.colours import ColourReport, solve_colours
-from rhot_app.calibration.colour.surroundings import HUE_STEP_DEG
-from rhot_app.calibration.registry import COLOURS
+from rhot_app.calibration.commands.colours import report
 from rhot_app.calibration.verdict import Finding, with_findings
-from rhot_app.charts import Chart, Curve
-from rhot_app.project import Rig
-from rhot_app.ui.models.palette import hex_of
-from rhot_app.ui.models.proposal import Change, NodeChange, Proposal, RigChange, Row
-from rhot_app.ui.models.rows import rig_rows
-from rhot_app.ui.wizards.models.step import ChartedStep, Pictures, Step, StepView, Task
+from rhot_app.ui.wizards.models.step import Done, Pictures, SolveStep, StepView, Task
 from rhot_app.ui.wizards.steps.camera_steps import Control
 from rhot_app.ui.wizards.steps.colour_pick import (
     MaskedPictures,
@@ -47,20 +39,19 @@ BOUNDS: tuple[Control, ...] = (
 )
 
 
-class BoundsStep(Step):
+class BoundsStep(SolveStep):
     """Learns all colours from what was picked, then lets a person move the bounds; Ctrl+Z goes back step by step."""
 
-    title = "Check the mask"
     watches = True
 
     def __init__(self, picks: PickStep) -> None:
+        super().__init__(lambda: learning(picks, {}, "Learning the colours …") if picks.gathering.names else None,
+                         report, "Check the mask", "Go back and pick a colour.")
         self.cameras = picks.cameras
         self.picks = picks
-        self.report: ColourReport | None = None
         self.given: dict[str, ChromaModel] = {}
         self.chosen = ""
         self.show: Show = "all"
-        self.problem = ""
         self.markers: MarkerSet = picks.base
         self._revision = -1
         self._undone: list[dict[str, ChromaModel]] = []
@@ -70,31 +61,22 @@ class BoundsStep(Step):
     @property
     def names(self) -> tuple[str, ...]:
         """Markers with samples."""
-        return self.report.names if self.report is not None else ()
+        return self.result.names if self.result is not None else ()
 
     def enter(self) -> None:
         """Other samples, other colours."""
         if self._revision != self.picks.gathering.revision:
             self._revision = self.picks.gathering.revision
-            self.report, self.given, self._undone, self._masked = None, {}, [], {}
+            self.given, self._undone, self._masked = {}, [], {}
             self.markers = self.picks.markers
-
-    def task(self) -> Task | None:
-        """Learn, unless that is done."""
-        if self.report is not None or not self.picks.gathering.names:
-            return None
-        return learning(self.picks, {}, "Learning the colours …")
+            self.begin()
 
     def take_result(self, result: Any) -> None:
         """The learnt bounds."""
-        self.report, self.problem = result, ""
+        super().take_result(result)
         if self.chosen not in result.names:
             self.chosen = result.names[0]
         self._show_given()
-
-    def take_failure(self, sentence: str) -> None:
-        """Why there are none."""
-        self.problem = sentence
 
     @property
     def masked(self) -> MaskedPictures:
@@ -103,7 +85,7 @@ class BoundsStep(Step):
 
     def value(self, control: Control) -> float | None:
         """A bound of the chosen marker."""
-        if self.report is None:
+        if self.result is None:
             return None
         return float(getattr(self.model(self.chosen), control.field))
 
@@ -113,7 +95,7 @@ class BoundsStep(Step):
 
     def change(self, control: Control, value: float, *, goes_on: bool = False) -> None:
         """Move a bound of the chosen marker; `goes_on`: a slider is still moving, one step back undoes it whole."""
-        if self.report is None:
+        if self.result is None:
             return
         kept = int(value) if control.field.startswith("luma") else value
         model = msgspec.structs.replace(self.model(self.chosen), **{control.field: kept})
@@ -144,10 +126,10 @@ class BoundsStep(Step):
             self._show_given()
 
     def _show_given(self) -> None:
-        assert self.report is not None
-        self.markers = msgspec.structs.replace(self.report.markers, markers=tuple(
+        assert self.result is not None
+        self.markers = msgspec.structs.replace(self.result.markers, markers=tuple(
             msgspec.structs.replace(marker, chroma=self.given.get(marker.id, marker.chroma))
-            for marker in self.report.markers.markers))
+            for marker in self.result.markers.markers))
 
     def see(self, pictures: Pictures) -> MaskedPictures:
         """The mask."""
@@ -159,9 +141,8 @@ class BoundsStep(Step):
 
     def view(self) -> StepView:
         """Look, and move what does not fit."""
-        if self.report is None:
-            return StepView("Go back and pick a colour." if not self.picks.gathering.names else
-                            "It did not work out." if self.problem else "One moment.", hint=self.problem)
+        if self.result is None:
+            return super().view()
         chosen = self.markers.ids.index(self.chosen) if self.show == "chosen" else None
         index = self.markers.ids.index(self.chosen)
         found = [picture.seen[index].found for picture in self._masked.values()]
@@ -184,127 +165,46 @@ def learning(picks: PickStep, given: dict[str, ChromaModel], title: str) -> Task
 
 # -- Step: separability of the colours, and what is proposed -----------------------------------------------------------
 
-
-_HEADROOM = 1.05  # of the chart above the highest column
-
-
-class SeparationStep(ChartedStep):
+class SeparationStep(SolveStep):
     """The verdict on the colours with the bounds that a person has left them, and on the light since then."""
 
-    title = "Tell them apart"
     watches = True
+    advice = "Read what may be mistaken for a marker, then go on."
 
     def __init__(self, bounds: BoundsStep) -> None:
+        super().__init__(self._judging, report, "Tell them apart", "Go back and pick a colour.")
         self.cameras = bounds.cameras
-        self.report: ColourReport | None = None
         self._bounds = bounds
         self._learnt: ColourReport | None = None
         self._given: Mapping[str, ChromaModel] = {}
-        self._problem = ""
         self._maker = MaskMaker()
-        self._drift: tuple[Finding, ...] = ()
 
-    @property
-    def judged(self) -> ColourReport | None:
-        """The report with what the cameras say of the light now."""
-        return self.report and replace(self.report, verdict=with_findings(self.report.verdict, self._drift))
-
-    @property
-    def keeps(self) -> bool:
-        """A report is worth a question."""
-        return self.report is not None
+    def _judging(self) -> Task | Done | None:
+        """Untouched bounds were judged as they were learnt."""
+        if self._learnt is None:
+            return None
+        return learning(self._bounds.picks, dict(self._given), "Trying the new bounds …") if self._given else \
+            Done(self._learnt)
 
     def enter(self) -> None:
-        """Other bounds, another judgement; untouched ones were judged as they were learnt."""
-        if self._learnt is not self._bounds.report or self._given != self._bounds.given:
-            self._learnt, self._given, self._problem = self._bounds.report, dict(self._bounds.given), ""
-            self._take(None if self._given else self._learnt)
-
-    def task(self) -> Task | None:
-        """Judge what was moved by hand."""
-        if self.report is not None or self._learnt is None:
-            return None
-        return learning(self._bounds.picks, dict(self._given), "Trying the new bounds …")
-
-    def take_result(self, result: Any) -> None:
-        """The judgement."""
-        self._take(result)
-
-    def take_failure(self, sentence: str) -> None:
-        """Why there is none."""
-        self._problem = sentence
+        """Other bounds, another judgement."""
+        if self._learnt is not self._bounds.result or self._given != self._bounds.given:
+            self._learnt, self._given = self._bounds.result, dict(self._bounds.given)
+            self.begin()
 
     def see(self, pictures: Pictures) -> tuple[Finding, ...] | None:
         """How the light stands to the one of the samples; None before they are learnt."""
-        report = self.report
-        return None if report is None else drift_of(self._maker.look(pictures, report.markers))
+        result = self.result
+        return None if result is None else drift_of(self._maker.look(pictures, result.markers))
 
     def take(self, seen: tuple[Finding, ...]) -> None:
         """What is said of the light."""
-        self._drift = seen
-
-    def _take(self, report: ColourReport | None) -> None:
-        self.report, self._drift = report, ()
-        self.charts = () if report is None else (hue_chart(report),)
+        if self.report is not None:
+            self.report = replace(self.report, verdict=with_findings(self.result.verdict, seen))
 
     def view(self) -> StepView:
         """The verdict, with what to do about it."""
-        judged = self.judged
-        if judged is None:
-            return StepView("Go back and pick a colour." if self._learnt is None else
-                            "It did not work out." if self._problem else "One moment.", hint=self._problem)
-        apart = judged.separability.sentences
-        hint = "; ".join(apart[:3]) + "." if apart else "No two colours overlap."
-        sentence = "Read what may be mistaken for a marker, then go on." if judged.verdict.acceptable else \
-            "Read what is wrong, then go back."
-        return StepView(sentence, done=judged.verdict.acceptable, hint=hint, verdict=judged.verdict)
-
-
-def hue_chart(report: ColourReport) -> Chart:
-    """Which hues the room has, and which of them each marker's bounds let through."""
-    room = report.room.hue_px
-    left = -180.0 + HUE_STEP_DEG * np.arange(len(room))
-    x = np.stack([left, left + HUE_STEP_DEG], axis=1).ravel()
-    top = 10.0 ** (_HEADROOM * np.log10(max(float(room.max()), 10.0)))
-    chosen = {marker.id: marker for marker in report.markers.markers}
-    curves = [Curve("the room", x, np.repeat(np.maximum(room, 1.0), 2))]
-    for one in report.samples:
-        marker = chosen[one.name]
-        middle = float(np.degrees(marker.chroma.hue_rad))
-        low, high = middle - marker.chroma.hue_tolerance_deg, middle + marker.chroma.hue_tolerance_deg
-        for turn in (-360.0, 0.0, 360.0):  # a band across red is drawn at both ends
-            ends = np.clip(np.array([low + turn, high + turn]), -180.0, 180.0)
-            if ends[1] > ends[0]:
-                name = one.name if low + turn < middle + turn <= 180.0 and middle + turn > -180.0 else ""
-                curves.append(Curve(name, ends, np.ones(2), "band", np.full(2, top), hex_of(one.rgb)))
-    return Chart("Colours of the room and of the markers", "hue (angle of chroma), °",
-                 "pixels per picture", tuple(curves), log_y=True)
-
-
-def matrix_cells(report: ColourReport) -> tuple[tuple[str, ...], list[tuple[str, list[float]]]]:
-    """The heads of the columns; each row's marker, and what share 0..1 of each column's colour is taken for it."""
-    apart = report.separability
-    return (*report.names, *apart.others), [(name, [float(share) for share in row])
-                                            for name, row in zip(report.names, apart.matrix, strict=True)]
-
-
-def propose(report: ColourReport | None, rig: Rig, path: Path | None,
-            node_settings: Mapping[int, dict[str, Any]]) -> Proposal | None:
-    """The rig with the new marker set, and every node with the very same."""
-    if report is None:
-        return None
-    after = msgspec.structs.replace(rig, markers=report.markers)
-    markers = msgspec.to_builtins(report.markers)
-    changes: list[Change] = [RigChange(rig, after, path, COLOURS.reason)]
-    shown = {f"{old.id}: colour": (old.display_rgb, new.display_rgb)
-             for old, new in zip(rig.markers.markers, report.markers.markers, strict=True)}
-    rows = [replace(row, swatches=shown.get(row.what)) for row in rig_rows(rig, after)]
-    for node in rig.nodes:
-        if node.node_id in node_settings:
-            before = node_settings[node.node_id]["markers"]
-            changes.append(NodeChange(node.node_id, {"markers": before}, {"markers": markers}))
-            rows.append(Row(f"colours in camera {node.name}", "the rig's" if before == msgspec.to_builtins(rig.markers)
-                            else "not the rig's", "the new ones"))
-        elif not node.text_datagrams:
-            rows.append(Row(f"colours in camera {node.name}", "not known", "not changed: the node does not answer"))
-    return Proposal(COLOURS.reason, report.verdict, tuple(rows), tuple(changes))
+        if self.result is None:
+            return super().view()
+        apart = self.result.separability.sentences
+        return replace(super().view(), hint="; ".join(apart[:3]) + "." if apart else "No two colours overlap.")

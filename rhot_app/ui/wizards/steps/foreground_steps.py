@@ -14,12 +14,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.proposal import Command, Proposal, Row
 from rhot_app.calibration.registry import FOREGROUND
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, told_apart, with_findings
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import Picture, ask_picture
-from rhot_app.ui.models.proposal import Command, Proposal, Row
 from rhot_app.ui.wizards.models.drawing import Layer
 from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Pictures, Step, StepView
 from rhot_node.detect.foreground import BackgroundSums, no_foreground, skin_mask
@@ -365,8 +365,9 @@ def propose(empty: EmptyStep, skin: SkinStep) -> Proposal | None:
     rows = [row for name in empty.nodes for row in (
         Row(f"{name}: background", _background(empty.before.get(name, {})), "learnt now"),
         Row(f"{name}: skin", str(empty.before.get(name, {}).get("skin", "none")), "learnt now"))]
-    return Proposal(FOREGROUND.reason, verdict, tuple(rows), (ForegroundChange(empty.nodes, empty.tried + skin.tried),),
-                    "Calibrate, Tracker chooses the bare hand.")
+    return Proposal(FOREGROUND.reason, verdict, tuple(rows),
+                    changes=(ForegroundChange(empty.nodes, empty.tried + skin.tried),),
+                    afterwards="Calibrate, Tracker chooses the bare hand.")
 
 
 def _background(known: dict[str, Any]) -> str:
