@@ -1,1 +1,1 @@
-"""The commands of the calibrations: arguments in, a report on standard output, a file only when it may be used."""
+"""One file per calibration: its command line, what it reports and what it proposes for the rig."""

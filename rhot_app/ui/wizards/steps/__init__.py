@@ -1,1 +1,1 @@
-"""The steps of each wizard without widgets: what they ask for, collect and find."""
+"""The steps of large wizards without widgets: what they ask for, collect and find."""
