@@ -81,7 +81,7 @@ ALIGNMENT = Calibration(
     "alignment", "Alignment with another tracker", "Where a Vive tracker's world is in the rig, from a movement of "
     "both.", "alignment with another tracker",
     Command("alignment", "where another tracker's world is in the rig, from two streams of one motion", ("tracker",),
-            "rhot_app.objects.alignment.alignment_command"))
+            "rhot_app.objects.alignment.calibration"))
 CERTIFICATE = Calibration(
     "certificate", "Certificate", "How good this rig is, measured as the thesis did, with 95 % intervals: five "
     "minutes.", "certificate")

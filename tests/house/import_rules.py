@@ -52,7 +52,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.calibration.commands": BELOW_ENGINE,  # they read logs
     "rhot_app.calibration.recorded_observations": BELOW_ENGINE,  # reads them for all
     "rhot_app.objects": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.calibration.verdict"),
-    "rhot_app.objects.alignment.alignment_command": BELOW_ENGINE,
+    "rhot_app.objects.alignment.calibration": BELOW_ENGINE,
     "rhot_app.state": ("rhot_node.wire.messages", "rhot_app.objects.state"),
     "rhot_app.latency": ("rhot_app.state",),
     "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.state"),

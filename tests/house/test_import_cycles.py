@@ -48,10 +48,15 @@ def refuse_circles(graph: Graph, what: str) -> None:
         pytest.fail(f"{what} need each other: " + " <- ".join(exc.args[1]))
 
 
+def is_command(module: str) -> bool:
+    """Whether only `__main__` imports it. The files of calibrations have what their wizards use, too."""
+    return module.endswith("_command") or (".commands." in module and not module.startswith("rhot_app.calibration."))
+
+
 def folder_of(module: str) -> str:
     """The folder of a module. Commands, which only `__main__` imports, are one; a module beside folders stands for
     itself, as one does that has a row of its own in the table."""
-    if module.endswith("_command") or ".commands." in module:
+    if is_command(module):
         return "commands"
     folder = module.rpartition(".")[0]
     is_folder = any(other.startswith(f"{module}.") for other in project())
@@ -61,7 +66,7 @@ def folder_of(module: str) -> str:
 
 def room_of(module: str) -> str:
     """The room of a module; commands are one; the folders of simulator and window are rooms of their own."""
-    if module.endswith("_command") or ".commands." in module:
+    if is_command(module):
         return "commands"
     found = room(module)
     if found not in ("rhot_app.simulator", "rhot_app.ui"):

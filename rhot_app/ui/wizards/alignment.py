@@ -17,8 +17,8 @@ from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QLineEdit, QPushBu
 
 from rhot_app.calibration.registry import ALIGNMENT
 from rhot_app.errors import CalibrationError, EngineError
-from rhot_app.objects.alignment.alignment_command import StreamRecording, propose, report, solve_recording
 from rhot_app.objects.alignment.alignment_file import Alignment, alignment_path, load_alignment
+from rhot_app.objects.alignment.calibration import StreamRecording, propose, report, solve_recording
 from rhot_app.objects.alignment.fit import LASTING_M, SEARCH_S
 from rhot_app.objects.alignment.report import FAIR_M, FAST_M_S, REACH_M, Coverage
 from rhot_app.state import HandState

@@ -14,8 +14,8 @@ from wizard_hand import RecordingAsker
 
 from rhot_app.calibration.verdict import Grade
 from rhot_app.geometry.transforms import inverse
-from rhot_app.objects.alignment.alignment_command import propose, solve_recording
 from rhot_app.objects.alignment.alignment_file import alignment_path, load_alignment, save_alignment
+from rhot_app.objects.alignment.calibration import propose, solve_recording
 from rhot_app.sources.poses.open_source import open_source
 from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.models.proposal import use_all

@@ -246,8 +246,8 @@ def test_a_drag_over_a_picture_is_in_its_own_pixels(open_sample):
     wall.set_pickable(True)
     view = wall.views["left"]
     hands.drag(view, view.to_widget(100, 60), view.to_widget(180, 120))
-    (camera, *box), = picked
-    assert camera == "left" and box == pytest.approx([100, 60, 80, 60], abs=2.0)
+    (picture, *box), = picked
+    assert picture.camera == "left" and box == pytest.approx([100, 60, 80, 60], abs=2.0)
 
 
 def test_a_silent_camera_is_named_in_its_picture(open_sample, asker):

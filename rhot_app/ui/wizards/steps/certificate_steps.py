@@ -154,7 +154,6 @@ def report(result: tuple[ProtocolFile, Certificate]) -> Report:
     """The lines as findings, and the certificate's own charts of what was moved through the volume."""
     from rhot_app.certificate.charts import chart_of
 
-
     charts = (chart_of(line) for line in result[1].lines if line.code in _CHARTED)
     return Report(verdict_of(result), charts=tuple(chart for chart in charts if chart is not None))
 
