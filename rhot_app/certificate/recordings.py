@@ -18,6 +18,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from rhot_app.errors import CertificateError, RecordingError
+from rhot_app.latency import latency_row
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig, with_tracker
 from rhot_app.recording.raw_log import LogReader
@@ -26,7 +27,6 @@ from rhot_app.state import LATENCY_STAGES
 from rhot_app.tracking.locate import locate_paired, rig_table
 from rhot_app.tracking.pairing import Paired, Pairing
 from rhot_app.tracking.rig_arrays import compile_rig
-from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.files import read_document, write_document
 
@@ -239,17 +239,13 @@ def read_latencies(path: Path, rig: Rig) -> Latencies:
 
     Raises CertificateError when it makes no state.
     """
-    from rhot_app.engine.offline.replay_summary import replay_states
-    from rhot_app.engine.pipeline import warm_up
+    from rhot_app.evaluation.track import states_of
 
     rig = rig if rig.tracker.kind == "classic" else with_tracker(rig, "classic")
     try:
         with contextlib.closing(LogReader(path)) as reader:
-            tracker = make_tracker(rig)
-            warm_up(tracker, rig)
-            rows = [[*(state.latency_s.get(name, np.nan) for name in LATENCY_STAGES),
-                     1e-9 * (state.t_receive_ns - state.t_master_ns)]
-                    for state in replay_states(reader, LogValidator(rig), tracker)]
+            rows = [[*latency_row(state), 1e-9 * (state.t_receive_ns - state.t_master_ns)]
+                    for state in states_of(reader, rig)]
     except RecordingError as exc:
         raise CertificateError(str(exc)) from exc
     rows = rows[min(len(rows) // 4, WARM_STATES):]

@@ -28,19 +28,19 @@ from rhot_app.certificate.recordings import (
 from rhot_app.evaluation.fault_injection import changed, lost
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
-from rhot_app.recording.raw_log import LogReader, Record
-from rhot_app.simulator.film.film import Report, for_each_camera
-from rhot_app.simulator.film.node_log import CABLE, T0_MASTER_NS, NodeSender, write_node_log
+from rhot_app.recording.raw_log import LogReader
+from rhot_app.simulator.film.detected import Sending, detected
+from rhot_app.simulator.film.film import for_each_camera
+from rhot_app.simulator.film.node_log import T0_MASTER_NS, write_node_log
 from rhot_app.simulator.film.points import LOG_NAME, PointNoise, write_points
-from rhot_app.simulator.film.scene_objects import MarkerPath, SceneObject
-from rhot_app.simulator.film.shot import Shot, make_renderer, make_shot
+from rhot_app.simulator.film.scene_objects import SceneObject
+from rhot_app.simulator.film.shot import Shot, make_shot
 from rhot_app.simulator.render.body import PALM_GROUP, POINT_M, SKIN
+from rhot_app.simulator.render.painter import PoseSource
 from rhot_app.simulator.scene.rigid_target import BALL_RADIUS_M, STICK_RGB, RigidTarget
-from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
+from rhot_app.simulator.scene.scene import Scene, build_rig
 from rhot_app.simulator.scene.scene_description import MarkerShow
 from rhot_app.sources.local_nodes import NodePorts
-from rhot_node.detect.image import from_i420
-from rhot_node.detectors import make_detector
 from rhot_node.wire.messages import MarkerObservation
 
 Array = NDArray[np.float64]
@@ -194,11 +194,11 @@ class _Screen:
 class _Flashing:
     """A `PoseSource` of a patch that is out of sight while its screen is dark, whole frames at a time."""
 
-    patch: MarkerPath
+    patch: PoseSource
     screen: _Screen
 
     def sample(self, times_s: Array) -> tuple[Array, Array]:
-        """As `MarkerPath.sample`; the times are those of one frame, whose middle row sees the patch."""
+        """As `PoseSource.sample`; the times are those of one frame, whose middle row sees the patch."""
         poses, angles = self.patch.sample(times_s)
         if not self.screen.lit(float(np.mean(times_s))):
             poses[:, 0, 3] += 50.0
@@ -211,8 +211,9 @@ def _record(shot: Shot, path: Path, screen: _Screen | None, *, sketched: bool) -
     rig = simulated_rig(shot.scene)
     about = {"simulated": shot.scene_object.name}
     if not sketched:
-        streams = for_each_camera(shot, functools.partial(_watch, rig, screen), None)
-        write_node_log(path, rig, about, [record for records in streams for record in records])
+        source = None if screen is None else _Flashing(shot.scene_object.source, screen)
+        streams = for_each_camera(shot, functools.partial(detected, Sending(rig, seed=0xCE48), source), None)
+        write_node_log(path, rig, about, [record for records, _ in streams for record in records])
         return
     work = path.with_suffix(".points")
     write_points(shot, work, PointNoise(loss=0.0))
@@ -235,24 +236,3 @@ def _as_lit(scene: Scene, times_s: list[Array], screen: _Screen, arrival_s: floa
     frame_s = float(mine_s[max(int(np.searchsorted(mine_s, ready_s, side="right")) - 1, 0)])
     return [marker if screen.lit(frame_s + 1e-9 * scene.row_time_ns * marker.y) else lost(marker.index)
             for marker in seen]
-
-
-def _watch(rig: Rig, screen: _Screen | None, shot: Shot, index: int, report: Report) -> list[Record]:
-    """One camera's pictures, what the node's detector finds in them, and what the node says of it."""
-    scene = shot.scene
-    detector, renderer = make_detector(node_settings(scene, index)), make_renderer(shot, index)
-    source = shot.scene_object.source
-    if screen is not None:
-        assert isinstance(source, MarkerPath)
-        source = _Flashing(source, screen)
-    sender = NodeSender(scene, rig, index, np.random.default_rng([scene.seed, index, 0xCE48]), CABLE)
-    times_ns = scene.frame_times_ns(index, shot.seconds)
-    records = list(sender.exchanges(1e-9 * times_ns[-1]))
-    for number, t_ns in enumerate(times_ns):
-        frame, _ = renderer.render(source, 1e-9 * t_ns, number)
-        seen = detector.detect(from_i420(frame, scene.preset.width, scene.preset.height))
-        record = sender.datagram(number, t_ns, seen)
-        if record is not None:
-            records.append(record)
-        report(number)
-    return records

@@ -11,26 +11,23 @@ import functools
 import hashlib
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
 import msgspec
-import numpy as np
 
 from rhot_app.project import Rig, load_rig
 from rhot_app.recording.raw_log import LogReader, Record
-from rhot_app.simulator.film.film import TRUTH_NAME, Progress, Report, for_each_camera, new_folder
+from rhot_app.simulator.film.detected import Sending, detected
+from rhot_app.simulator.film.film import TRUTH_NAME, Progress, for_each_camera, new_folder
 from rhot_app.simulator.film.ideal_observations import ORDINARY, ideal_observations
-from rhot_app.simulator.film.node_log import CABLE, Network, NodeSender, write_node_log
-from rhot_app.simulator.film.shot import RIG_NAME, Shot, make_renderer, make_shot, save_shot
-from rhot_app.simulator.film.truth import FrameTruth, Truth, load_truth, save_truth, true_object
-from rhot_app.simulator.scene.scene import Scene, node_settings
-from rhot_node.detect.image import from_i420
-from rhot_node.detectors import make_detector
+from rhot_app.simulator.film.node_log import CABLE, Network, write_node_log
+from rhot_app.simulator.film.shot import RIG_NAME, make_shot, save_shot
+from rhot_app.simulator.film.truth import Truth, load_truth, save_truth, true_object
+from rhot_app.simulator.scene.scene import Scene
 from rhot_node.files import read_input, resource_path
-from rhot_node.wire.messages import MarkerObservation
 
 LOG_NAME: Final = "take.rhotlog"
 
@@ -128,50 +125,16 @@ def _film(order: Order, place: Path, progress: Progress | None) -> None:
     with new_folder(place) as work:
         save_shot(shot, work)
         rig = load_rig(work / RIG_NAME)
+        sending = Sending(rig, order.network)
         if order.sketched:
-            streams = tuple(_sketch(rig, order.network, shot, index) for index in range(len(rig.nodes)))
+            found = [ideal_observations(shot, index) for index in range(len(rig.nodes))]
+            streams = tuple((sending.said(shot, index, seen), truth) for index, (seen, truth) in enumerate(found))
         else:
-            streams = for_each_camera(shot, functools.partial(_watch, rig, order.network), progress)
+            streams = for_each_camera(shot, functools.partial(detected, sending, None), progress)
         notes = {"simulated": shot.scene_object.name, "sources": _source_digest(order.sketched)}
         write_node_log(work / LOG_NAME, rig, notes, [record for records, _ in streams for record in records])
         truths = tuple(truth for _, truth in streams)
         save_truth(work / TRUTH_NAME, true_object(shot.scene_object, shot.seconds, truths))
-
-
-Stream = tuple[list[Record], FrameTruth]
-"""What one node says of a shot, and what was true of its frames."""
-
-
-def _watch(rig: Rig, network: Network, shot: Shot, index: int, report: Report) -> Stream:
-    """Pictures, and what the detector finds in them."""
-    scene, preset = shot.scene, shot.scene.preset
-    detector = make_detector(node_settings(scene, index))
-    renderer = make_renderer(shot, index)
-    seen, visible = [], []
-    for number, t_ns in enumerate(scene.frame_times_ns(index, shot.seconds)):
-        frame, fractions = renderer.render(shot.scene_object.source, 1e-9 * t_ns, number)
-        seen.append(detector.detect(from_i420(frame, preset.width, preset.height)))
-        visible.append(fractions.copy())
-        report(number)
-    times_s = 1e-9 * np.array(scene.frame_times_ns(index, shot.seconds))
-    return _say(rig, network, shot, index, seen), FrameTruth(times_s, np.array(visible))
-
-
-def _sketch(rig: Rig, network: Network, shot: Shot, index: int) -> Stream:
-    """No pictures."""
-    seen, truth = ideal_observations(shot, index)
-    return _say(rig, network, shot, index, seen), truth
-
-
-def _say(rig: Rig, network: Network, shot: Shot, index: int,
-         seen: Sequence[Sequence[MarkerObservation]]) -> list[Record]:
-    """One node's clock exchanges, and a datagram for every frame that is not lost on its way."""
-    rng = np.random.default_rng([shot.scene.seed, index, 0x7A4E])
-    voice = NodeSender(shot.scene, rig, index, rng, network)
-    times_ns = shot.scene.frame_times_ns(index, shot.seconds)
-    sent = [voice.datagram(number, t_ns, markers) for number, (t_ns, markers) in
-            enumerate(zip(times_ns, seen, strict=True))]
-    return [*voice.exchanges(1e-9 * times_ns[-1]), *(record for record in sent if record is not None)]
 
 
 def _motion_digest(motion: str) -> str:

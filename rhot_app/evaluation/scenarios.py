@@ -15,21 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from rhot_app.engine.offline.replay_summary import replay_states
-from rhot_app.engine.pipeline import warm_up
 from rhot_app.errors import SimulatorError
 from rhot_app.evaluation import fault_injection
 from rhot_app.evaluation.accuracy import Deviations, Figures, WornMarkers, axes_within, deviations, distances, worn_by
 from rhot_app.evaluation.data_sets import DataSet
 from rhot_app.evaluation.run import SETTLE_S
 from rhot_app.evaluation.score import VISIBLE_FRACTION, count_swaps, rms
-from rhot_app.evaluation.track import Timed, TrackedStates, tracked
+from rhot_app.evaluation.track import Timed, TrackedStates, states_of, tracked
 from rhot_app.hand.skeleton import WRIST_ROLE
 from rhot_app.project import Rig
 from rhot_app.recording.raw_log import Record, RecordKind
 from rhot_app.simulator.film.truth import Truth
-from rhot_app.sources.replay import LogValidator
-from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import Tracker
 
 Array = NDArray[np.float64]
@@ -155,11 +151,9 @@ def computing(take: DataSet, rig: Rig, minutes: float) -> Figures:
     """Time from a datagram's bytes to its state, and how memory grows after the first lap of a log that is repeated."""
     records = take.records()
     laps = max(2, round(60.0 * minutes / take.seconds))
-    tracker = make_tracker(rig)
-    warm_up(tracker, rig)
     first = _Lap(records)
     timed = Timed(first.watch(fault_injection.prolonged(records, laps)))
-    for _ in replay_states(timed, LogValidator(rig), tracker):
+    for _ in states_of(timed, rig):
         pass
     by_clock, of_processor = 1e6 * np.array(timed.compute_s), 1e6 * np.array(timed.cpu_s)
     return {"median_us": float(np.median(by_clock)), "p99_us": float(np.percentile(by_clock, 99.0)),

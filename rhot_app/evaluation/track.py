@@ -96,17 +96,22 @@ def rig_with(rig: Rig, settings: TrackerSettings) -> Rig:
     return msgspec.structs.replace(rig, tracker=settings)
 
 
+def states_of(records: Iterable[Record], rig: Rig, tracker: Tracker | None = None) -> Iterator[HandState]:
+    """What the rig's tracker, or another one, makes of a log's records, one by one. The first costs no compilation."""
+    chosen = make_tracker(rig) if tracker is None else tracker
+    warm_up(chosen, rig)
+    yield from replay_states(records, LogValidator(rig), chosen)
+
+
 def tracked(records: Iterable[Record], rig: Rig, tracker: Tracker | None = None) -> TrackedStates:
     """What the rig's tracker, or another one, makes of a log's records; as fast as it can, one thread.
 
     Raises SimulatorError when it makes nothing.
     """
-    chosen = make_tracker(rig) if tracker is None else tracker
-    warm_up(chosen, rig)
     states: list[HandState] = []
     display = Display(records, rig, states) if rig.tracker.kind == "estimator" else None
     timed = Timed(records if display is None else display)
-    states.extend(replay_states(timed, LogValidator(rig), chosen))  # one by one, as they come
+    states.extend(states_of(timed, rig, tracker))  # one by one, as they come
     return track_of(states, np.array(timed.compute_s), None if display is None else display.predicted())
 
 

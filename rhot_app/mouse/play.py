@@ -17,12 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.start import start_pose_file
-from rhot_app.engine.offline.replay_summary import replay_states
-from rhot_app.engine.pipeline import warm_up
 from rhot_app.estimation.se3 import exp_so3
 from rhot_app.evaluation.data_sets import Order, Watch, data_set, data_sets_folder
 from rhot_app.evaluation.searched_nodes import SearchedNodes
-from rhot_app.evaluation.track import Timed
+from rhot_app.evaluation.track import Timed, states_of
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS, TIP_ROLES, HandPose
@@ -37,7 +35,6 @@ from rhot_app.simulator.scene.motion import WRIST_BELOW_CENTRE_M, Sway
 from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_defaults
 from rhot_app.sources.local_nodes import NodePorts
-from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.scene import make_tracker
 from rhot_node.detect.foreground import learn_background, skin_foreground
@@ -160,10 +157,8 @@ def _markers(set_up: SetUp, scene: Scene, motion: Path, seconds: float, blocked_
     second = data.rig.nodes[1].node_id
     records = [one for one in data.records() if one.node_id != second or one.kind is not RecordKind.DATAGRAM
                or 1e-9 * (one.t_master_ns - T0_MASTER_NS) < blocked_s]
-    tracker = make_tracker(rig)
-    warm_up(tracker, rig)
     timed = Timed(records)
-    states = list(replay_states(timed, LogValidator(rig), tracker))
+    states = list(states_of(timed, rig))
     times_s = 1e-9 * np.array([state.t_master_ns - T0_MASTER_NS for state in states])
     roles = [marker.role for marker in rig.markers.markers]
     tips = truth.markers_at(times_s)[:, [roles.index(role) for role in TIP_ROLES]]

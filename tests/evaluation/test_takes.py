@@ -14,10 +14,11 @@ from rhot_app.errors import SimulatorError
 from rhot_app.evaluation import data_sets as takes
 from rhot_app.evaluation import fault_injection as alter
 from rhot_app.evaluation.compare import judge, orders
-from rhot_app.evaluation.data_sets import LOG_NAME, DataSet, Order, Stream, data_set
+from rhot_app.evaluation.data_sets import LOG_NAME, DataSet, Order, data_set
 from rhot_app.evaluation.track import tracked
 from rhot_app.project import TrackerSettings
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
+from rhot_app.simulator.film.detected import Stream
 from rhot_app.simulator.film.film import TRUTH_NAME, Report
 from rhot_app.simulator.film.node_log import CABLE, Network
 from rhot_app.simulator.film.shot import Shot
