@@ -111,9 +111,9 @@ def proposed(reason: str, report: Report, before: Rig, after: Rig, *, changes: t
 
 def rows_of(before: Rig, after: Rig, figures: Iterable[Figure] = ()) -> tuple[Row, ...]:
     """Each of the result's `figures` beside the rig's of the same name; then every other one in which the rigs differ,
-    in the order of the rig file. A figure that one rig lacks is a dash."""
-    old, new = ({one.name: one.text for one in figures_of(rig)} for rig in (before, after))
-    rows = {one.name: Row(one.name, old.get(one.name, ""), one.text) for one in figures if one.name}
+    in the order of the rig file. What stays as it is has no row; a figure that one rig lacks is a dash."""
+    old, new = ({one.name: one.brief for one in figures_of(rig)} for rig in (before, after))
+    rows = {one.name: Row(one.name, old.get(one.name, ""), one.brief) for one in figures if one.name}
     names = [name for name in (*new, *(name for name in old if name not in new)) if name not in rows]
     others = (Row(name, old.get(name, "–"), new.get(name, "–")) for name in names)
-    return (*rows.values(), *(row for row in others if row.changed))
+    return tuple(row for row in (*rows.values(), *others) if row.changed)

@@ -56,6 +56,16 @@ class Figure:
         """E.g. "534.3 ± 0.5, 534.1 ± 0.5 px"."""
         return f"{self.number} {self.unit}".rstrip() if any(map(str.isdigit, self.number)) else self.number
 
+    @property
+    def brief(self) -> str:
+        """The same in a narrow column: several numbers with the largest standard deviation of theirs, if they are of
+        one unit."""
+        values, spreads = _several(self.value), [sd for sd in _several(self.sd) if sd]
+        if isinstance(self.value, str) or len(values) < 2:
+            return self.text
+        more = f" ± {max(spreads):.{self.decimals}f}" if self.unit and spreads else ""
+        return f"{', '.join(_number(value, None, self.decimals) for value in values)}{more} {self.unit}".rstrip()
+
     def fields(self) -> dict[str, Any]:
         """What JSON says of it."""
         found: dict[str, Any] = {}
@@ -156,7 +166,7 @@ def nested(items: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _several(value: Any) -> list[float | None]:
+def _several(value: Any) -> list[Any]:
     known = plain(value)
     return [] if known is None else known if isinstance(known, list) else [known]
 

@@ -252,11 +252,6 @@ def report(result: StereoReport, frame: WorldFrame | None = None) -> Report:
             "views_used": 0, **fields})
     squares, board, ruler, (by_rig, by_noise) = figures.squares, figures.board_errors, figures.ruler, figures.error_m
     said = [distance_figure(pair.first, pair.second, pair.baseline_m, pair.baseline_std_m) for pair in figures.pairs]
-    cameras = []
-    for camera in figures.cameras:
-        shown, row = _lens(camera)
-        said += shown
-        cameras.append(row)
     said += [
         Figure("corners, rms", figures.rms_px, "px", key="rms_px"),
         Figure("shots", len(figures.shots), decimals=0, key="views_used"),
@@ -273,6 +268,11 @@ def report(result: StereoReport, frame: WorldFrame | None = None) -> Report:
                     key="expected_error_mm.by_calibration"),
              Figure(f"the same by {MARKER_NOISE_PX:g} px of noise", 1e3 * by_noise, "mm",
                     key="expected_error_mm.by_marker_noise")]
+    cameras = []
+    for camera in figures.cameras:
+        lens, row = _lens(camera)
+        said += lens
+        cameras.append(row)
     tables = [Table("cameras", tuple(cameras)), Table("pairs", tuple(_pair(pair) for pair in figures.pairs))]
     if frame is not None:
         fields["table.rms_px"] = frame.rms_px

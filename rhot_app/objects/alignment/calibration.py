@@ -237,11 +237,11 @@ def propose(result: AlignmentResult, before: Alignment | None, path: Path | None
         [1e3 * value for value in before.rig_from_foreign.translation_m],
         [1e3 * value for value in before.tracker_from_body.translation_m], 1e3 * before.time_offset_s,
         None if before.rms_m is None else 1e3 * before.rms_m)
-    said, known = report(result.report), {one.name: one.text for one in old}
+    said, known = report(result.report), {one.name: one.brief for one in old}
     drift = result.drift
     state = ("none" if before is None else "not tested" if drift is None else
              f"stale: {1e3 * drift.distance_m:.1f} mm off" if drift.stale else "holds")
-    rows = tuple(Row(one.name, known.get(one.name, ""), one.text) for one in said.figures if one.name)
+    rows = tuple(Row(one.name, known.get(one.name, ""), one.brief) for one in said.figures if one.name)
     return Proposal(ALIGNMENT.reason, said.verdict, (Row("alignment in use", state, "just solved"), *rows),
                     changes=(AlignmentChange(before, to_alignment(result.report), path),),
                     afterwards="" if path is None else f"It is in {path.name}, beside the rig.")

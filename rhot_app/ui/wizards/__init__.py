@@ -9,11 +9,11 @@ A calibration is two files:
 * ``rhot_app/ui/wizards/NAME.py``: ``make_wizard(context) -> Definition``, with the steps and pages that are its own.
 
 A step (`models.step.Step`) knows no widgets: its state, the sentence that says what to do now, the bars, whether it is
-done. `see` looks at pictures in a worker's thread and changes nothing; everything else is called in the window's thread
-and must be quick. A page (`framework.page.Page`) hands what a person does to its step and emits `changed`; a step
-without controls needs no class: ``Page(step)``. Movements are recorded by `framework.movement_page.Movements`, boards
-found by `models.board_form.BoardStep`, results computed by `models.step.SolveStep`, and
-`framework.definition.accept_result` makes the last page: before and after.
+done. `observe` looks at pictures in a worker's thread and changes nothing; `accept_observation` gets what it found. All
+but `observe` is called in the window's thread and must be quick. A page (`framework.page.Page`) hands what a person
+does to its step and emits `changed`; a step without controls needs no class: ``Page(step)``. Movements are recorded by
+`framework.movement_page.Movements`, boards found by `models.board_form.BoardStep`, results computed by
+`models.step.SolveStep`, and `framework.definition.accept_result` makes the last page: before and after.
 
 To add one:
 
@@ -28,5 +28,5 @@ process of its own (`rhot_app.ui.backend.solver`) with remaining time and cancel
 `context.connect()` gives is used in workers only: `Job`, `Definition.put_back`.
 
 Live pictures (`rhot_app.ui.backend.feed`) are the nodes' stills in full size; `framework.work.PictureWorker` calls
-`see` with the newest of all cameras. What a step draws over them is in `models.drawing`, in px of the full frame.
+`observe` with the newest of all cameras. What a step draws over them is in `models.drawing`, in px of the full frame.
 """

@@ -91,12 +91,12 @@ class DistanceStep(Step):
         seen = np.array([x[0] - x[1] for x in pixels], dtype=np.float64)
         return seen[np.isfinite(seen)]
 
-    def see(self, pictures: Pictures) -> dict[str, tuple[Picture, tuple[MarkerObservation, ...]]]:
+    def observe(self, pictures: Pictures) -> dict[str, tuple[Picture, tuple[MarkerObservation, ...]]]:
         """The markers in each picture."""
         return {name: (picture, self._detectors.setdefault(name, FastDetector(self.rig.markers)).detect(
             from_bgr(picture.bgr))) for name, picture in pictures.items()}
 
-    def take(self, seen: dict[str, tuple[Picture, tuple[MarkerObservation, ...]]]) -> None:
+    def accept_observation(self, seen: dict[str, tuple[Picture, tuple[MarkerObservation, ...]]]) -> None:
         """The markers seen last."""
         self._seen = seen
 

@@ -51,11 +51,11 @@ class LengthsStep(Step):
         """The person leaves the lengths unproven, or not after all."""
         self.skipped = on
 
-    def see(self, pictures: Pictures) -> Pictures:
+    def observe(self, pictures: Pictures) -> Pictures:
         """Nothing to look for: a person marks the ends."""
         return pictures
 
-    def take(self, seen: Pictures) -> None:
+    def accept_observation(self, seen: Pictures) -> None:
         """The pictures that Space would hold."""
         self._live = seen
 

@@ -155,17 +155,17 @@ class LensShowStep(FilmedStep):
         """Whether anything was taken."""
         return bool(self.views)
 
-    def see(self, pictures: Pictures) -> tuple[str, BoardObservation, float]:
+    def observe(self, pictures: Pictures) -> tuple[str, BoardObservation, float]:
         """The board in the picture, and when that was taken, s of the node's clock."""
         camera = self.camera
         return (camera, self._search.look({camera: pictures[camera]}, self.board),
                 1e-9 * pictures[camera].t_node_ns)
 
-    def take(self, seen: tuple[str, BoardObservation, float]) -> None:
+    def accept_observation(self, seen: tuple[str, BoardObservation, float]) -> None:
         """Offer what is seen; the guide decides and says what to do."""
         camera, look, t_s = seen
         if self._guide is not None and (camera, look.board) == self._of and not self.films.paths:
-            self._search.take(look)
+            self._search.accept_observation(look)
             view = look.views[camera]
             self._seen = view, t_s
             if self._search.size_finding(self.board) is None:
@@ -244,7 +244,7 @@ class LensSolveStep(SolveStep):
         self.cameras = (self._show.camera,)
         super().enter()
 
-    def see(self, pictures: Pictures) -> dict[str, Picture]:
+    def observe(self, pictures: Pictures) -> dict[str, Picture]:
         """The pictures as the new lens straightens them, when that is asked for."""
         result = self.result
         if result is None or not self.straighten:
@@ -252,7 +252,7 @@ class LensSolveStep(SolveStep):
         return {name: replace(picture, bgr=straightened(picture.bgr, result.intrinsics))
                 for name, picture in pictures.items() if picture.bgr.shape[1::-1] == result.size}
 
-    def take(self, seen: dict[str, Picture]) -> None:
+    def accept_observation(self, seen: dict[str, Picture]) -> None:
         """The straightened pictures."""
         self._straight = seen
 
@@ -324,7 +324,7 @@ class LensResultPage(Page):
         self.square.setToolTip("Forces one focal length for both directions, as nearly every sensor has it. Fewer "
                                "numbers to find need fewer views.")
         self.square.toggled.connect(self._square)
-        self.table = FigureTable()
+        self.table = FigureTable(3)
         self.table.setToolTip("How well each view fits. Arrows in the picture are the mean residual of each part: "
                               "a pattern in them is something that the lens model does not explain.")
         self.column.addWidget(self.straighten)

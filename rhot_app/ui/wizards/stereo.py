@@ -67,14 +67,14 @@ class BoardFinder(Step):
         assert board is not None, "the first step is not done without a board"
         return board
 
-    def see(self, pictures: Pictures) -> BoardObservation:
+    def observe(self, pictures: Pictures) -> BoardObservation:
         """The board in each picture."""
         return self.search.look(pictures, self.board)
 
-    def take(self, seen: BoardObservation) -> None:
+    def accept_observation(self, seen: BoardObservation) -> None:
         """What the cameras see now; a camera without a picture sees nothing."""
         if seen.board == self.board:
-            self.search.take(seen)
+            self.search.accept_observation(seen)
             self.seen = {name: seen.views.get(name) for name in self.cameras or ()}
 
 
@@ -124,10 +124,10 @@ class ShowStep(BoardFinder, FilmedStep):
         """Whether anything was kept."""
         return self._collector is not None and bool(self.views.shots)
 
-    def take(self, seen: BoardObservation) -> None:
+    def accept_observation(self, seen: BoardObservation) -> None:
         """Offer what is seen; the collector decides."""
         if not self.films.paths:
-            super().take(seen)
+            super().accept_observation(seen)
             self._put(still=False)
 
     def capture(self) -> bool:

@@ -59,10 +59,10 @@ class CollectStep(Step):
         self.captured = []
         self.enough = 3
 
-    def see(self, pictures):
+    def observe(self, pictures):
         return {name: (picture, brightest(picture)) for name, picture in pictures.items()}
 
-    def take(self, seen):
+    def accept_observation(self, seen):
         self.seen = seen
 
     def capture(self):

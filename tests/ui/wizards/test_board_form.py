@@ -63,7 +63,7 @@ def test_the_board_is_confirmed_by_what_is_seen(scene):
     step = BoardStep(MEASURED)
     assert not step.view().done and step.view().may_go_on, "no tick before anything was seen"
     assert "Show the board" in step.view().sentence
-    step.take(step.see(scene.pictures()))
+    step.accept_observation(step.observe(scene.pictures()))
     view = step.view()
     assert "left and right" in view.sentence and view.done
     dots = next(mark for mark in view.annotated["left"].overlay if isinstance(mark, Dots))
@@ -75,29 +75,29 @@ def test_the_board_is_confirmed_by_what_is_seen(scene):
 def test_a_smaller_count_is_found_out(scene):
     step = BoardStep(BoardFields(cols=8, square_mm=25.0))
     for _ in range(3):
-        step.take(step.see(scene.pictures()))
+        step.accept_observation(step.observe(scene.pictures()))
     assert "9x6" in step.view().hint
-    seen_before = step.see(scene.pictures())
+    seen_before = step.observe(scene.pictures())
     step.change(BoardFields(cols=9, square_mm=25.0))
-    step.take(seen_before)
+    step.accept_observation(seen_before)
     assert step.view().hint == "", "what was seen of another board is past"
 
 
 def test_squares_that_go_on_forbid_the_count(scene):
     step = BoardStep(MEASURED)
-    sight = step.see(scene.pictures())
+    sight = step.observe(scene.pictures())
     for _ in range(3):
-        step.take(replace(sight, beyond=(Beyond(column=True, row=False),) * 2))
+        step.accept_observation(replace(sight, beyond=(Beyond(column=True, row=False),) * 2))
     view = step.view()
     assert not view.done and "Count" in view.sentence and "10x6" in view.hint
 
 
 def test_a_larger_count_is_explained(scene):
     step = BoardStep(BoardFields(cols=10, rows=7, square_mm=25.0))
-    step.take(step.see(scene.pictures()))
+    step.accept_observation(step.observe(scene.pictures()))
     assert "seems to have 9x6" in step.view().hint
     scene.world_from_board = None
-    step.take(step.see(scene.pictures()))
+    step.accept_observation(step.observe(scene.pictures()))
     assert "seems to have 9x6" in step.view().hint, "the reason is looked for now and then only"
 
 
@@ -107,7 +107,7 @@ def test_a_board_without_a_right_way_up_is_told():
 
 def test_a_board_that_nobody_measured_is_shown_but_not_done(scene):
     step = BoardStep(BoardFields())
-    step.take(step.see(scene.pictures()))
+    step.accept_observation(step.observe(scene.pictures()))
     view = step.view()
     assert not view.may_go_on and "Measure the squares" in view.sentence
     assert all(view.annotated[name].overlay for name in ("left", "right")), "the person sees that it is the right one"

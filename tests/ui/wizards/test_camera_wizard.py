@@ -126,7 +126,7 @@ def test_a_camera_that_gives_no_picture_is_not_good(asker):
     step = SettingsStep(CameraChoices(asker.rig.nodes, asker.told), asker.rig.markers)
     for number in range(12):
         shown = {"left": Picture("left", painted(asker.rig), number, number * 30_000_000, 1 + number * 400_000_000)}
-        step.take(step.see(shown))
+        step.accept_observation(step.observe(shown))
         if number == 5:
             assert step.view().verdict.acceptable and not step.view().may_go_on, "the other one may be slow"
     assert step.view().verdict.codes >= {"no_picture"} and not step.view().done

@@ -41,7 +41,7 @@ def look(step: PickStep | BoundsStep | SeparationStep, times: int = 4, light: tu
     """Let a step see some pictures by a light."""
     for number in range(times):
         image = frame(number % 3, light)
-        step.take(step.see({"left": Picture("left", image, number, number, number)}))
+        step.accept_observation(step.observe({"left": Picture("left", image, number, number, number)}))
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +107,7 @@ def test_the_masks_page_says_why_the_chosen_marker_is_not_found_or_in_doubt(
     bounds.chosen = "ring"
     paints = {name: rgb for name, rgb in {**PAINTS, **change}.items() if rgb is not None}
     image = to_bgr(picture(paints, background=(60, 62, 66)))
-    bounds.take(bounds.see({"left": Picture("left", image, 0, 0, 0)}))
+    bounds.accept_observation(bounds.observe({"left": Picture("left", image, 0, 0, 0)}))
     hint = bounds.view().hint
     assert all(words in hint for words in said) and ("left: " in hint) == bool(said)
 

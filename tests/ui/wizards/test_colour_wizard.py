@@ -74,7 +74,7 @@ def picks(scene, rig):
 
 
 def look(step, scene):
-    step.take(step.see(scene.at_rest))
+    step.accept_observation(step.observe(scene.at_rest))
 
 
 def click_at(hands, camera, x, y, to=None):
@@ -316,9 +316,9 @@ def test_two_markers_of_one_colour_are_refused_and_undo_mends_it(picks):
 
 def test_a_click_is_read_in_the_picture_that_was_clicked(picks, scene):
     rotated = dict(zip(NAMES, [PAINTS[name] for name in (*NAMES[1:], NAMES[0])], strict=True))
-    late = picks.see(PaintScene(rotated).at_rest)
+    late = picks.observe(PaintScene(rotated).at_rest)
     assert picks.capture()
-    picks.take(late)  # looked at while the pictures were held
+    picks.accept_observation(late)  # looked at while the pictures were held
     assert picks.pick(picks.held["left"], *PaintScene.where("ring"), 0.0, 0.0), picks.problem
     shown = picks.markers.markers[picks.base.ids.index(NAMES[0])].display_rgb
     assert np.abs(np.subtract(shown, PAINTS["ring"])).max() < 40
@@ -327,12 +327,12 @@ def test_a_click_is_read_in_the_picture_that_was_clicked(picks, scene):
 def test_a_camera_that_does_not_find_a_marker_is_named_with_the_test_that_refuses_it(picks, scene):
     other = PaintScene({name: rgb for name, rgb in PAINTS.items() if name != "ring"}, background=(60, 62, 66))
     seen = {"left": scene.at_rest["left"], "right": other.at_rest["right"]}
-    picks.take(picks.see(seen))
+    picks.accept_observation(picks.observe(seen))
     pick(picks, "ring")
     picks.chosen = SKIN
     x, y = on_skin("thumb")
     assert picks.pick(picks.masked["left"].picture, x - 4.0, y, 8.0, 20.0), picks.problem
-    picks.take(picks.see(seen))
+    picks.accept_observation(picks.observe(seen))
     hint = picks.view().hint
     assert all(word in hint for word in ("right", "ring", "not found")) and "left" not in hint
 

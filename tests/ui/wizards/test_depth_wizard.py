@@ -105,7 +105,7 @@ def test_the_chosen_marker_is_ringed_where_it_is_in_the_picture_shown(marker):
     for number in range(6):
         pictures = {name: Picture(name, scene.draw(node_id), number, 0, number)
                     for name, node_id in (("left", 1), ("right", 2))}
-        step.take(step.see(pictures))
+        step.accept_observation(step.observe(pictures))
         for name, annotated in step.view().annotated.items():
             assert annotated.picture is pictures[name]
             (dots,) = [mark for mark in annotated.overlay if isinstance(mark, Dots)]

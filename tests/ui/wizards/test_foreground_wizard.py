@@ -190,7 +190,7 @@ def both_learnt(nodes):
         nodes.hand = hand
         step.begin()
         step.finish(step.learn(nodes.command))
-    skin.take(skin.see(dict.fromkeys(cameras)))
+    skin.accept_observation(skin.observe(dict.fromkeys(cameras)))
     return propose(empty, skin)
 
 

@@ -65,7 +65,7 @@ def test_from_the_board_to_a_saved_lens(hands, scene):
     assert any(isinstance(mark, Line) for mark in wall["left"].overlay), "residuals are drawn"
     assert hands.window.page.table.rowCount() >= 10
     hands.next()
-    assert hands.window.page.table.item(1, 1).text() == "572.0, 572.0 px"
+    assert hands.window.page.table.item(0, 1).text() == "572.0, 572.0 px"
     hands.use()
     assert "then stereo" in hands.hint
     left, right = load_rig(hands.path).nodes
@@ -88,11 +88,11 @@ def steps():
 def test_space_takes_a_view_and_undo_gives_it_back(steps, scene):
     _, step = steps
     scene.place(*PLACES[0])
-    step.take(step.see(scene.pictures()))
+    step.accept_observation(step.observe(scene.pictures()))
     assert step.capture() and len(step.views) == 1
     assert not step.capture() and len(step.views) == 1, "the same view again adds nothing"
     scene.world_from_board = None
-    step.take(step.see(scene.pictures()))
+    step.accept_observation(step.observe(scene.pictures()))
     assert step.seen is None and not step.capture()
     assert step.undo() and step.views == () and not step.view().may_go_on
 
@@ -100,28 +100,28 @@ def test_space_takes_a_view_and_undo_gives_it_back(steps, scene):
 def test_a_corrected_square_keeps_the_views_and_a_wrong_board_is_named(steps, scene):
     board, step = steps
     scene.place(*PLACES[0])
-    step.take(step.see(scene.pictures()))
+    step.accept_observation(step.observe(scene.pictures()))
     assert step.capture()
     board.change(msgspec.structs.replace(board.fields, square_mm=24.6))
     step.enter()
     assert len(step.views) == 1 and step.board.square_m == pytest.approx(0.0246)
     board.change(msgspec.structs.replace(board.fields, cols=10, rows=7))
     step.enter()
-    step.take(step.see(scene.pictures()))
+    step.accept_observation(step.observe(scene.pictures()))
     assert step.views == () and "seems to have 9x6" in step.view().hint
 
 
 def test_another_camera_begins_anew(steps, scene):
     board, step = steps
     scene.place(*PLACES[0])
-    step.take(step.see(scene.pictures()))
+    step.accept_observation(step.observe(scene.pictures()))
     assert step.capture()
-    of_left = step.see(scene.pictures())
+    of_left = step.observe(scene.pictures())
     board.choose("right")
     step.enter()
-    step.take(of_left)
+    step.accept_observation(of_left)
     assert step.camera == "right" and step.views == () and step.seen is None
-    step.take(step.see(scene.pictures()))
+    step.accept_observation(step.observe(scene.pictures()))
     assert step.capture() and len(step.views) == 1
 
 

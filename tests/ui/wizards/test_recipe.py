@@ -36,7 +36,7 @@ def bench(make_bench, tmp_path, monkeypatch):
 
 def test_a_step_is_tested_without_a_window():
     step = toy.GreyStep()
-    step.take(80.0)
+    step.accept_observation(80.0)
     assert [step.capture() for _ in range(3)] == [True] * 3
     assert step.view().done and toy_calibration.mean_level(step.levels, progress=lambda text, fraction: None) == 80.0
 

@@ -151,7 +151,7 @@ def shown(compiled):
     show.enter()
     for place in PLACES:
         scene.place(*place)
-        show.take(show.see(scene.pictures()))
+        show.accept_observation(show.observe(scene.pictures()))
         show.capture()
     assert show.view().done, show.view()
     return show
@@ -169,7 +169,7 @@ def test_a_corrected_square_keeps_the_shots(compiled):
     show = ShowStep(board, CAMERAS)
     show.enter()
     scene.place(*PLACES[0])
-    show.take(show.see(scene.pictures()))
+    show.accept_observation(show.observe(scene.pictures()))
     assert show.capture()
     board.change(replace_fields(board.fields, square_mm=24.6))
     show.enter()
@@ -187,8 +187,8 @@ def test_a_wrong_board_is_named_where_it_is_shown_and_gives_no_shots(compiled, c
     show.enter()
     for place in PLACES[:3]:
         scene.place(*place)
-        seen = show.see(scene.pictures())
-        show.take(replace(seen, beyond=(Beyond(column=True, row=False),) * 2) if cols == 9 else seen)
+        seen = show.observe(scene.pictures())
+        show.accept_observation(replace(seen, beyond=(Beyond(column=True, row=False),) * 2) if cols == 9 else seen)
     assert said in show.view().hint and not show.capture() and not show.view().may_go_on
 
 
@@ -219,7 +219,7 @@ def test_undo_forgets_the_last_shot_and_another_board_all(scene):
     show.enter()
     for count, place in enumerate(PLACES[:2], 1):
         scene.place(*place)
-        show.take(show.see(scene.pictures()))
+        show.accept_observation(show.observe(scene.pictures()))
         show.capture()
         assert len(show.views.shots) == count
     first = show.views.shots[0]
@@ -234,7 +234,7 @@ def test_a_ruler_needs_both_ends_in_two_pictures():
     step = LengthsStep(CAMERAS)
     assert not step.view().may_go_on and step.known.ruler is None
     step.set_lengths(0.0, 200.0)
-    step.take({name: Picture(name, blank, 1, 0, 0) for name in CAMERAS})
+    step.accept_observation({name: Picture(name, blank, 1, 0, 0) for name in CAMERAS})
     assert step.capture() and not step.view().passable
     for camera, x in (("left", 100.0), ("left", 300.0), ("right", 60.0)):
         step.pick(camera, x, 240.0)

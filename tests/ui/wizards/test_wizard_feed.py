@@ -56,7 +56,7 @@ class Counting(Step):
 
     watches = True
 
-    def see(self, pictures):
+    def observe(self, pictures):
         time.sleep(0.02)
         return {name: picture.number for name, picture in pictures.items()}
 
@@ -132,7 +132,7 @@ def test_a_look_that_fails_does_not_end_the_live_view(feed):
     class Clumsy(Counting):
         looks = 0
 
-        def see(self, pictures):
+        def observe(self, pictures):
             self.looks += 1
             raise ValueError("a strange picture")
 

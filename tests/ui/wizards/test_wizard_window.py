@@ -94,13 +94,13 @@ def test_what_is_drawn_was_found_in_the_very_picture_that_is_shown(open_sample):
     hands = open_sample()
     hands.window.page.box.setValue(9)
     hands.next()
-    see, feed = hands.window.step.see, hands.window.feed
+    observe, feed = hands.window.step.observe, hands.window.feed
 
     def slow(pictures):
         eventually(lambda: all(feed.newest(name).number > picture.number for name, picture in pictures.items()))
-        return see(pictures)
+        return observe(pictures)
 
-    hands.window.step.see = slow
+    hands.window.step.observe = slow
     numbers, views = {}, hands.frame.grid.views
 
     def drawn():

@@ -29,10 +29,10 @@ class GreyStep(Step):
         self.now = None
         self.levels = ()
 
-    def see(self, pictures):
+    def observe(self, pictures):
         return float(sum(picture.bgr.mean() for picture in pictures.values()) / len(pictures))
 
-    def take(self, seen):
+    def accept_observation(self, seen):
         self.now = seen
 
     def capture(self):

@@ -164,10 +164,11 @@ class RowTable(QTableWidget):
 
 
 class FigureTable(QTableWidget):
-    """The figures of a report's table; its first column is what they are of."""
+    """The first `columns` of a report's table, by default all; what its figures are of stands first."""
 
-    def __init__(self) -> None:
+    def __init__(self, columns: int | None = None) -> None:
         super().__init__()
+        self._columns = columns
         self.verticalHeader().setVisible(False)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
@@ -188,6 +189,7 @@ class FigureTable(QTableWidget):
             return
         self._shown = table
         heads, texts = (table.heads, table.texts) if table is not None else ((), [])
+        heads, texts = heads[:self._columns], [row[:self._columns] for row in texts]
         self.setColumnCount(len(heads))
         self.setHorizontalHeaderLabels(list(heads))
         self.setRowCount(len(texts))

@@ -151,7 +151,7 @@ class WizardWindow(ToolWindow):
         """What was seen in the newest pictures; what the step says to it; the pictures."""
         seen = self.picture_worker.found(self.step)
         if seen is not None:
-            self.step.take(seen)
+            self.step.accept_observation(seen)
             self._dirty = True
         now = time.monotonic()
         if self._dirty or now >= self._next_show:

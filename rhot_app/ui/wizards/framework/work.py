@@ -171,7 +171,7 @@ class PictureWorker:
         if not pictures or any(picture is last.get(name) for name, picture in pictures.items()):
             return False
         try:
-            seen = step.see(pictures)
+            seen = step.observe(pictures)
         except Exception:  # one strange picture must not end the live view; the log has the whole story
             log.exception("a picture could not be looked at")
             seen = None

@@ -119,7 +119,7 @@ class BoardSearch:
         return BoardObservation(board, pictures, views,
                                 missing=why_missing(to_gray(next(iter(pictures.values())).bgr), board))
 
-    def take(self, seen: BoardObservation) -> None:
+    def accept_observation(self, seen: BoardObservation) -> None:
         """What a look has seen."""
         self.pictures, self.views = seen.pictures, seen.views
         self.recognised = self.recognised or any(view is not None for view in seen.views.values())
@@ -196,15 +196,15 @@ class BoardStep(Step):
         if before is None or self.board is None or not same_pattern(before, self.board):
             self.forget_views()
 
-    def see(self, pictures: Pictures) -> BoardObservation | None:
+    def observe(self, pictures: Pictures) -> BoardObservation | None:
         """Look for the board in each picture."""
         board = self.board
         return None if board is None else self._search.look(pictures, board)
 
-    def take(self, seen: BoardObservation) -> None:
+    def accept_observation(self, seen: BoardObservation) -> None:
         """Where the board was seen."""
         if seen.board == self.board:
-            self._search.take(seen)
+            self._search.accept_observation(seen)
 
     def view(self) -> StepView:
         """The question, and whether the answer fits what is seen."""

@@ -1,7 +1,7 @@
 """One step of a wizard without its widgets: what to do now, what is seen, whether it is done.
 
-The window calls `see` in a worker's thread and everything else in its own; only `see` may take longer than a few
-milliseconds, and it must not change the step.
+The window calls `observe` in a worker's thread and everything else in its own; only `observe` may take longer than a
+few milliseconds, and it must not change the step.
 """
 
 from __future__ import annotations
@@ -92,7 +92,8 @@ class StepView:
 
 class Step:
     """Base of all steps. `title` stands in the list at the left; `cameras` are those whose pictures are shown (None:
-    all of the rig's); `watches` says whether `see` wants pictures; `captures` whether the space bar means something."""
+    all of the rig's); `watches` says whether `observe` wants pictures; `captures` whether the space bar means
+    something."""
 
     title = ""
     cameras: tuple[str, ...] | None = None
@@ -106,12 +107,12 @@ class Step:
         """What to show now; called many times a second."""
         return StepView(self.title)
 
-    def see(self, pictures: Pictures) -> Any:
-        """Look at pictures, in a worker's thread; what is returned is handed to `take`."""
+    def observe(self, pictures: Pictures) -> Any:
+        """Look at pictures, in a worker's thread; what is returned is handed to `accept_observation`."""
         return None
 
-    def take(self, seen: Any) -> None:
-        """What `see` has found."""
+    def accept_observation(self, seen: Any) -> None:
+        """What `observe` has found."""
 
     def capture(self) -> bool:
         """Space: keep what is seen now; whether something was kept."""

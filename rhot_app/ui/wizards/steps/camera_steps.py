@@ -277,13 +277,13 @@ class SettingsStep(Step):
         """Whether anything was changed."""
         return bool(self.choices.changed)
 
-    def see(self, pictures: Pictures) -> dict[str, PictureAdvice]:
+    def observe(self, pictures: Pictures) -> dict[str, PictureAdvice]:
         """Advice on each picture."""
         now, grey = self._sent, dict(self._grey)
         return {name: self._eyes[name].look(picture, now[self._ids[name]], grey.get(name))
                 for name, picture in pictures.items() if name in self._eyes}
 
-    def take(self, seen: dict[str, PictureAdvice]) -> None:
+    def accept_observation(self, seen: dict[str, PictureAdvice]) -> None:
         """The newest advice."""
         self._looks = {**self._looks, **seen}
         if seen and not self._last_ns:

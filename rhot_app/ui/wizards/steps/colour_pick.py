@@ -174,11 +174,11 @@ class PickStep(Step):
         """Picking takes a person a minute."""
         return bool(self.gathering.names)
 
-    def see(self, pictures: Pictures) -> tuple[Pictures, MaskedPictures]:
+    def observe(self, pictures: Pictures) -> tuple[Pictures, MaskedPictures]:
         """The mask; the detectors are the picture worker's own."""
         return pictures, self._maker.look(self.held or pictures, self._markers, tuple(self._learnt))
 
-    def take(self, seen: tuple[Pictures, MaskedPictures]) -> None:
+    def accept_observation(self, seen: tuple[Pictures, MaskedPictures]) -> None:
         """Gather where markers show something new."""
         self._live, self._masked = seen
         if not self.held:

@@ -131,11 +131,11 @@ class BoundsStep(SolveStep):
             msgspec.structs.replace(marker, chroma=self.given.get(marker.id, marker.chroma))
             for marker in self.result.markers.markers))
 
-    def see(self, pictures: Pictures) -> MaskedPictures:
+    def observe(self, pictures: Pictures) -> MaskedPictures:
         """The mask."""
         return self._maker.look(pictures, self.markers, (self.chosen,))
 
-    def take(self, seen: MaskedPictures) -> None:
+    def accept_observation(self, seen: MaskedPictures) -> None:
         """What was seen."""
         self._masked = seen
 
@@ -192,12 +192,12 @@ class SeparationStep(SolveStep):
             self._learnt, self._given = self._bounds.result, dict(self._bounds.given)
             self.begin()
 
-    def see(self, pictures: Pictures) -> tuple[Finding, ...] | None:
+    def observe(self, pictures: Pictures) -> tuple[Finding, ...] | None:
         """How the light stands to the one of the samples; None before they are learnt."""
         result = self.result
         return None if result is None else drift_of(self._maker.look(pictures, result.markers))
 
-    def take(self, seen: tuple[Finding, ...]) -> None:
+    def accept_observation(self, seen: tuple[Finding, ...]) -> None:
         """What is said of the light."""
         if self.report is not None:
             self.report = replace(self.report, verdict=with_findings(self.result.verdict, seen))

@@ -228,7 +228,7 @@ class SkinStep(LearningStep):
             return not self._stopped and bool(
                 ask_node(command, node_id, "learn_skin", save=False).get("answer", {}).get("found"))
 
-    def see(self, pictures: Pictures) -> dict[str, Mask]:
+    def observe(self, pictures: Pictures) -> dict[str, Mask]:
         """What each node takes for the hand now."""
         found = {}
         with contextlib.closing(self._connect()) as asker:
@@ -239,7 +239,7 @@ class SkinStep(LearningStep):
                         found[name] = mask_of(name, answer)
         return found
 
-    def take(self, seen: dict[str, Mask]) -> None:
+    def accept_observation(self, seen: dict[str, Mask]) -> None:
         """The newest masks."""
         self.masks = {**self.masks, **seen}
 
