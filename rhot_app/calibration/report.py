@@ -139,8 +139,9 @@ class Report:
         """What is printed below the verdict."""
         named = [one for one in self.figures if one.name]
         width = max((len(one.name) for one in named), default=0)
-        return [*(f"{one.name:<{width}}  {one.text}" for one in named),
-                *(line for table in self.tables for line in ("", *table.lines()) if table.heads), *self.notes]
+        tables = [line for table in self.tables for line in ("", *table.lines()) if table.heads]
+        between = [""] if tables and self.notes else []
+        return [*(f"{one.name:<{width}}  {one.text}" for one in named), *tables, *between, *self.notes]
 
 
 def plain(value: Any) -> Any:

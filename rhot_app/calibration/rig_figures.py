@@ -45,6 +45,11 @@ def lens_figures(camera: str, lens: Intrinsics, std: Mapping[str, float] | None 
                  "distortion")
 
 
+def order_of_distortion(lens: Intrinsics) -> str:
+    """A sentence: which coefficients a lens's distortion lists."""
+    return f"Distortion is {', '.join(PARAMETERS[4:4 + len(lens.distortion)])} of OpenCV."
+
+
 def place_figures(node: RigNode) -> Iterator[Figure]:
     """Where a camera stands and where it looks."""
     place = 1e3 * np.array(node.pose.translation_m) if node.pose_known else "not known"

@@ -84,7 +84,7 @@ def report(result: IntrinsicsReport, camera: str = "") -> Report:
     """What the lens of `camera` is, how well it is known, and of which views."""
     from rhot_app.calibration.bundle.robust_error import what_is_reported
     from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
-    from rhot_app.calibration.rig_figures import lens_figures
+    from rhot_app.calibration.rig_figures import lens_figures, order_of_distortion
 
     std = {name: std for name, (_, std) in result.parameters.items()}
     errors, board, cover = result.errors, result.board_errors, result.coverage
@@ -107,7 +107,8 @@ def report(result: IntrinsicsReport, camera: str = "") -> Report:
                 f"{100 * cover.share:.0f} % of the picture (55 % and more are good).")
     return Report(
         result.verdict, tuple(figures), (Table("views", views),),
-        (f"{what_is_reported(result.error_inflation)}.", coverage, *left_out(result.dropped)),
+        (f"{what_is_reported(result.error_inflation)}.", order_of_distortion(result.intrinsics), coverage,
+         *left_out(result.dropped)),
         {"size": result.size, "std": std, "disagreement": result.error_inflation, "undetermined": result.undetermined,
          "coverage": {**cover.bars, "share": cover.share, "cells": cover.cells},
          "expected_error_mm.distance_m": WORKING_DISTANCE_M, "board_errors_mm": None, **dropped_fields(result.dropped)})

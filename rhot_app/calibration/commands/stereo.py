@@ -241,8 +241,9 @@ def report(result: StereoReport, frame: WorldFrame | None = None) -> Report:
     """Distances, lenses and errors; where cameras stand above the table of `frame`. The first pair's figures stand at
     the top of JSON, too."""
     from rhot_app.calibration.bundle.robust_error import what_is_reported
-    from rhot_app.calibration.rig_figures import distance_figure
+    from rhot_app.calibration.rig_figures import distance_figure, order_of_distortion
     from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M
+    from rhot_app.geometry.camera import rig_intrinsics
 
     figures, fields = result.figures, dropped_fields(result.dropped)
     if figures is None:
@@ -284,7 +285,9 @@ def report(result: StereoReport, frame: WorldFrame | None = None) -> Report:
             for each in frame.stances)))
     return Report(
         result.verdict, tuple(said), tuple(tables),
-        (f"{what_is_reported(figures.error_inflation)}.", *left_out(result.dropped)), {
+        (f"{what_is_reported(figures.error_inflation)}.",
+         order_of_distortion(rig_intrinsics(figures.cameras[0].size, figures.cameras[0].lens)),
+         *left_out(result.dropped)), {
             **tables[1].to_json()[0], "noise_px": figures.noise_px, "board_error_mm": None, "table": None,
             "expected_error_mm.distance_m": WORKING_DISTANCE_M, "expected_error_mm.marker_noise_px": MARKER_NOISE_PX,
             "std_method": "inverse of the bundle adjustment's normal equations at the corners' own spread, times the "

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QBrush, QColor
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QHeaderView, QLabel, QPushButton, QWidget
 
 from rhot_app.calibration.commands.bones import propose, report, roles_of, solve_log
 from rhot_app.calibration.hand.bones import BONE_NAMES, enter_bones
@@ -330,6 +330,8 @@ class HandPage(Page):
             return
         self._shown = result
         self.table.show_table(None if self._hand.report is None else self._hand.report.tables[0])
+        for column in range(1, self.table.columnCount() - 1):
+            self.table.horizontalHeader().setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         for r, bone in enumerate(result.bones if result is not None else ()):
             self.table.cell(r, self.table.columnCount() - 1).setBackground(self._brush(knowledge_of(bone)))
         self.reaches.setText("" if result is None else "Reach: " + ", ".join(

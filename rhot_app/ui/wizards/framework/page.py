@@ -196,7 +196,8 @@ class FigureTable(QTableWidget):
         for r, row in enumerate(texts):
             for c, text in enumerate(row):
                 item = QTableWidgetItem(text)
-                item.setTextAlignment((Qt.AlignmentFlag.AlignRight if c else Qt.AlignmentFlag.AlignLeft)
+                is_number = text[:1] in "-–0123456789"
+                item.setTextAlignment((Qt.AlignmentFlag.AlignRight if is_number else Qt.AlignmentFlag.AlignLeft)
                                       | Qt.AlignmentFlag.AlignVCenter)
                 self.setItem(r, c, item)
 
