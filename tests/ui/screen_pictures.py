@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QRadioButton,
     QScrollArea,
-    QTableWidget,
+    QTableView,
     QToolButton,
     QWidget,
 )
@@ -73,7 +73,7 @@ def cut_texts(window: QWidget) -> list[str]:
             least = part.minimumSizeHint() if isinstance(part, (QCheckBox, QRadioButton)) else part.sizeHint()
             if least.width() > part.width():
                 cut.append(part.text())
-        elif isinstance(part, QTableWidget):
+        elif isinstance(part, QTableView):
             cut += _cut_cells(part)
     return cut
 
@@ -87,23 +87,24 @@ def _scrolls(part: QWidget, window: QWidget) -> bool:
     return False
 
 
-def _cut_cells(table: QTableWidget) -> list[str]:
+def _cut_cells(table: QTableView) -> list[str]:
     """Texts of heads and cells that are wider, or where they wrap higher, than their place."""
     cut = []
     padding = 2 * (CELL_PADDING_PX + 3)
-    header = table.horizontalHeader()
-    for column in range(table.columnCount()):
-        head = table.horizontalHeaderItem(column)
-        if head is not None and header.fontMetrics().horizontalAdvance(head.text()) > header.sectionSize(column):
-            cut.append(head.text())
+    header, model = table.horizontalHeader(), table.model()
+    for column in range(model.columnCount()):
+        head = model.headerData(column, Qt.Orientation.Horizontal)
+        if head and header.fontMetrics().horizontalAdvance(head) > header.sectionSize(column):
+            cut.append(head)
         if not table.wordWrap() and table.sizeHintForColumn(column) > table.columnWidth(column):
             cut.append(f"column {column}")
-    for row in range(table.rowCount() if table.wordWrap() else 0):
-        for column in range(table.columnCount()):
-            item = table.item(row, column)
-            if item is not None and item.text():
+    for row in range(model.rowCount() if table.wordWrap() else 0):
+        for column in range(model.columnCount()):
+            cell = model.index(row, column)
+            if text := cell.data():
                 room = QRect(0, 0, table.columnWidth(column) - padding, 10_000)
-                needed = QFontMetrics(item.font()).boundingRect(room, Qt.TextFlag.TextWordWrap, item.text())
+                font = cell.data(Qt.ItemDataRole.FontRole) or table.font()
+                needed = QFontMetrics(font).boundingRect(room, Qt.TextFlag.TextWordWrap, text)
                 if needed.height() > table.rowHeight(row) or needed.width() > room.width():
-                    cut.append(item.text())
+                    cut.append(text)
     return cut

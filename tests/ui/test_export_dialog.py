@@ -35,7 +35,7 @@ def dialog(themed: Any, qtbot: Any, log: Path, tmp_path: Path) -> Iterator[Expor
     dialog = ExportDialog(copy, tmp_path)
     qtbot.addWidget(dialog)
     dialog.show()
-    qtbot.waitUntil(lambda: dialog.table.rowCount() > 0, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: bool(dialog.table.records), timeout=PATIENCE_MS)
     yield dialog
     dialog.close()
 
@@ -46,16 +46,15 @@ def choose(box: Any, value: Any) -> None:
 
 def cells(dialog: ExportDialog, name: str) -> list[str]:
     """A column of the preview."""
-    heads = [dialog.table.horizontalHeaderItem(column).text() for column in range(dialog.table.columnCount())]
-    return [dialog.table.item(row, heads.index(name)).text() for row in range(dialog.table.rowCount())]
+    heads = dialog.table.heads()
+    return [dialog.table.text(row, heads.index(name)) for row in range(len(dialog.table.records))]
 
 
 def test_the_first_rows_follow_the_choices(dialog: ExportDialog, qtbot: Any) -> None:
     assert cells(dialog, "condition")[0] == "SEARCHING" and 100.0 < float(cells(dialog, "index_z_mm")[-1]) < 1000.0
     choose(dialog.units_box, "m")
     dialog.rate_box.setValue(50.0)
-    qtbot.waitUntil(lambda: "index_z_m" in [dialog.table.horizontalHeaderItem(column).text()
-                                            for column in range(dialog.table.columnCount())], timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: "index_z_m" in dialog.table.heads(), timeout=PATIENCE_MS)
     assert cells(dialog, "time_s")[1] == "0.0200"
     choose(dialog.format_box, "gltf")
     assert dialog.units_box.currentData() == "m" and not dialog.units_box.isEnabled()

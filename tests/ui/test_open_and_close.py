@@ -25,6 +25,7 @@ from rhot_app.sources.discovery import Search
 from rhot_app.ui.common.disposal import plot_widget, release_style
 from rhot_app.ui.dialogs import dialogs
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
+from rhot_app.ui.dialogs.rig_dialog import RigDialog
 from rhot_app.ui.main_window import MainWindow
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.framework.definition import WIZARDS, Wizard
@@ -103,7 +104,7 @@ OPENERS = (
     Opener("fit", lambda window: window.wizards.open_fit(), lambda window: window.wizards.fit),
     Opener("recordings", lambda window: window.replays.list(), lambda window: window.replays.library),
     Opener("replay", lambda window: window.replays.open(Path("none.rhotlog")), lambda window: window.replays.window),
-    Opener("rig", lambda window: window.show_rig_file("hand"), at_top(dialogs.RigDialog)),
+    Opener("rig", lambda window: window.show_rig_file("hand"), at_top(RigDialog)),
     dialog("settings", lambda window: window.actions_.settings.trigger()),
     dialog("about", lambda window: window.actions_.about.trigger()),
     dialog("export", lambda window: window.dialogs.export_recording(window.settings)))

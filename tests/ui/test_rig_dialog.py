@@ -7,9 +7,9 @@ import pytest
 from fake_engine import synthetic_rig
 from patience import PATIENCE_MS
 from PySide6.QtGui import QFontMetrics
-from PySide6.QtWidgets import QTableWidget
 
-from rhot_app.ui.dialogs.dialogs import RigDialog
+from rhot_app.ui.common.record_table import RecordTable
+from rhot_app.ui.dialogs.rig_dialog import RigDialog
 
 
 @pytest.mark.parametrize("page", ["cameras", "markers", "hand"])
@@ -20,11 +20,11 @@ def test_no_head_and_no_value_is_cut_off(qtbot, themed, page):
     qtbot.addWidget(dialog)
     dialog.show()
     qtbot.waitExposed(dialog)
-    table = dialog.tabs.currentWidget().findChild(QTableWidget)
+    table = dialog.tabs.currentWidget().findChild(RecordTable)
     metrics = QFontMetrics(table.font())
-    for column in range(table.columnCount()):
-        texts = [table.item(row, column).text() for row in range(table.rowCount())]
-        texts.append(table.horizontalHeaderItem(column).text())
+    for column, head in enumerate(table.heads()):
+        texts = [table.text(row, column) for row in range(len(table.records))]
+        texts.append(head)
         assert table.columnWidth(column) >= max(metrics.horizontalAdvance(text) for text in texts) + 8
     bars = (table.horizontalScrollBar(), table.verticalScrollBar())
     qtbot.waitUntil(lambda: not any(bar.isVisible() for bar in bars), timeout=PATIENCE_MS)

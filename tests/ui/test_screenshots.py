@@ -15,8 +15,8 @@ from rhot_app.project import TrackerSettings, load_rig
 from rhot_app.sources.discovery import Search, Sighting, conflicts, together
 from rhot_app.sources.pairing import Introduction, NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer
-from rhot_app.ui.dialogs.dialogs import RigDialog
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog, PairDialog
+from rhot_app.ui.dialogs.rig_dialog import RigDialog
 from rhot_app.ui.models.palette import DARK
 from rhot_node.files import resource_path
 from rhot_node.network.presence import Presence
@@ -133,7 +133,7 @@ def connecting() -> NodesDialog:
         who = [Introduction(k, name, "ready", "paired", 1, 2, 3, 4) for k, name in ((1, "left"), (2, "right"))]
         return [NodeAnswer(address, one, one.name == "left") for address, one in zip(addresses, who, strict=True)]
     dialog = NodesDialog(DARK, find=find, ask=ask)
-    dialog.found.searched.connect(lambda: dialog.choose(1, dialog.found.nodes[1]))
+    dialog.found.searched.connect(lambda: dialog.choose(1, dialog.found.table.records[1]))
     return dialog
 
 

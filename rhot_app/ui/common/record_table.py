@@ -47,10 +47,11 @@ class RecordModel(QAbstractTableModel, Generic[R]):
         self.columns = self.columns if columns is None else tuple(columns)
         self.endResetModel()
 
-    def refresh(self) -> None:
-        """The records say something else now."""
+    def refresh(self, first_column: int = 0) -> None:
+        """The records say something else now, from a column on; what is being typed over in one of these is lost."""
         if self.records:
-            self.dataChanged.emit(self.index(0, 0), self.index(len(self.records) - 1, len(self.columns) - 1))
+            self.dataChanged.emit(self.index(0, first_column),
+                                  self.index(len(self.records) - 1, len(self.columns) - 1))
 
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, N802
         """How many records there are."""
@@ -71,10 +72,10 @@ class RecordModel(QAbstractTableModel, Generic[R]):
 
     def headerData(self, section: int, orientation: Qt.Orientation,  # noqa: N802
                    role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """The columns' heads."""
-        if orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
-            return self.columns[section].head
-        return None
+        """The columns' heads, and the rows' numbers where a table shows them."""
+        if role != Qt.ItemDataRole.DisplayRole:
+            return None
+        return self.columns[section].head if orientation == Qt.Orientation.Horizontal else section + 1
 
     def flags(self, index: Index) -> Qt.ItemFlag:
         """Cells with a `write` can be typed over."""

@@ -6,26 +6,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QColor, QShowEvent
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
-    QHeaderView,
-    QLabel,
-    QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
-    QTabWidget,
-    QVBoxLayout,
     QWidget,
 )
 
-from rhot_app.charts import hex_of
-from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.skeleton import FINGERS
-from rhot_app.project import Rig, RigNode
+from rhot_app.project import Rig
 from rhot_app.sources.cameras.camera_set import Prepared
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.disposal import dispose, release_style
@@ -38,6 +27,7 @@ from rhot_app.ui.dialogs.export_dialog import ExportDialog
 from rhot_app.ui.dialogs.networks_dialog import NetworksDialog
 from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
 from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
+from rhot_app.ui.dialogs.rig_dialog import RigDialog
 from rhot_app.ui.dialogs.settings_dialog import SettingsDialog
 from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
 from rhot_app.ui.models.palette import Scheme
@@ -212,129 +202,3 @@ def _bring_forward(window: QWidget | None) -> None:
         window.show()
         window.raise_()
         window.activateWindow()
-
-
-# -- what the rig file says, to read -----------------------------------------------------------------------------------
-
-Rows = list[list[str]]
-
-_MARGIN_PX = 40
-_HEAD_PX = 190  # tabs, sentence, column heads and button
-
-CAMERA_HEADS = ("camera", "picture [px]", "field of view", "focal length [px]", "centre [px]", "k1, k2",
-                "address : port")
-MARKER_HEADS = ("marker", "colour", "place", "shape", "radius [mm]")
-HAND_HEADS = ("finger", "first bone [mm]", "second [mm]", "last [mm]", "marker to last joint [mm]")
-
-
-def camera_rows(rig: Rig) -> Rows:
-    """One row of text per camera."""
-    return [_camera_row(node) for node in rig.nodes]
-
-
-def _camera_row(node: RigNode) -> list[str]:
-    lens = node.intrinsics
-    wide = np.degrees(CameraModel.from_rig(lens, node.pose).field_of_view[0])
-    return [node.name, f"{lens.width} × {lens.height}", f"{wide:.1f}°", f"{lens.fx:.1f}, {lens.fy:.1f}",
-            f"{lens.cx:.1f}, {lens.cy:.1f}", f"{lens.distortion[0]:.3f}, {lens.distortion[1]:.3f}",
-            f"{node.address}:{node.control_port}"]
-
-
-def baseline_text(rig: Rig) -> str:
-    """Distance of the first two cameras in words."""
-    if len(rig.nodes) < 2:
-        return "The rig has one camera; depth needs two."
-    if not all(rig.tracked_with[:2]):
-        return f"Where {rig.nodes[0].name} and {rig.nodes[1].name} stand to each other is not known."
-    first, second = (np.array(node.pose.translation_m) for node in rig.nodes[:2])
-    return f"{rig.nodes[0].name} and {rig.nodes[1].name} stand {1e3 * np.linalg.norm(second - first):.1f} mm apart."
-
-
-def marker_rows(rig: Rig) -> Rows:
-    """One row of text per marker."""
-    return [[m.id, hex_of(m.display_rgb), (m.role or "free").replace("_", " "), m.shape,
-             f"{m.radius_mm:.1f}" if m.radius_mm else "–"] for m in rig.markers.markers]
-
-
-def hand_rows(rig: Rig) -> Rows:
-    """One row of text per finger."""
-    rows = []
-    for name in FINGERS:
-        finger = rig.hand.fingers[name]
-        rows.append([name, *(f"{bone:.1f}" for bone in finger.bones_mm), f"{finger.marker_mm:.1f}"])
-    return rows
-
-
-class RigDialog(QDialog):
-    """Three tabs; `page` is the one shown first: "cameras", "markers" or "hand"."""
-
-    def __init__(self, rig: Rig, page: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setWindowTitle(f"Rig {rig.name}")
-        self.setProperty("guide", "calibration")
-        self.tabs = QTabWidget()
-        self.tabs.addTab(_page(_table(CAMERA_HEADS, camera_rows(rig)), baseline_text(rig)), "Cameras")
-        markers = _table(MARKER_HEADS, marker_rows(rig))
-        for row, marker in enumerate(rig.markers.markers):
-            cell = markers.item(row, 1)
-            if cell is not None:
-                cell.setBackground(QColor(hex_of(marker.display_rgb)))
-                light = 0.3 * marker.display_rgb[0] + 0.6 * marker.display_rgb[1] + 0.1 * marker.display_rgb[2] > 128
-                cell.setForeground(QColor("#000000" if light else "#ffffff"))
-        self.tabs.addTab(_page(markers, f"Marker set {rig.markers.name or 'without a name'}. Nodes and master must use "
-                                        "the same one."), "Markers")
-        self.tabs.addTab(_page(_table(HAND_HEADS, hand_rows(rig)),
-                               f"{rig.hand.name or 'Hand'}, {rig.hand.side} side; wrist "
-                               f"{rig.hand.wrist_breadth_mm:.0f} × {rig.hand.wrist_thickness_mm:.0f} mm."), "Hand")
-        self.tabs.setCurrentIndex(("cameras", "markers", "hand").index(page))
-        close = QPushButton("Close")
-        close.clicked.connect(self.reject)
-        layout = QVBoxLayout(self)
-        layout.addWidget(self.tabs)
-        layout.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
-
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Only now are fonts and paddings known."""
-        self._fit()
-        super().showEvent(event)
-
-    def _fit(self) -> None:
-        """Wide and tall enough for every table, as far as the screen allows; beyond that they scroll."""
-        tables = self.findChildren(QTableWidget)
-        width = max(_width_of(table) for table in tables) + 2 * _MARGIN_PX
-        height = max(table.verticalHeader().length() for table in tables) + _HEAD_PX
-        room = self.screen().availableSize()
-        self.resize(min(max(width, 480), room.width() - _MARGIN_PX), min(height, room.height() - _MARGIN_PX))
-
-
-def _table(heads: tuple[str, ...], rows: Rows) -> QTableWidget:
-    table = QTableWidget(len(rows), len(heads))
-    table.setHorizontalHeaderLabels(list(heads))
-    table.verticalHeader().setVisible(False)
-    table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
-    table.setWordWrap(False)
-    table.setSelectionMode(QTableWidget.SelectionMode.NoSelection)
-    table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    for r, row in enumerate(rows):
-        for c, text in enumerate(row):
-            table.setItem(r, c, QTableWidgetItem(text))
-    header = table.horizontalHeader()
-    header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-    header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    header.setStretchLastSection(True)
-    return table
-
-
-def _width_of(table: QTableWidget) -> int:
-    header = table.horizontalHeader()
-    return sum(max(table.sizeHintForColumn(k), header.sectionSizeHint(k)) for k in range(table.columnCount()))
-
-
-def _page(table: QTableWidget, sentence: str) -> QWidget:
-    page = QWidget()
-    label = QLabel(sentence)
-    label.setWordWrap(True)
-    layout = QVBoxLayout(page)
-    layout.addWidget(label)
-    layout.addWidget(table, 1)
-    return page

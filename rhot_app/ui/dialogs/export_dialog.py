@@ -18,8 +18,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QProgressBar,
     QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -34,6 +32,7 @@ from rhot_app.export.states import HandStates, columns
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import newest_recording
 
@@ -93,8 +92,8 @@ class ExportDialog(QDialog):
         self.fill_box.setMinimumHeight(30)
         self.fill_box.setToolTip("Gaps up to this length are interpolated. What is filled in is marked: by its "
                                  "knowledge, or in a table beside the file where the format has none.")
-        self.table = QTableWidget(0, 0)
-        self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
+        self.table: RecordTable[tuple[object, ...]] = RecordTable(())
+        self.table.verticalHeader().show()
         self.table.setToolTip("The first fingertips as they would be written; the file holds much more.")
         self.sentence = Sentence(3)
         self.bar = QProgressBar()
@@ -210,14 +209,8 @@ class ExportDialog(QDialog):
         steps_s = np.diff(np.asarray(table["time_s"], dtype=np.float64))
         if self.rate_box.value() == 0.0 and len(steps_s) and np.median(steps_s) > 0.0:
             self.rate_box.setSpecialValueText(f"{_OWN_RATE}, {1.0 / np.median(steps_s):.0f} Hz")
-        self.table.setColumnCount(len(wanted))
-        self.table.setRowCount(len(states))
-        self.table.setHorizontalHeaderLabels([name.replace("fingertip_", "") for name in wanted])
-        for column, name in enumerate(wanted):
-            places = 2 if name.endswith("_mm") else 4
-            for row, value in enumerate(table[name].tolist()):
-                text = value if isinstance(value, str) else "" if value != value else f"{value:.{places}f}"
-                self.table.setItem(row, column, QTableWidgetItem(text))
+        self.table.show_records(list(zip(*(table[name].tolist() for name in wanted), strict=True)),
+                                [_column(number, name) for number, name in enumerate(wanted)])
         self.table.resizeColumnsToContents()
         self._say("")
 
@@ -284,3 +277,14 @@ def _box(entries: Any, meaning: str) -> QComboBox:
         box.addItem(words, value)
     box.setToolTip(meaning)
     return box
+
+
+def _column(number: int, name: str) -> Column[tuple[object, ...]]:
+    """A column of the preview, which is the value of that number in a row."""
+    places = 2 if name.endswith("_mm") else 4
+
+    def text(row: tuple[object, ...]) -> str:
+        value = row[number]
+        return value if isinstance(value, str) else "" if value != value else f"{value:.{places}f}"
+
+    return Column(name.replace("fingertip_", ""), text)

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QHBoxLayout,
-    QHeaderView,
     QProgressBar,
     QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -20,16 +16,21 @@ from PySide6.QtWidgets import (
 from rhot_app.progress import Progress
 from rhot_app.sources.discovery import FoundNode, Search
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_node.wire.messages import TrustState
 
 Find = Callable[[Progress], Search]
 """Searches and reports its progress; called in a worker."""
 
-COLUMNS = ("name", "id", "address", "trust", "state")
 NOBODY = ("No node was found. Is rhot-node running there, and on the same network? Some networks let no search "
           "through: then type the address in below.")
 _TRUST = {TrustState.OPEN: "open to everybody", TrustState.UNPAIRED: "not paired yet", TrustState.PAIRED: "paired"}
+COLUMNS: tuple[Column[FoundNode], ...] = (
+    Column("name", lambda node: node.presence.name), Column("id", lambda node: str(node.presence.node_id)),
+    Column("address", lambda node: ", ".join(node.addresses)),
+    Column("trust", lambda node: _TRUST[node.presence.trust]),
+    Column("state", lambda node: "announces itself" if node.state is None else node.state.name.lower()))
 
 
 class FoundNodes(QWidget):
@@ -43,21 +44,13 @@ class FoundNodes(QWidget):
         super().__init__(parent)
         self._find = find
         self._job: Job | None = None
-        self.nodes: tuple[FoundNode, ...] = ()
-        self.table = QTableWidget(0, len(COLUMNS))
-        self.table.setHorizontalHeaderLabels(COLUMNS)
-        self.table.verticalHeader().hide()
-        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        self.table.horizontalHeader().setStretchLastSection(True)
-        self.table.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table: RecordTable[FoundNode] = RecordTable(COLUMNS)
+        self.table.fit_columns()
         self.table.setTabKeyNavigation(False)
         self.table.setShowGrid(False)
         self.table.setAccessibleName("Nodes on the network")
         self.table.setMinimumHeight(140)
-        self.table.itemSelectionChanged.connect(self._show_whether_chosen)
+        self.table.chosen_changed.connect(self._show_whether_chosen)
         self.side_buttons = [self._side_button(number, side) for number, side in enumerate(sides)]
         self.again = QPushButton("Search again")
         self.again.setAutoDefault(False)
@@ -101,20 +94,13 @@ class FoundNodes(QWidget):
         button.setAutoDefault(False)
         button.setEnabled(False)
         button.setToolTip("Possible once a node is selected in the list.")
-        button.clicked.connect(lambda: self.chosen.emit(number, self.nodes[self.table.currentRow()]))
+        button.clicked.connect(lambda: self.chosen.emit(number, self.table.chosen))
         return button
 
     def _show(self, found: Search) -> None:
         self._rest()
-        self.nodes = found.nodes
         self.table.clearSelection()
-        self.table.setRowCount(len(found.nodes))
-        for row, node in enumerate(found.nodes):
-            who = node.presence
-            state = "announces itself" if node.state is None else node.state.name.lower()
-            for column, text in enumerate((who.name, str(who.node_id), ", ".join(node.addresses), _TRUST[who.trust],
-                                           state)):
-                self.table.setItem(row, column, QTableWidgetItem(text))
+        self.table.show_records(found.nodes)
         sentences = [*([] if found.nodes else [NOBODY]), *found.conflicts, *found.notes]
         self.message.setText("\n".join(sentences))
         self._show_whether_chosen()
@@ -135,4 +121,4 @@ class FoundNodes(QWidget):
 
     def _show_whether_chosen(self) -> None:
         for button in self.side_buttons:
-            button.setEnabled(bool(self.table.selectedItems()))
+            button.setEnabled(self.table.chosen is not None)

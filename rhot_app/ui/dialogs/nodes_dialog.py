@@ -124,7 +124,7 @@ class NodesDialog(QDialog):
     def _choose_by_name(self) -> None:
         """Nodes that are called as the sides are taken for these, unless something was typed or chosen before."""
         for side, name in enumerate(SIDES):
-            named = [node for node in self.found.nodes if node.presence.name == name]
+            named = [node for node in self.found.table.records if node.presence.name == name]
             if len(named) == 1 and not self.hosts[side].text().strip():
                 self.choose(side, named[0])
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, Qt, Signal
@@ -12,11 +14,10 @@ from PySide6.QtWidgets import (
     QHeaderView,
     QStyledItemDelegate,
     QStyleOptionViewItem,
-    QTableWidget,
-    QTableWidgetItem,
     QWidget,
 )
 
+from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import DASH, bytes_text
 from rhot_app.ui.replay.library import Entry, Summary
@@ -24,7 +25,6 @@ from rhot_app.ui.replay.session import time_text
 from rhot_app.ui.replay.timeline import paint_conditions
 
 NAME, DATE, RIG, LENGTH, SIZE, BAR = range(6)
-_HEADS = ("Name", "Date", "Rig", "Length", "Size", "Condition")
 _WIDTHS_PX = {DATE: 190, RIG: 150, LENGTH: 90, SIZE: 90, BAR: 300}
 _ROW_PX = 34
 _CODES = Qt.ItemDataRole.UserRole
@@ -47,87 +47,93 @@ class BarDelegate(QStyledItemDelegate):
             paint_conditions(painter, box, np.asarray(codes, np.int8), self.scheme)
 
 
-class RecordingTable(QTableWidget):
+@dataclass
+class Line:
+    """A recording, what is known of how well it was tracked, and words while nothing is."""
+
+    entry: Entry
+    summary: Summary | None = None
+    words: str = ""
+
+    @property
+    def length(self) -> str:
+        """Minutes and seconds, once they are known."""
+        return "" if self.summary is None else time_text(round(self.summary.duration_s)).rpartition(".")[0]
+
+    @property
+    def condition(self) -> str:
+        """What stands in the bar's place."""
+        if self.entry.problem:
+            return "cannot be read"
+        return self.words if self.summary is None else ""
+
+    def roles(self) -> dict[int, Any]:
+        """The tooltip of every cell but the bar's."""
+        return {Qt.ItemDataRole.ToolTipRole: self.entry.problem or str(self.entry.path)}
+
+    def bar(self) -> dict[int, Any]:
+        """The bar's codes and its tooltip."""
+        if self.summary is None or self.entry.problem:
+            return self.roles()
+        found = self.summary
+        said = found.note or (f"{found.states} states, {found.bookmarks} bookmarks. Green and full: tracking; yellow: "
+                              "partial; red and low: lost; empty: no state.")
+        return {_CODES: found.conditions, Qt.ItemDataRole.ToolTipRole: said}
+
+
+class RecordingTable(RecordTable[Line]):
     """`named` gives a recording's path and the name that was typed."""
 
     named = Signal(object, str)
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
-        super().__init__(0, len(_HEADS), parent)
-        self.entries: list[Entry] = []
-        self._filling = False
+        super().__init__((
+            Column("Name", lambda line: line.entry.path.stem, roles=Line.roles,
+                   write=lambda line, name: self.named.emit(line.entry.path, name)),
+            Column("Date", lambda line: f"{line.entry.created:%d %b %Y, %H:%M}", roles=Line.roles),
+            Column("Rig", lambda line: line.entry.rig_name or DASH, roles=Line.roles),
+            Column("Length", lambda line: line.length, number=True, roles=Line.roles),
+            Column("Size", lambda line: bytes_text(line.entry.size), number=True, roles=Line.roles),
+            Column("Condition", lambda line: line.condition, roles=Line.bar)), parent)
         self._bars = BarDelegate(scheme, self)
-        self.setHorizontalHeaderLabels(list(_HEADS))
-        self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.setShowGrid(False)
         self.setAlternatingRowColors(True)
-        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setItemDelegateForColumn(BAR, self._bars)
+        self.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignCenter)
         self.horizontalHeader().setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
         for column, width in _WIDTHS_PX.items():
             self.setColumnWidth(column, width)
-        self.itemChanged.connect(self._take_name)
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours."""
         self._bars.scheme = scheme
         self.viewport().update()
 
+    @property
+    def entries(self) -> list[Entry]:
+        """The recordings shown."""
+        return [line.entry for line in self.records]
+
     def show_entries(self, entries: list[Entry]) -> None:
         """Other recordings; nothing is known of how well they were tracked."""
-        self._filling = True
-        self.entries = entries
-        self.setRowCount(len(entries))
-        for row, entry in enumerate(entries):
-            self._fill_row(row, entry)
-        self._filling = False
-
-    def _fill_row(self, row: int, entry: Entry) -> None:
-        texts = {NAME: entry.path.stem, DATE: f"{entry.created:%d %b %Y, %H:%M}", RIG: entry.rig_name or DASH,
-                 LENGTH: "", SIZE: bytes_text(entry.size), BAR: "cannot be read" if entry.problem else ""}
-        for column, text in texts.items():
-            item = QTableWidgetItem(text)
-            flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
-            item.setFlags(flags | Qt.ItemFlag.ItemIsEditable if column == NAME else flags)
-            item.setToolTip(entry.problem or str(entry.path))
-            if column in (LENGTH, SIZE):
-                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            self.setItem(row, column, item)
+        self.show_records([Line(entry) for entry in entries])
 
     def show_summary(self, path: Path, summary: Summary | None, words: str) -> None:
         """A recording's length and bar; `words` while there is no summary."""
-        row = next((row for row, entry in enumerate(self.entries) if entry.path == path and not entry.problem), None)
-        if row is None:
-            return
-        self._filling = True
-        bar = self._cell(row, BAR)
-        if summary is None:
-            bar.setText(words)
-        else:
-            self._cell(row, LENGTH).setText(time_text(round(summary.duration_s)).rpartition(".")[0])
-            bar.setText("")
-            bar.setData(_CODES, summary.conditions)
-            bar.setToolTip(summary.note or f"{summary.states} states, {summary.bookmarks} bookmarks. Green and full: "
-                           "tracking; yellow: partial; red and low: lost; empty: no state.")
-        self._filling = False
-
-    def _cell(self, row: int, column: int) -> QTableWidgetItem:
-        item = self.item(row, column)
-        assert item is not None  # every row is filled
-        return item
+        for line in self.records:
+            if line.entry.path == path:
+                line.summary, line.words = summary, words
+        self.records_model.refresh(LENGTH)  # a name may be being typed
 
     @property
-    def chosen(self) -> Entry | None:
+    def chosen_entry(self) -> Entry | None:
         """The recording that is selected."""
-        rows = self.selectionModel().selectedRows()
-        return self.entries[rows[0].row()] if rows and rows[0].row() < len(self.entries) else None
+        return None if self.chosen is None else self.chosen.entry
 
     def choose(self, path: Path | None) -> None:
         """Select a recording; the first one when it is not there."""
-        if self.entries:
+        if self.records:
             self.selectRow(next((row for row, entry in enumerate(self.entries) if entry.path == path), 0))
 
     @property
@@ -137,10 +143,5 @@ class RecordingTable(QTableWidget):
 
     def edit_name(self) -> None:
         """Have the name of the selected recording typed over."""
-        rows = self.selectionModel().selectedRows()
-        if rows:
-            self.editItem(self._cell(rows[0].row(), NAME))
-
-    def _take_name(self, item: QTableWidgetItem) -> None:
-        if not self._filling and item.column() == NAME and item.row() < len(self.entries):
-            self.named.emit(self.entries[item.row()].path, item.text())
+        if self.chosen_rows:
+            self.edit(self.records_model.index(self.chosen_rows[0], NAME))

@@ -92,8 +92,8 @@ class LibraryWindow(ToolWindow):
         layout.addLayout(buttons)
 
     def _connect(self) -> None:
-        self.table.itemSelectionChanged.connect(self._show_choice)
-        self.table.itemDoubleClicked.connect(lambda item: self.open_chosen())
+        self.table.chosen_changed.connect(self._show_choice)
+        self.table.doubleClicked.connect(lambda index: self.open_chosen())
         self.table.named.connect(self._rename)
         self.summaries.changed.connect(self._show_summary)
         self.open_button.clicked.connect(self.open_chosen)
@@ -138,7 +138,7 @@ class LibraryWindow(ToolWindow):
         return self._listing is not None
 
     def _fill(self, entries: list[Entry]) -> None:
-        chosen = self.table.chosen
+        chosen = self.table.chosen_entry
         self.table.show_entries(entries)
         for entry in entries:
             self._show_summary(entry.path)
@@ -152,7 +152,7 @@ class LibraryWindow(ToolWindow):
         self.table.show_summary(path, self.summaries.of(path), self.summaries.words(path))
 
     def _show_choice(self) -> None:
-        entry = self.table.chosen
+        entry = self.table.chosen_entry
         self.open_button.setEnabled(entry is not None and not entry.problem)
         self.rename_button.setEnabled(entry is not None)
         self.delete_button.setEnabled(entry is not None)
@@ -171,7 +171,7 @@ class LibraryWindow(ToolWindow):
 
     def open_chosen(self) -> None:
         """Play the recording that is selected."""
-        entry = self.table.chosen
+        entry = self.table.chosen_entry
         if entry is not None and not entry.problem:
             self.open_asked.emit(entry.path)
 
@@ -190,7 +190,7 @@ class LibraryWindow(ToolWindow):
 
     def delete_chosen(self) -> None:
         """Delete the recording that is selected; it lies in the trash until the page is closed."""
-        entry = self.table.chosen
+        entry = self.table.chosen_entry
         if entry is None:
             return
         try:
@@ -212,7 +212,7 @@ class LibraryWindow(ToolWindow):
 
     def collect_video(self) -> None:
         """Fetch the videos of the recording that is selected, in a worker."""
-        entry, rig = self.table.chosen, self._rig()
+        entry, rig = self.table.chosen_entry, self._rig()
         if entry is None or self._collecting is not None:
             return
         path, remaining = entry.path, Remaining(time.monotonic())

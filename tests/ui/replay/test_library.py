@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from fake_backend import InProcessSolver
 from person import Person
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QModelIndex, Qt
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QWidget
@@ -42,15 +42,18 @@ class Shelf(Person):
 
     @property
     def names(self) -> list[str]:
-        return [self.text(row, NAME) for row in range(self.window.table.rowCount())]
+        return [self.text(row, NAME) for row in range(len(self.window.table.records))]
 
     def text(self, row: int, column: int) -> str:
-        return self.window.table.item(row, column).text()
+        return self.window.table.text(row, column)
+
+    def index(self, name: str, column: int) -> QModelIndex:
+        return self.window.table.records_model.index(self.names.index(name), column)
 
     def choose(self, name: str) -> None:
         self.window.table.setFocus()
-        item = self.window.table.item(self.names.index(name), NAME)
-        self.click(self.window.table.viewport(), self.window.table.visualItemRect(item).center())
+        index = self.index(name, NAME)
+        self.click(self.window.table.viewport(), self.window.table.visualRect(index).center())
 
     def type_name(self, name: str) -> None:
         edit = self.window.table.findChild(QLineEdit)
@@ -112,10 +115,10 @@ def test_recordings_are_listed_with_rig_length_and_condition(make_shelf, folder,
     grasp, nothing, later = (shelf.names.index(name) for name in (GRASP, "nothing", "later"))
     shelf.until(lambda: shelf.text(grasp, LENGTH))
     assert shelf.text(grasp, LENGTH) == "0:04" and shelf.text(grasp, RIG)
-    codes = np.array(window.table.item(grasp, BAR).data(Qt.ItemDataRole.UserRole))
+    codes = np.array(shelf.index(GRASP, BAR).data(Qt.ItemDataRole.UserRole))
     assert len(codes) == BAR_PARTS and (codes == TRACKING).sum() > BAR_PARTS // 2
     shelf.until(lambda: shelf.text(nothing, LENGTH) == "0:00")
-    assert "no datagrams" in window.table.item(nothing, BAR).toolTip()
+    assert "no datagrams" in shelf.index("nothing", BAR).data(Qt.ItemDataRole.ToolTipRole)
     assert shelf.text(later, BAR) == "cannot be read"
     shelf.choose("later")
     assert "version 99" in window.sentence.text() and not window.open_button.isEnabled()
@@ -134,9 +137,9 @@ def test_a_summary_is_made_once(make_shelf, log, summary, tmp_path, monkeypatch)
 def test_a_recording_is_opened_by_button_and_by_double_click(shelf, log):
     shelf.choose(GRASP)
     shelf.click(shelf.window.open_button)
-    item = shelf.window.table.item(shelf.names.index(GRASP), NAME)
+    index = shelf.index(GRASP, NAME)
     QTest.mouseDClick(shelf.window.table.viewport(), Qt.MouseButton.LeftButton,
-                      pos=shelf.window.table.visualItemRect(item).center())
+                      pos=shelf.window.table.visualRect(index).center())
     QTest.keyClick(shelf.window.table, Qt.Key.Key_Return)
     assert shelf.opened == [log] * 3
 
@@ -149,7 +152,7 @@ def test_a_recording_is_renamed(shelf, log):
     shelf.type_name("thumb test")
     shelf.until(lambda: "thumb test" in shelf.names)
     assert renamed == [(log, log.with_name("thumb test.rhotlog"))] and not log.exists()
-    shelf.until(lambda: shelf.window.table.chosen.path.stem == "thumb test")
+    shelf.until(lambda: shelf.window.table.chosen_entry.path.stem == "thumb test")
 
 
 @pytest.mark.parametrize(("name", "why"), [("nothing", "already"), ("a/b", "no name for a recording"),
@@ -162,6 +165,17 @@ def test_a_name_that_cannot_be_is_refused_in_a_sentence(shelf, log, name, why):
     shelf.type_name(name)
     shelf.until(lambda: why in shelf.window.sentence.text() and not shelf.window.listing)
     assert log.exists() and GRASP in shelf.names
+
+
+def test_a_name_that_is_being_typed_stays_when_a_summary_comes(shelf, log, summary):
+    shelf.choose(GRASP)
+    shelf.click(shelf.window.rename_button)
+    edit = shelf.window.table.findChild(QLineEdit)
+    edit.selectAll()
+    QTest.keyClicks(edit, "half a na")
+    shelf.window.table.show_summary(log, summary, "")
+    assert edit.text() == "half a na"
+    QTest.keyClick(edit, Qt.Key.Key_Escape)
 
 
 def test_a_deleted_recording_comes_back(shelf, log, folder):
@@ -179,7 +193,7 @@ def test_a_deleted_recording_comes_back(shelf, log, folder):
     QTest.keyClick(shelf.window.table, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     shelf.until(lambda: GRASP in shelf.names and log.exists())
     shelf.until(lambda: not shelf.window.undo_button.isEnabled())
-    assert shelf.window.table.chosen.path == log
+    assert shelf.window.table.chosen_entry.path == log
 
 
 def test_closing_the_page_makes_an_end_of_what_was_deleted(shelf, log, folder):

@@ -1,0 +1,130 @@
+"""What the rig file says, to read: its cameras, markers and hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QShowEvent
+from PySide6.QtWidgets import QDialog, QLabel, QPushButton, QTabWidget, QVBoxLayout, QWidget
+
+from rhot_app.charts import hex_of
+from rhot_app.geometry.camera import CameraModel
+from rhot_app.hand.anatomy import FingerAnatomy
+from rhot_app.hand.skeleton import FINGERS
+from rhot_app.project import Rig, RigNode
+from rhot_app.ui.common.record_table import Column, RecordTable
+from rhot_node.markers import Marker
+
+_MARGIN_PX = 40
+_HEAD_PX = 190  # tabs, sentence, column heads and button
+
+
+def _field_of_view(node: RigNode) -> str:
+    return f"{np.degrees(CameraModel.from_rig(node.intrinsics, node.pose).field_of_view[0]):.1f}°"
+
+
+CAMERA_COLUMNS: tuple[Column[RigNode], ...] = (
+    Column("camera", lambda node: node.name),
+    Column("picture [px]", lambda node: f"{node.intrinsics.width} × {node.intrinsics.height}"),
+    Column("field of view", _field_of_view),
+    Column("focal length [px]", lambda node: f"{node.intrinsics.fx:.1f}, {node.intrinsics.fy:.1f}"),
+    Column("centre [px]", lambda node: f"{node.intrinsics.cx:.1f}, {node.intrinsics.cy:.1f}"),
+    Column("k1, k2", lambda node: "{:.3f}, {:.3f}".format(*node.intrinsics.distortion[:2])),
+    Column("address : port", lambda node: f"{node.address}:{node.control_port}"))
+
+
+def _colours(marker: Marker) -> dict[int, QColor]:
+    """The marker's colour, and what can be read on it."""
+    red, green, blue = marker.display_rgb
+    light = 0.3 * red + 0.6 * green + 0.1 * blue > 128
+    return {Qt.ItemDataRole.BackgroundRole: QColor(red, green, blue),
+            Qt.ItemDataRole.ForegroundRole: QColor("#000000" if light else "#ffffff")}
+
+
+MARKER_COLUMNS: tuple[Column[Marker], ...] = (
+    Column("marker", lambda marker: marker.id),
+    Column("colour", lambda marker: hex_of(marker.display_rgb), roles=_colours),
+    Column("place", lambda marker: (marker.role or "free").replace("_", " ")),
+    Column("shape", lambda marker: marker.shape),
+    Column("radius [mm]", lambda marker: f"{marker.radius_mm:.1f}" if marker.radius_mm else "–"))
+
+
+def _bone(number: int) -> Callable[[tuple[str, FingerAnatomy]], str]:
+    return lambda named: f"{named[1].bones_mm[number]:.1f}"
+
+
+HAND_COLUMNS: tuple[Column[tuple[str, FingerAnatomy]], ...] = (
+    Column("finger", lambda named: named[0]), Column("first bone [mm]", _bone(0)), Column("second [mm]", _bone(1)),
+    Column("last [mm]", _bone(2)), Column("marker to last joint [mm]", lambda named: f"{named[1].marker_mm:.1f}"))
+
+
+def baseline_text(rig: Rig) -> str:
+    """Distance of the first two cameras in words."""
+    if len(rig.nodes) < 2:
+        return "The rig has one camera; depth needs two."
+    if not all(rig.tracked_with[:2]):
+        return f"Where {rig.nodes[0].name} and {rig.nodes[1].name} stand to each other is not known."
+    first, second = (np.array(node.pose.translation_m) for node in rig.nodes[:2])
+    return f"{rig.nodes[0].name} and {rig.nodes[1].name} stand {1e3 * np.linalg.norm(second - first):.1f} mm apart."
+
+
+class RigDialog(QDialog):
+    """Three tabs; `page` is the one shown first: "cameras", "markers" or "hand"."""
+
+    def __init__(self, rig: Rig, page: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(f"Rig {rig.name}")
+        self.setProperty("guide", "calibration")
+        self.tabs = QTabWidget()
+        self.tabs.addTab(_page(_table(CAMERA_COLUMNS, rig.nodes), baseline_text(rig)), "Cameras")
+        self.tabs.addTab(_page(_table(MARKER_COLUMNS, rig.markers.markers),
+                               f"Marker set {rig.markers.name or 'without a name'}. Nodes and master must use the same "
+                               "one."), "Markers")
+        self.tabs.addTab(_page(_table(HAND_COLUMNS, [(name, rig.hand.fingers[name]) for name in FINGERS]),
+                               f"{rig.hand.name or 'Hand'}, {rig.hand.side} side; wrist "
+                               f"{rig.hand.wrist_breadth_mm:.0f} × {rig.hand.wrist_thickness_mm:.0f} mm."), "Hand")
+        self.tabs.setCurrentIndex(("cameras", "markers", "hand").index(page))
+        close = QPushButton("Close")
+        close.clicked.connect(self.reject)
+        layout = QVBoxLayout(self)
+        layout.addWidget(self.tabs)
+        layout.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Only now are fonts and paddings known."""
+        self._fit()
+        super().showEvent(event)
+
+    def _fit(self) -> None:
+        """Wide and tall enough for every table, as far as the screen allows; beyond that they scroll."""
+        tables = self.findChildren(RecordTable)
+        width = max(_width_of(table) for table in tables) + 2 * _MARGIN_PX
+        height = max(table.verticalHeader().length() for table in tables) + _HEAD_PX
+        room = self.screen().availableSize()
+        self.resize(min(max(width, 480), room.width() - _MARGIN_PX), min(height, room.height() - _MARGIN_PX))
+
+
+def _table(columns: Sequence[Column[Any]], records: Sequence[Any]) -> RecordTable[Any]:
+    table: RecordTable[Any] = RecordTable(columns, selectable=False)
+    table.setWordWrap(False)
+    table.show_records(records)
+    table.fit_columns()
+    return table
+
+
+def _width_of(table: RecordTable[Any]) -> int:
+    header = table.horizontalHeader()
+    return sum(max(table.sizeHintForColumn(k), header.sectionSizeHint(k)) for k in range(header.count()))
+
+
+def _page(table: RecordTable[Any], sentence: str) -> QWidget:
+    page = QWidget()
+    label = QLabel(sentence)
+    label.setWordWrap(True)
+    layout = QVBoxLayout(page)
+    layout.addWidget(label)
+    layout.addWidget(table, 1)
+    return page
