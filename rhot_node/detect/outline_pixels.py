@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_node.detect.coverage import COLLINEAR, FLATNESS, PIXELS_LEAST
-from rhot_node.detect.image import table_of
+from rhot_node.detect.image import EVEN, table_of
 
 # -- records -----------------------------------------------------------------------------------------------------------
 
@@ -26,7 +26,7 @@ ANGLES = np.arctan(np.arange(FINE + 2.0) / FINE)  # rad, by the tangent in FINE 
 
 BAND = 1.5  # px on either side of the outline that its blurred edge reaches
 RING_NEAR, RING_FAR = 1.4, 2.8  # px outside the outline: what surrounds the marker
-BLUR_VARIANCE = 0.2  # px^2: point spread of about 0.7 luma px and the 2x2 chroma mean
+BLUR_VARIANCE = (0.5 * 0.7) ** 2 + EVEN  # px^2: point spread of about 0.7 luma px and the 2x2 chroma mean
 BLUR_LEAST, BLUR_MOST = 0.38, 0.9  # px
 SLOW = 0.1  # gain of what changes slowly: shading, rim, blur
 SETTLED, RESTING = 9.0, 3.0  # frames until rim and blur are learnt, and the luma read, in every third frame only

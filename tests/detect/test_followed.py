@@ -8,7 +8,7 @@ import tracemalloc
 import msgspec
 import numpy as np
 import pytest
-from marker_rendering import SKIN, Canvas, Rgb, disc
+from marker_rendering import SKIN, Canvas, Rgb, capsule, disc
 from shipped_markers import RHOT6
 
 from rhot_node.detect import outline_pixels
@@ -39,6 +39,19 @@ def single(name: str, x: float, y: float, edge: bool = False) -> tuple[FastDetec
         canvas.paint(lambda px, py: px + 0.0 * py < 50.0, SKIN, (0, 48), 120)
     return (FastDetector(MarkerSet(markers=(marker,))),
             canvas.paint(disc(x, y, 10), marker.display_rgb, (50, 44), 13, 0.25))
+
+
+def test_an_edge_is_as_wide_as_the_lens_and_the_mean_of_four_pixels_make_it() -> None:
+    places, shares = [], []
+    for shift in np.arange(128) / 64.0:
+        edge = 60.0 + float(shift)  # luma px; a chroma pixel's centre is at 2 x + 0.5
+        canvas = Canvas(120, 16, (0, 0, 0)).paint(capsule((-900, 8), (edge - 400, 8), 400), (1, 1, 1), (60, 8), 90)
+        shares.append(canvas.seen()[8, :, 0].reshape(60, 2).mean(axis=1))
+        places.append(np.arange(60) - 0.5 * (edge - 0.5))
+    away, share = np.concatenate(places), np.concatenate(shares)
+    near = np.abs(away) < 2.0
+    variance = 2.0 / 128.0 * (away * (share - (away < 0.0)))[near].sum()
+    assert variance == pytest.approx(outline_pixels.BLUR_VARIANCE, abs=0.003)
 
 
 @pytest.mark.parametrize("name", ["thumb", "index", "ring"])
