@@ -171,6 +171,7 @@ class _Paper:
                                                  self.at(x + 0.5 * curve.width, min(y, foot)))
                     self.marks.append(Box(left, top, right - left, max(low - top, 0.2), ink))
             case "whiskers":
+                known = known & np.isfinite(high)
                 for x, y, end in zip(curve.x[known], curve.y[known], high[known], strict=True):
                     self.marks.append(Stroke((self.at(x, y), self.at(x, end)), _WIDTHS["whiskers"], ink))
             case "band":
@@ -181,7 +182,7 @@ class _Paper:
 
     def _line(self, x: Array, y: Array, known: NDArray[np.bool_], ink: Ink, style: str) -> None:
         """A stroke for every run of known values; dashes are every other piece of it."""
-        for run in np.ma.clump_unmasked(np.ma.masked_array(x, ~known)):
+        for run in np.ma.clump_unmasked(np.ma.masked_array(x, ~known)) if known.any() else ():
             points = np.array([self.at(a, b) for a, b in zip(x[run], y[run], strict=True)])
             if style == "dashes":
                 along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])

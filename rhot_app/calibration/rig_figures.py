@@ -26,7 +26,7 @@ def figures_of(rig: Rig) -> Iterator[Figure]:
     depth = rig.depth
     yield Figure("distance from", "calibrated cameras" if depth.mode == "stereo" else "disparity alone")
     if depth.k is not None and depth.z is not None:
-        yield Figure("k", depth.k, "m", decimals=4)
+        yield Figure("k", 100.0 * depth.k, "cm", decimals=2)
         yield Figure("z", depth.z, decimals=4)
     yield Figure("tracker", tracker_text(rig.tracker))
 

@@ -37,7 +37,7 @@ def _static(line: Line) -> Chart:
     """Figure 7.7: bars per marker and axis, and the thesis's range."""
     names = tuple(line.curves)
     values = np.nan_to_num(np.array([_values(line, name)[:2] for name in names]))
-    low = min(10.0 ** (math.ceil(math.log10(max(values[values > 0.0].min(), 1e-3))) - 1), 0.01)
+    low = min(10.0 ** (math.ceil(math.log10(max(values[values > 0.0].min(initial=10.0), 1e-3))) - 1), 0.01)
     at, span = np.arange(len(names), dtype=np.float64), (-0.6, len(names) - 0.4)
     least, most = (_level(name, span, value, THESIS) for name, value in
                    zip(("thesis: 2 to 5 px", ""), thesis.JITTER_PX, strict=True))
@@ -56,7 +56,7 @@ def _depth(line: Line) -> Chart:
     theirs = 100.0 * (depth_from_disparity(thesis.DISPARITY_PX, thesis.BASELINE_M, thesis.WIDTH_PX,
                                            math.radians(thesis.VIEW_ANGLE_DEG)) / thesis.REAL_M - 1.0)
     corrected = 100.0 * (thesis.POWER_K_M * thesis.DISPARITY_PX**thesis.POWER_Z / thesis.REAL_M - 1.0)
-    most = 1.1 * max(6.0, float(np.abs(off).max()))
+    most = 1.1 * max(6.0, float(np.nanmax(np.abs(off))))
     return Chart("Deviation from the ruler (table 10.1, figure 7.8)", "cm by the ruler", "%", (
         Curve("one pixel, eq. 7.3", at, pixel, colour=GREY), Curve("", at, -pixel, colour=GREY),
         Curve("thesis, eq. 6.12", 100.0 * thesis.REAL_M, theirs, "dots", colour=THESIS),

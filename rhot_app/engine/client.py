@@ -37,7 +37,10 @@ VANISHED_S = 1.0
 ABSENT_S = 2.0
 """An engine that starts makes its sockets sooner."""
 
-_ALIVE_S = 5.0  # so often an engine that is at a slow command is asked whether it is still there
+ASKED_S, SILENT_S = 5.0, 30.0
+"""So often an engine that is at a slow command is asked whether it is still there, and after so long without an answer
+it is not: a busy computer may keep it from answering for some seconds."""
+
 _RECEIVE_QUEUE = 2000  # messages a slow client may fall behind before the oldest are dropped
 
 
@@ -106,21 +109,30 @@ class EngineClient:
             socket.connect(self.directory.commands)
             socket.send(msgspec.json.encode({"command": name, **arguments}))
             absent = not Path(self.directory.commands.removeprefix("ipc://")).exists()
-            answered = socket.poll(round(1e3 * (min(timeout_s, ABSENT_S) if absent else timeout_s)))
-            timeout_s = max(timeout_s, SLOW_S.get(name, 0.0))
-            while not (answered or absent) and time.monotonic() < begun_s + timeout_s:
-                self.command("hello")
-                answered = socket.poll(round(1e3 * _ALIVE_S))
-            if not answered:
+            if absent:
+                timeout_s = min(timeout_s, ABSENT_S)
+            elif name in SLOW_S:
+                self._follow(socket, SLOW_S[name])
+                timeout_s = 0.0
+            if not socket.poll(round(1e3 * timeout_s)):
                 if absent:
                     raise EngineError(f"There is no engine in {self.directory.path}. Start it with "
                                       "`rhot engine --rig FILE`.")
-                raise EngineError(f"the engine in {self.directory.path} gave no answer to {name!r} in {timeout_s:g} s. "
-                                  "Is it running? Start it with `rhot engine --rig FILE`.")
+                raise EngineError(f"the engine in {self.directory.path} gave no answer to {name!r} in "
+                                  f"{time.monotonic() - begun_s:.0f} s. Is it running? Start it with "
+                                  "`rhot engine --rig FILE`.")
             frames = socket.recv_multipart()
         finally:
             socket.close()
         return _read_answer(frames)
+
+    def _follow(self, socket: zmq.Socket[bytes], most_s: float) -> None:
+        """Wait until an answer has come, or `most_s` are over, or the engine has answered nothing for `SILENT_S`."""
+        begun_s = heard_s = time.monotonic()
+        while not socket.poll(round(1e3 * ASKED_S)) and time.monotonic() < min(begun_s + most_s, heard_s + SILENT_S):
+            with contextlib.suppress(EngineError):
+                self.command("hello")
+                heard_s = time.monotonic()
 
     def rig(self, *, timeout_s: float = 3.0) -> Rig:
         """The engine's rig. Raises EngineError as `command` does."""

@@ -44,6 +44,14 @@ def test_a_line_is_interrupted_where_nothing_is_known_and_stays_on_the_paper() -
     assert drawn[0][1, 1] == pytest.approx(drawn[1][0, 1]) and (np.concatenate(drawn) > 0.0).all()
 
 
+@pytest.mark.parametrize("style", ["line", "dashes", "dots", "band", "bars", "whiskers"])
+def test_what_is_not_known_is_not_drawn(style: str) -> None:
+    for x in (X, X[:0]):
+        for y, high in ((x, np.full(len(x), np.nan)), (np.full(len(x), np.nan), x)):
+            svg = Chart("t", "", "mm", (Curve("a", x, y, style, high),)).draw().to_svg()  # type: ignore[arg-type]
+            assert b"nan" not in svg
+
+
 @pytest.mark.parametrize(("span", "log", "expected"), [
     ((0.0, 10.0), False, [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]), ((-6.6, 6.6), False, [-5.0, 0.0, 5.0]),
     ((0.01, 10.0), True, [0.01, 0.1, 1.0, 10.0]), ((1.0, 10.0), True, [1.0, 2.0, 5.0, 10.0])])

@@ -1,6 +1,7 @@
 """Client and server over real sockets: commands, refusals, streams, a node's control channel, a vanished engine."""
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +29,7 @@ from rhot_app.sources.links import UdpNodes
 from rhot_app.state import HandState
 from rhot_node.files import JSON_BYTES_MAX
 from rhot_node.keys import new_key_pair
+from rhot_node.network.context import Context
 from rhot_node.threads import OneShotThread
 from rhot_node.wire.messages import NodeState
 
@@ -221,7 +223,7 @@ def test_status_and_commands_go_on_while_a_rigs_tracker_is_compiled(
     try:
         with EngineClient(tmp_path / "slow") as client, EngineClient(tmp_path / "slow") as changer:
             slow = msgspec.to_builtins(msgspec.structs.replace(rig, name="slow"))
-            change = threading.Thread(target=lambda: changer.command("set_rig", timeout_s=0.1, document=slow))
+            change = threading.Thread(target=lambda: changer.command("set_rig", document=slow))
             change.start()
             eventually(lambda: any("prepared" in one.text for one in client.status.advice) if client.poll(0.05)
                        and client.status else False)
@@ -234,6 +236,42 @@ def test_status_and_commands_go_on_while_a_rigs_tracker_is_compiled(
     finally:
         SlowTracker.compiled.set()
         bench.close()
+
+
+def test_a_rig_is_waited_for_while_the_engine_is_too_busy_to_answer(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine_client, "ASKED_S", 0.1)
+    busy_s = 3.5  # a question of its own, "hello", fails meanwhile
+    context = Context()
+    socket = context.socket(zmq.ROUTER)
+    socket.bind(EngineDirectory(tmp_path).commands)
+    begun_s = time.monotonic()
+
+    def serve() -> None:
+        time.sleep(busy_s)
+        while socket.poll(1000):
+            client, empty, text = socket.recv_multipart()
+            socket.send_multipart([client, empty, b'{"ok": true, "asked": %s}' % text])
+
+    server = threading.Thread(target=serve)
+    server.start()
+    try:
+        with EngineClient(tmp_path) as client:
+            assert client.command("set_rig", document={})["asked"]["command"] == "set_rig"
+        assert time.monotonic() - begun_s >= busy_s
+    finally:
+        server.join()
+        context.destroy(0)
+
+
+def test_an_engine_that_is_silent_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine_client, "ASKED_S", 0.1)
+    monkeypatch.setattr(engine_client, "SILENT_S", 0.5)
+    context = Context()
+    context.socket(zmq.ROUTER).bind(EngineDirectory(tmp_path).commands)
+    with EngineClient(tmp_path) as client, pytest.raises(EngineError, match="set_rig"):
+        client.command("set_rig", document={})
+    context.destroy(0)
 
 
 def test_what_fails_in_a_thread_of_the_engine_is_told(bench: Bench, client: EngineClient) -> None:

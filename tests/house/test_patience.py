@@ -19,6 +19,7 @@ MAY_SLEEP = {
     "node/test_link.py": "a program that is late", "sources/test_receiver.py": "a program that is late",
     "node/node_fakes.py": "a camera's own pace", "node/node_process.py": "a camera's own pace",
     "simulator/test_proxy.py": "a node's own pace",
+    "engine/test_server_and_client.py": "an engine that is late",
     "e2e/test_virtual_screen.py": "between two presses of Ctrl-C",
     "ui/wizards/slow_work.py": "work that takes long",
     "ui/wizards/test_wizard_feed.py": "a look that takes long, and work in full swing",

@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
         raise CalibrationError(f"{args.rig}: disparity needs two cameras, the rig has {len(rig.nodes)}.")
     result = fit_depth(read_depth_table(args.table), _geometry(args, rig))
     written = "" if rig is None else propose(result, rig).save(args.out)
-    return show(report(result, rig if args.out is not None else None), as_json=args.json, written=written)
+    return show(report(result, rig if written else None), as_json=args.json, written=written)
 
 
 def _geometry(args: argparse.Namespace, rig: Rig | None) -> DepthGeometry:
@@ -97,7 +97,7 @@ def report(result: DepthReport, rig: Rig | None = None) -> Report:
               Curve("measured", np.abs([row.disparity_px for row in result.rows]),
                     100 * np.array([row.distance_m for row in result.rows]), "dots"))
     return Report(
-        verdict, (Figure("distance from", "disparity alone"), Figure("k", result.k_m, "m", decimals=4),
+        verdict, (Figure("distance from", "disparity alone"), Figure("k", 100.0 * result.k_m, "cm", decimals=2),
                   Figure("z", result.z, sd=result.z_sd, key="z", sd_key="z_sd")),
         (Table("rows", tuple(rows)),), ("Distance is k · |disparity|^z.",
                                         *(f"left out: {row.where}: {row.reason}" for row in result.rejected)),

@@ -254,7 +254,7 @@ def report(result: StereoReport, frame: WorldFrame | None = None) -> Report:
     squares, board, ruler, (by_rig, by_noise) = figures.squares, figures.board_errors, figures.ruler, figures.error_m
     said = [distance_figure(pair.first, pair.second, pair.baseline_m, pair.baseline_std_m) for pair in figures.pairs]
     said += [
-        Figure("corners, rms", figures.rms_px, "px", key="rms_px"),
+        Figure("corners, rms", figures.rms_px, "px", decimals=3, key="rms_px"),
         Figure("shots", len(figures.shots), decimals=0, key="views_used"),
         Figure(f"{figures.board.parts} of {1e3 * figures.board.square_m:.2f} mm, as seen", 1e3 * squares.mean_m, "mm",
                1e3 * squares.std_m, key="square_mm_triangulated", sd_key="square_std_mm"),
@@ -319,7 +319,8 @@ def _lens(camera: CameraFigures) -> tuple[list[Figure], tuple[Figure, ...]]:
     std = {name: float(std) for name, std, has in zip(PARAMETERS, camera.lens_std, own, strict=True) if has}
     lens = list(lens_figures(camera.name, rig_intrinsics(camera.size, camera.lens), std))
     return [replace(one, key="") for one in lens], (
-        Figure("camera", camera.name, key="name"), Figure("corners, rms", camera.rms_px, "px", key="rms_px"),
+        Figure("camera", camera.name, key="name"),
+        Figure("corners, rms", camera.rms_px, "px", decimals=3, key="rms_px"),
         *(replace(one, name="") for one in lens), Figure("", camera.size, key="size"), Figure("", std, key="std"))
 
 

@@ -79,13 +79,13 @@ class Alignment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("covariance is not symmetric, or a variance is negative")
 
 
-def to_alignment(report: AlignmentReport) -> Alignment:
-    """What is kept of a calibration."""
+def to_alignment(report: AlignmentReport, created: str | None = None) -> Alignment:
+    """What is kept of a calibration that was solved at `created`, ISO 8601; None: now."""
     fit = report.fit
     covariance = 0.5 * (report.covariance + report.covariance.T)
     return Alignment(_transform(fit.rig_from_foreign), _transform(fit.tracker_from_body), fit.offset_s,
                      tuple(tuple(map(float, row)) for row in covariance), fit.noise_m, fit.rms_m, fit.inlier_ratio,
-                     datetime.now(UTC).isoformat(timespec="seconds"))
+                     created or datetime.now(UTC).isoformat(timespec="seconds"))
 
 
 def alignment_path(rig_path: Path) -> Path:

@@ -7,6 +7,7 @@ import json
 import math
 import sys
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -172,11 +173,13 @@ class StreamRecording:
 
 @dataclass(frozen=True, eq=False)
 class AlignmentResult:
-    """A solved alignment, its search, and the test of the one that was in use; None when there was none."""
+    """A solved alignment, its search, the test of the one that was in use, None when there was none, and when it was
+    solved, ISO 8601."""
 
     report: AlignmentReport
     search: OffsetSearch
     drift: Drift | None
+    created: str
 
 
 def solve_recording(recording: StreamRecording, before: Alignment | None, *, progress: Progress) -> AlignmentResult:
@@ -190,7 +193,8 @@ def solve_recording(recording: StreamRecording, before: Alignment | None, *, pro
     rig = MotionStream(recording.rig_s, recording.places)
     fit, search = align(foreign, rig, SEARCH_S, progress)
     drift = None if before is None else DriftMonitor.test_streams(before, foreign, rig)
-    return AlignmentResult(judge_alignment(fit, search), search, drift)
+    created = datetime.now(UTC).isoformat(timespec="seconds")
+    return AlignmentResult(judge_alignment(fit, search), search, drift, created)
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,5 +247,5 @@ def propose(result: AlignmentResult, before: Alignment | None, path: Path | None
              f"stale: {1e3 * drift.distance_m:.1f} mm off" if drift.stale else "holds")
     rows = tuple(Row(one.name, known.get(one.name, ""), one.brief) for one in said.figures if one.name)
     return Proposal(ALIGNMENT.reason, said.verdict, (Row("alignment in use", state, "just solved"), *rows),
-                    changes=(AlignmentChange(before, to_alignment(result.report), path),),
+                    changes=(AlignmentChange(before, to_alignment(result.report, result.created), path),),
                     afterwards="" if path is None else f"It is in {path.name}, beside the rig.")

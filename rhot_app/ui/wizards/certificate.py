@@ -63,16 +63,17 @@ def make_wizard(context: WizardContext) -> Definition:
              FlashPage(made["flash"], context.connect, movements.states, said),
              MovementPage(made["plumb"], context.connect, movements.states))
     solve = SolveStep(lambda: task_of(said, made), report)
-    keep = KeepStep(lambda: propose(solve.result, lambda: _place(context.rig.name)), context.rig_path,
+    keep = KeepStep(lambda: propose(solve.result, lambda created: _place(context.rig.name, created)), context.rig_path,
                     "Record a step first.")
     return Definition(CERTIFICATE.title, (*pages, ChartPage(solve, context.scheme), KeepPage(keep, context.scheme)),
                       solver="rhot_app.certificate.certify", put_back=movements.end)
 
 
-def _place(rig: str) -> Path:
-    """A new folder in the user's documents."""
+def _place(rig: str, created: str) -> Path:
+    """A folder in the user's documents for a certificate that was `created` then, ISO 8601."""
     name = "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in rig)
-    return user_documents_path() / "RHOT" / "certificates" / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+    made = datetime.fromisoformat(created).astimezone()
+    return user_documents_path() / "RHOT" / "certificates" / f"{name}-{made:%Y%m%d-%H%M%S}"
 
 
 class StillPage(MovementPage):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from fake_engine import synthetic_rig
 from moved_tracker import DELAY_S, FOREIGN_FROM_RIG, TRACKER_FROM_FINGER, MovedTracker
 from msgspec.structs import replace
+from patience import eventually
 from PySide6.QtCore import Qt
 from wizard_hand import RecordingAsker
 
@@ -21,6 +23,7 @@ from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.models.proposal import use_all
 from rhot_app.ui.wizards import alignment
 from rhot_app.ui.wizards.alignment import TogetherStep, in_use
+from rhot_app.ui.wizards.models.step import AcceptStep
 
 MARKERS = synthetic_rig().markers.ids
 
@@ -117,6 +120,12 @@ def test_an_alignment_that_holds_no_longer_is_called_stale(tmp_path):
     movement.record(9.0)
     result, proposal, path = movement.solve(tmp_path / "desk.json")
     assert result.drift is None
+    step = AcceptStep(lambda: propose(result, None, path), None)
+    step.enter()
+    entered_s = time.time()
+    eventually(lambda: int(time.time()) > int(entered_s))  # files are stamped to the second
+    step.enter()
+    assert step.proposal == proposal, "coming back to the page later finds the same proposal"
     use_all(proposal.changes, None)
     saved = load_alignment(path)
     check(saved)

@@ -215,12 +215,13 @@ def _headline(line: Line) -> str:
     return f"{chief.name} {in_words(chief.interval, chief.unit)}"
 
 
-def propose(result: tuple[ProtocolFile, Certificate] | None, folder: Callable[[], Path]) -> Proposal | None:
-    """The lines of the certificate as rows: title, verdict, and the figure that it rests on or what to do."""
+def propose(result: tuple[ProtocolFile, Certificate] | None, folder: Callable[[str], Path]) -> Proposal | None:
+    """The lines of the certificate as rows: title, verdict, and the figure that it rests on or what to do. `folder`:
+    where one that was made then, ISO 8601, is written."""
     if result is None:
         return None
     rows = tuple(Row(line.title, line.verdict, _headline(line)) for line in result[1].lines)
-    place = folder()
+    place = folder(result[1].created)
     return Proposal(CERTIFICATE.reason, verdict_of(result), rows, changes=(WriteCertificate(place, result),),
                     afterwards=f"It stands in {place}: certificate.html, .pdf and .json, with the recordings.")
 
