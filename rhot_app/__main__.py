@@ -132,7 +132,11 @@ def _command_first(arguments: list[str]) -> list[str]:
     rest = before.parse_known_args(arguments)[0].rest
     if not rest or rest[0] not in SUBCOMMANDS:
         return arguments
-    return [rest[0], *arguments[:len(arguments) - len(rest)], *rest[1:]]
+    room, count = argparse.ArgumentParser(), 1
+    _load(SUBCOMMANDS[rest[0]].module).add_arguments(room)
+    while (inner := _inner(room, rest[count:count + 1])) is not room:  # `mouse run` is one command
+        room, count = inner, count + 1
+    return [*rest[:count], *arguments[:len(arguments) - len(rest)], *rest[count:]]
 
 
 def _inner(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> argparse.ArgumentParser:

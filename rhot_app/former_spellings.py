@@ -10,18 +10,27 @@ import shlex
 import sys
 from collections.abc import Iterable, Sequence
 
+from rhot_app.errors import SimulatorError
+
 _SCENE = {
     "--background": "--set background={}", "--back": "--set facing=back", "--worn": "--set worn_paint={}",
     "--uneven": "--set uneven_paint={}", "--glove": "--set glove_rgb={}", "--lamp": "--set lamp.brightness={}",
     "--kelvin": "--set lamp.kelvin={}", "--mains": "--set lamp.mains_hz={}",
 }
+_OF_SHOW = {
+    "board": {
+        "--board": "--set show.size={}", "--square-mm": "--set show.square_mm={}",
+        "--charuco": "--set show.pattern=charuco", "--marker-mm": "--set show.marker_mm={}",
+        "--dictionary": "--set show.dictionary={}", "--legacy-pattern": "--set show.legacy=true",
+        "--legacy": "--set show.legacy=true", "--on-table": "--set show.on_table=true"},
+    "ruler": {"--ruler-mm": "--set show.length_mm={}"},
+    "marker": {"--marker": "--set show.marker={}", "--moving": "--set show.moving=true"},
+}
+"""By what is shown: options that were ignored beside anything else."""
+
 _SHOW = {
     "--cube": "--set show.cube=true", "--bare": "--show bare-hand", "--tone": "--set show.tone={}",
-    "--sleeve": "--set show.sleeve=true", "--board": "--set show.size={}", "--square-mm": "--set show.square_mm={}",
-    "--charuco": "--set show.pattern=charuco", "--marker-mm": "--set show.marker_mm={}",
-    "--dictionary": "--set show.dictionary={}", "--legacy-pattern": "--set show.legacy=true",
-    "--legacy": "--set show.legacy=true", "--on-table": "--set show.on_table=true",
-    "--ruler-mm": "--set show.length_mm={}", "--marker": "--set show.marker={}", "--moving": "--set show.moving=true",
+    "--sleeve": "--set show.sleeve=true", **_OF_SHOW["board"], **_OF_SHOW["ruler"], **_OF_SHOW["marker"],
 }
 _LENSES = {"--left-intrinsics": "--intrinsics left={}", "--right-intrinsics": "--intrinsics right={}"}
 _OPTIONS: dict[str, dict[str, str]] = {
@@ -45,11 +54,30 @@ _COMPARED = "rest,wave,grasp,pinch,fast"
 
 def present_spelling(arguments: Sequence[str]) -> list[str]:
     """The same command line as it is spelt now; a note on standard error says what has changed."""
-    present = _certified(_tracked(_board(_options_of(_with_subcommand(list(arguments))))))
+    said, ignored = _shown(list(arguments))
+    present = _certified(_tracked(_board(_options_of(_with_subcommand(said)))))
     if present != list(arguments):
-        print(f"rhot: this is the former spelling, read for one release. Now: rhot {shlex.join(present)}",
+        left = f" Left out, because it says nothing of what is shown: {', '.join(ignored)}." if ignored else ""
+        print(f"rhot: this is the former spelling, read for one release.{left} Now: rhot {shlex.join(present)}",
               file=sys.stderr)
     return present
+
+
+def _shown(arguments: list[str]) -> tuple[list[str], list[str]]:
+    """The arguments of `simulate` without the options that were ignored, and these. Raises SimulatorError."""
+    if arguments[:1] != ["simulate"]:
+        return arguments, []
+    rest, shows = _taken(arguments, ["--show"])
+    show = shows[-1][1] if shows else "hand"
+    if "--bare" in arguments:
+        if show not in ("hand", "bare-hand"):
+            raise SimulatorError(f"--bare is of a hand: leave out --show {show}, or it.")
+        arguments = rest
+    elif not shows and _taken(arguments, ["--scene"])[1]:
+        return arguments, []  # the file says what is shown
+    other = {option: new for one, options in _OF_SHOW.items() if one != show for option, new in options.items()}
+    kept, ignored = _taken(arguments, other, [option for option, new in other.items() if "{}" not in new])
+    return kept, [option for option, _ in ignored]
 
 
 def _with_subcommand(arguments: list[str]) -> list[str]:

@@ -83,8 +83,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_run(parser: argparse.ArgumentParser) -> None:
+    add_directory_argument(parser)
     source = parser.add_mutually_exclusive_group()
-    add_directory_argument(source)
     source.add_argument("--simulated", action="store_true",
                         help="start a simulated rig whose hand works the mouse, and end it afterwards")
     source.add_argument("--log", type=input_file, metavar="LOG",
@@ -150,8 +150,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace) -> None:
     """Raises OutputError when options contradict each other."""
-    if args.log is not None and args.seconds is not None:
-        raise OutputError("--log reads a recording to its end; leave --seconds out.")
+    if args.log is not None and (args.seconds is not None or args.directory is not None):
+        raise OutputError("--log reads a recording to its end; leave "
+                          f"--{'directory' if args.seconds is None else 'seconds'} out.")
     if args.log is not None and (args.pointer or args.osc is not None):
         raise OutputError("--log is read as fast as it can be, too fast for --pointer and --osc; leave them out.")
     if args.rig is not None and args.log is None:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from rhot_app.simulator.film.film import Progress
     from rhot_app.simulator.film.shot import Shot
 
+SECONDS = 10.0
 MOST_PICTURES = 999
 POINT_SIGMA_PX = 0.12
 
@@ -31,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``rhot simulate``."""
     add_scene_arguments(parser)
     add_show_argument(parser)
-    add_seconds_argument(parser, "length of the recording", 10.0)
+    add_seconds_argument(parser, f"length of the recording (default {SECONDS:g})", None)
     add_out_argument(parser, "new folder for the frames (DIR/left, DIR/right), truth.npz and shot.json; to play it to "
                      "two nodes on this machine, their settings (left.json, right.json) and rig.json. A name "
                      "that ends in .json: write the scene alone, for --scene", required=True, metavar="DIR")
@@ -55,9 +56,10 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.progress import ProgressLine
     from rhot_app.simulator.film.shot import make_shot
 
-    _check(args)
     if args.out.suffix == ".json":
         return _write_scene(args)
+    args.seconds = SECONDS if args.seconds is None else args.seconds
+    _check(args)
     announce_compilation()
     if args.depth_table is not None:
         return _write_depth_table(args)
@@ -101,6 +103,10 @@ def _write_scene(args: argparse.Namespace) -> int:
     from rhot_app.errors import SimulatorError
     from rhot_app.simulator.scene.scene_file import write_scene
 
+    for name in ("seconds", "pictures", "points", "depth_table", "hide"):
+        if getattr(args, name) not in (None, []):
+            raise SimulatorError(f"--out {args.out} writes the scene alone, without pictures: leave out "
+                                 f"--{name.replace('_', '-')}, or name a folder.")
     if args.out.exists():
         raise SimulatorError(f"{args.out} exists already; choose another name or remove it.")
     write_scene(args.out, fields_of(args))

@@ -28,7 +28,7 @@ class Actions(QObject):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
-        self.start = self._make("Start", "", "Tell the nodes to stream, or to stop (Space).")
+        self.start = self._make("Start", "", "Tell the nodes to stream, or to stop.")
         self.record = self._make("Record", "R", "Write the raw log of all datagrams, or end it.")
         self.bookmark = self._make("Bookmark", "B", "Write a few words about this moment into the recording.")
         self.video = self._make("Record video, too", "", "Each camera writes its own frames as long as the next "

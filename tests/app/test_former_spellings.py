@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rhot_app import former_spellings
-from rhot_app.__main__ import parse
+from rhot_app.__main__ import main, parse
 from rhot_app.former_spellings import present_spelling
 from rhot_app.simulator.scene.scene_arguments import scene_of, show_of
 
@@ -39,12 +39,40 @@ DOCUMENT = (Path(__file__).parents[2] / "docs" / "commands.md").read_text()
     ("certify --step static=s --step=ruler:30=r --step rod=o --step plumb=p --facing back --marker m --rod-mm 5 "
      "--rod-markers a,b", "certify --step static:back=s --step=ruler:30:m=r --step rod:5:a,b=o --step plumb:a,b=p"),
     ("--directory here mouse --pointer", "mouse run --directory here --pointer"),
+    ("mouse --simulated --directory here --gain 2", "mouse run --simulated --directory here --set gain=2"),
+    ("simulate --bare --show hand --out a", "simulate --show bare-hand --out a"),
+    ("simulate --scene NONE --moving --out a", "simulate --scene NONE --set show.moving=true --out a"),
 ])
 def test_a_former_line_is_read_as_the_present_one(former: str, now: str, capsys: pytest.CaptureFixture[str]) -> None:
     _, parsed = parse(shlex.split(former))
     note = capsys.readouterr().err
     assert note == f"rhot: this is the former spelling, read for one release. Now: rhot {now}\n"
     assert vars(parse(shlex.split(now))[1]) == vars(parsed) and not capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("former", "left", "now"), [
+    ("--charuco --square-mm 25", "--charuco, --square-mm", ""), ("--moving --on-table", "--moving, --on-table", ""),
+    ("--marker index --distance 0.5", "--marker", "--distance 0.5"), ("--ruler-mm 100", "--ruler-mm", ""),
+    ("--show ruler --square-mm 25", "--square-mm", "--show ruler"),
+    ("--bare --charuco", "--charuco", "--show bare-hand"),
+    ("--show board --marker thumb --board=8x5", "--marker", "--show board --set show.size=8x5")])
+def test_a_former_option_of_what_is_not_shown_is_left_out(former: str, left: str, now: str,
+                                                          capsys: pytest.CaptureFixture[str]) -> None:
+    parsed = parse(["simulate", *former.split(), "--out", "a"])[1]
+    assert f"says nothing of what is shown: {left}. Now: rhot simulate" in capsys.readouterr().err
+    assert vars(parse(["simulate", *now.split(), "--out", "a"])[1]) == vars(parsed)
+    show_of(parsed)
+
+
+def test_a_bare_hand_beside_another_show_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "--show", "empty", "--bare", "--out", str(tmp_path / "a")]) == 2
+    assert "leave out --show empty" in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
+def test_a_command_of_two_words_may_follow_the_apps_options(capsys: pytest.CaptureFixture[str]) -> None:
+    parsed = parse(shlex.split("--directory here mouse run --pointer"))[1]
+    assert vars(parse(shlex.split("mouse run --directory here --pointer"))[1]) == vars(parsed)
+    assert not capsys.readouterr().err
 
 
 @pytest.mark.parametrize("present", ["replay a.rhotlog --json", "evaluate --help", "mouse run --json", "export --back",

@@ -94,7 +94,9 @@ def test_the_board_is_the_one_of_rhot_target_where_nobody_names_another() -> Non
 
 @pytest.mark.parametrize(("text", "board"), [
     ("charuco", CharucoBoard(10, 7, 0.025, 0.75 * 0.025)), ("8x5", Chessboard(8, 5, 0.025)),
-    ("9,6", Chessboard(9, 6, 0.025)), ("circles,4x9", CircleGrid(4, 9, 0.025)), ("", STANDARD_BOARD),
+    ("9,6", Chessboard(9, 6, 0.025)), ("charuco, 9, 6,marker_mm=15", CharucoBoard(9, 6, 0.025, 0.015)),
+    ("marker_mm=15,9,6", CharucoBoard(9, 6, 0.025, 0.015)), ("circles,4x9", CircleGrid(4, 9, 0.025)),
+    ("", STANDARD_BOARD),
     ("charuco, 8x5, marker_mm=15, dictionary=DICT_5X5_100, legacy",
      CharucoBoard(8, 5, 0.025, 0.015, "DICT_5X5_100", True)),
     ("aprilgrid,6x6,tag_spacing=0.2", AprilGrid(6, 6, 0.025, 0.2))])

@@ -32,7 +32,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.errors": ("rhot_node.files",),
     "rhot_app.diagnostics": (),
     "rhot_app.options": ("rhot_app.errors",),
-    "rhot_app.former_spellings": (),
+    "rhot_app.former_spellings": ("rhot_app.errors",),
     "rhot_app.progress": ("rhot_node.errors",),
     "rhot_app.charts": ("rhot_app.vector_graphics",),
     "rhot_app.vector_graphics": (),

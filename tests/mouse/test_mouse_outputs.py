@@ -135,6 +135,7 @@ FORMER = ("--measure", "--gain")
     (("--gain", "-1"), "--set gain=-1: -1 is not"), (("--set", "speed=1"), "the names are gain, height_gain"),
     (("--set", "height_from=wrist"), "it is index or palm"), (("--set", "on_table"), "it is true or false"),
     (("--log", __file__, "--simulated"), "not allowed with"),
+    (("--log", __file__, "--directory", "NONE"), "leave --directory out"),
     (("--seed", "1.5"), "1.5 is not a whole number"), (("--log", "NONE"), "none"),
     (("--directory", "NONE"), "no engine is heard")])
 def test_contradictory_options_end_with_a_sentence(arguments: tuple[str, ...], words: str, tmp_path: Path,

@@ -12,7 +12,7 @@ from rhot_app.__main__ import main, parse
 from rhot_app.simulator.film.shot import make_shot, save_shot
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 from rhot_app.simulator.scene.scene_arguments import scene_of, show_of
-from rhot_app.simulator.scene.scene_description import BoardShow, HandShow
+from rhot_app.simulator.scene.scene_description import BoardShow, HandShow, MarkerShow
 
 
 def written(path: Path, **fields: Any) -> str:
@@ -59,6 +59,22 @@ def test_a_recordings_shot_is_a_scene(tmp_path: Path) -> None:
     assert main(["simulate", "--scene", str(tmp_path / "shot.json"), "--out", str(tmp_path / "new")]) == 2
 
 
+@pytest.mark.parametrize(("words", "show"), [
+    (("--show", "board", "--set", "show.size=9,6"), BoardShow(size="9,6")),
+    (("--show", "marker", "--set", "show.marker=1"), MarkerShow("1")),
+    (("--show", "marker", "--set", "show.marker=1", "--set", "show.marker=null"), MarkerShow()),
+    (("--set", "show.motion=7"), HandShow("7")), (("--set", "show.motion=7", "--motion", "tap"), HandShow("tap"))])
+def test_a_field_of_text_takes_what_looks_like_a_number(words: tuple[str, ...], show: object) -> None:
+    assert show_of(of(*words)) == show
+
+
+@pytest.mark.parametrize("option", ["--pictures=3", "--hide=thumb", "--points", "--depth-table=20,40", "--seconds=10"])
+def test_a_scene_alone_takes_no_option_of_pictures(option: str, tmp_path: Path,
+                                                   capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", option, "--out", str(tmp_path / "a.json")]) == 2
+    assert f"leave out {option.split('=')[0]}," in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(("fields", "said"), [
     ({"settings": {"lamp": {"kelvin": 1}}}, "scene.json: lamp.kelvin: expected a number >= 1700"),
     ({"settings": {"lampe": 1}}, 'scene.json: lampe: there is no field "lampe"; did you mean "lamp"?'),
@@ -69,7 +85,7 @@ def test_a_recordings_shot_is_a_scene(tmp_path: Path) -> None:
     ({"show": {"show": "board", "tone": 7}}, 'show.tone: there is no field "tone"'),
     ({"settings": {"presets": {"wide": {"fps": "x"}}}}, "presets.wide.fps: expected a number, not text"),
     ({"settings": {"preset": "slow"}}, "preset 'slow' is none of fast, wide"), ({"format": "rhot-rig"}, "rhot-scene"),
-    ({"settings": {"markers": "none.json"}}, "none.json")])
+    ({"settings": {"markers": "none.json"}}, "none.json"), ({"settings": {"markers": 6}}, "markers: expected text")])
 def test_a_scene_file_that_cannot_be_is_refused(fields: dict[str, Any], said: str, tmp_path: Path,
                                                 capsys: pytest.CaptureFixture[str]) -> None:
     path = written(tmp_path / "scene.json", **fields)
@@ -84,7 +100,7 @@ def test_a_scene_file_that_cannot_be_is_refused(fields: dict[str, Any], said: st
     ("lamp=3", "expected an object {...}, not a whole number"), ("lamp.kelvin.x=3", "expected a number, not an object"),
     ("kelvin=3", 'no field "kelvin"'), ("seed=x", "a seed is a whole number"), ("show.cube=", "expected true or false"),
     ("distance_m=near", "expected a number, not text"), ("glove_rgb=1,2", "glove_rgb=1,2: expected a list"),
-    ("lamp.kelvin=nan", "lamp.kelvin=nan")])
+    ("lamp.kelvin=nan", "lamp.kelvin=nan"), ("markers=6", "there is no '6'")])
 def test_a_field_that_cannot_be_set_is_refused(text: str, said: str, tmp_path: Path,
                                                capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", "--set", text, "--out", str(tmp_path / "out")]) == 2

@@ -110,6 +110,14 @@ def test_steps_and_video_are_the_switches_that_were_there(bench, page):
     assert page.general.video_check.isChecked() and bench.window.settings.video
 
 
+def test_start_says_its_own_key_beside_the_space_bar(bench, page):
+    start = bench.window.actions_.start
+    assert start.toolTip().endswith("or to stop (Space).")
+    select_action(bench, page, "Start")
+    press_new_key(bench, page, Qt.Key.Key_G)
+    bench.until(lambda: start.toolTip().endswith("or to stop (Space, G)."))
+
+
 def test_a_key_of_ones_own_works_now_and_after_a_start(bench, page, make_bench, tmp_path):
     row = select_action(bench, page, "Scene alone")
     press_new_key(bench, page, Qt.Key.Key_F11)

@@ -115,7 +115,7 @@ def unit_of(args: argparse.Namespace) -> float | None:
 
 # -- arguments that describe a board -----------------------------------------------------------------------------------
 
-_SIZE = re.compile(r"\s*\d+\s*,\s*\d+\s*")  # 9,6 is a size too
+_SIZE = re.compile(r"(?<![^,])\s*(\d+)\s*,\s*(\d+)\s*(?![^,])")  # 9,6 is a size too
 _SIZES = {kind: size for kind, (size, _) in KINDS.items()}
 SIZE_HELP = (f"inner corners of a chessboard (default {_SIZES['chessboard']}), squares of a ChArUco board "
              f"({_SIZES['charuco']}), tags of an AprilGrid ({_SIZES['aprilgrid']}), circles in a row and rows "
@@ -163,7 +163,7 @@ def described_board(text: str, square_mm: float | None) -> Board:
     from rhot_app.calibration.board.boards import make_board
 
     kind, size, chosen = "", None, dict[str, Any]()
-    for part in [text] if _SIZE.fullmatch(text) else [part.strip() for part in text.split(",") if part.strip()]:
+    for part in filter(None, map(str.strip, _SIZE.sub(r"\1x\2", text).split(","))):
         name, equals, value = part.partition("=")
         if part in KINDS and not kind:
             kind = part

@@ -68,7 +68,7 @@ def fields_of(args: argparse.Namespace) -> SceneFields:
         name, equals, value = text.partition("=")
         if not equals or not all(name.strip().split(".")):
             raise SimulatorError(f"--set {text}: write NAME=VALUE, as in --set lamp.kelvin=3000.")
-        fields.set(name.strip(), value_of(value.strip()), f"--set {text}")
+        fields.set(name.strip(), value_of(value.strip()), f"--set {text}", value.strip())
     for name in ("preset", "markers", "seed"):
         if getattr(args, name) is not None:
             fields.set(name, getattr(args, name), f"--{name} {getattr(args, name)}")

@@ -10,7 +10,7 @@ import json
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal, get_args, get_type_hints
 
 import msgspec
 
@@ -54,9 +54,11 @@ class SceneFields:
     show: dict[str, Any] = field(default_factory=dict)
     seed: int = 1
     origins: dict[str, str] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
 
-    def set(self, name: str, value: Any, origin: str) -> None:
-        """Choose one field, `lamp.kelvin` of the settings or `show.tone` of what is shown; `seed` is the seed."""
+    def set(self, name: str, value: Any, origin: str, text: str | None = None) -> None:
+        """Choose one field, `lamp.kelvin` of the settings or `show.tone` of what is shown; `seed` is the seed. `text`:
+        what was read as the value, which a field of text takes itself."""
         if name == "seed":
             self.seed = _seed(value, origin)
             return
@@ -69,6 +71,9 @@ class SceneFields:
         place[last] = value
         self.origins = {known: one for known, one in self.origins.items() if not known.startswith(f"{name}.")}
         self.origins[name] = origin
+        self.texts.pop(name, None)
+        if text is not None and not isinstance(value, str | None):
+            self.texts[name] = text
 
     def _path(self, name: str) -> tuple[Any, ...]:
         shown = name.startswith(SHOW)
@@ -76,6 +81,7 @@ class SceneFields:
 
     def scene(self) -> Scene:
         """The scene. Raises RigError, SimulatorError."""
+        self._take_texts(TwinSettings, self.settings, "")
         try:
             settings = msgspec.convert(_merged(msgspec.to_builtins(twin_defaults()), self.settings), TwinSettings)
         except msgspec.ValidationError as exc:
@@ -85,14 +91,21 @@ class SceneFields:
     def shown(self) -> Show:
         """What stands before the cameras. Raises SimulatorError."""
         fields = {"show": "hand", **self.show}
+        kind = next((one for one in get_args(Show) if one.__struct_config__.tag == fields["show"]), Show)
+        self._take_texts(kind, fields, SHOW)
         if fields["show"] == "board":
             fields.setdefault("size", CHARUCO if fields.get("pattern") == "charuco" else BOARD)
-        kind = next((one for one in get_args(Show) if one.__struct_config__.tag == fields["show"]), Show)
         try:
             shown: Show = msgspec.convert(fields, kind)
             return shown
         except msgspec.ValidationError as exc:
             raise SimulatorError(self._objection(str(exc), kind, SHOW, f"--show {fields['show']}")) from exc
+
+    def _take_texts(self, kind: Any, fields: dict[str, Any], prefix: str) -> None:
+        """Give the fields of text that a `kind` has the texts that could be read as something else (9,6, or 1)."""
+        for name, hint in (get_type_hints(kind) if isinstance(kind, type) else {}).items():
+            if prefix + name in self.texts and str in (hint, *get_args(hint)):
+                fields[name] = self.texts[prefix + name]
 
     def _objection(self, problem: str, kind: Any, prefix: str, whole: str) -> str:
         """What msgspec says of a field of a `kind`, said of the option or file that chose it."""

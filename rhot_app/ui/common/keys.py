@@ -14,6 +14,9 @@ from rhot_app.ui.common.settings import Settings
 _FIXED: Final = {"Space": "Start and Stop", "Alt+Down": "opening menus", "Alt+M": "the list of sentences"}
 """Keys that no action can have, and what they serve."""
 
+_ALWAYS: Final = {"start": "Space"}
+"""By an action's object name: a key that it has beside the one that can be changed."""
+
 
 class ActionKeys:
     """The keys of a window's actions, which are known by their object names: those that they were made with, or those
@@ -65,7 +68,8 @@ class ActionKeys:
     def _set(self, action: QAction, key: QKeySequence) -> None:
         action.setShortcut(key)
         meaning, text = self._meanings[action.objectName()], key.toString(QKeySequence.SequenceFormat.NativeText)
-        action.setToolTip(f"{meaning.removesuffix('.')} ({text})." if text else meaning)
+        keys = ", ".join(filter(None, (_ALWAYS.get(action.objectName()), text)))
+        action.setToolTip(f"{meaning.removesuffix('.')} ({keys})." if keys else meaning)
 
 
 def title_of(action: QAction) -> str:
