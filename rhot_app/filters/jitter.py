@@ -20,7 +20,9 @@ GAP_S = 0.12
 WINDOW_S = 0.5
 """s: length of the parabola about each sample of a hand at rest."""
 
-_LEAST = 4  # values of which a root mean square is told
+LEAST = 4
+"""Values of which a root mean square is told."""
+
 _LEAST_NEIGHBOURS = 2  # on each side of a parabola
 _LONGEST_WINDOW = 1.5  # times its length, when samples are missing
 
@@ -35,7 +37,7 @@ def moving(times_s: Array, values: Array) -> float:
     rows = rows[whole]
     squares = np.square(np.einsum("nk,nkd->nd", difference_weights(times_s[rows]), values[rows])).sum(axis=1)
     squares = squares[np.isfinite(squares)]
-    return float(np.sqrt(squares.mean())) if len(squares) >= _LEAST else np.nan
+    return float(np.sqrt(squares.mean())) if len(squares) >= LEAST else np.nan
 
 
 def difference_weights(times_s: Array) -> Array:

@@ -207,7 +207,7 @@ def numeric_options() -> list[tuple[tuple[str, ...], str]]:
 
 def test_every_option_that_takes_a_number_is_found() -> None:
     options = numeric_options()
-    assert len(options) > 60 and (("calibrate", "depth"), "--baseline-mm") in options
+    assert len(options) > 50 and (("calibrate", "depth"), "--baseline-mm") in options
 
 
 @pytest.mark.parametrize(("words", "option"), numeric_options(), ids=lambda part: part if isinstance(part, str) else

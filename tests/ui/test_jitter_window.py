@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fake_engine import FakeEngine
 
-from rhot_app.filters.jitter import difference_weights
+from rhot_app.filters.jitter import difference_weights, moving
 from rhot_app.ui.models.meters import JitterWindow
 
 RATE_HZ = 40.0
@@ -39,6 +39,15 @@ def test_noise_is_told_as_its_own_rms(template):
     window = JitterWindow(span_s=5.0)
     feed(window, template, times, 0.0005 * random.standard_normal((400, 3)))
     assert window.rms(round(times[-1] * 1e9)) == pytest.approx(0.0005 * np.sqrt(3), rel=0.12)
+
+
+def test_it_is_what_the_definition_says(template):
+    random = np.random.default_rng(4)
+    times = np.cumsum(random.choice([0.02, 0.025, 0.03, 0.3], 30, p=[0.3, 0.4, 0.25, 0.05]))
+    places = 0.001 * random.standard_normal((30, 3))
+    window = JitterWindow(span_s=60.0)
+    feed(window, template, times, places)
+    assert window.rms(round(times[-1] * 1e9)) == pytest.approx(moving(times, places), rel=1e-6)
 
 
 def test_smooth_motion_is_not_jitter(template):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.engine.status import EngineStatus, NodeStatus
-from rhot_app.filters.jitter import GAP_S, ORDER, difference_weights
+from rhot_app.filters.jitter import GAP_S, LEAST, ORDER, difference_weights
 from rhot_app.latency import STACKED, latency_row, p50_p99, whole_way
 from rhot_app.state import LATENCY_STAGES, HandState
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class JitterWindow:
-    """Fed with every state; tells each marker's jitter over the last `span_s` seconds, m."""
+    """`filters.jitter.moving` of each marker over the last `span_s` seconds, m, fed with one state after the other."""
 
     def __init__(self, span_s: float = 1.0, capacity: int = 512, gap_s: float = GAP_S) -> None:
         self._span_ns = round(span_s * 1e9)
@@ -53,14 +53,14 @@ class JitterWindow:
         del self._recent_t[0], self._recent[0]
 
     def rms(self, now_ns: int) -> Array:
-        """(M,) three-dimensional rms jitter of each marker, m; NaN with fewer than four values in the window."""
+        """(M,) three-dimensional rms jitter of each marker, m; NaN with fewer than `LEAST` values in the window."""
         n = min(self._count, self._capacity)
         inside = now_ns - self._times[:n] <= self._span_ns
         squares = self._squares[:n][inside]
         known = np.isfinite(squares)
         count = known.sum(axis=0)
         total = np.where(known, squares, 0.0).sum(axis=0)
-        return np.where(count >= 4, np.sqrt(total / np.maximum(count, 1)), np.nan)
+        return np.where(count >= LEAST, np.sqrt(total / np.maximum(count, 1)), np.nan)
 
 
 # -- latency by stage --------------------------------------------------------------------------------------------------

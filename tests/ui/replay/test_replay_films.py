@@ -124,6 +124,6 @@ def test_export_begins_as_the_recording_is_shown(desk: Desk, tmp_path: Path) -> 
     assert not dialog.smooth_box.isChecked() and dialog.options().fill_s is None
     dialog.fill_box.setValue(0.3)
     assert dialog.options().fill_s == pytest.approx(0.3)
-    desk.until(lambda: dialog.table.rowCount() > 0)
+    desk.until(lambda: dialog.table.records)
     desk.click(dialog.close_button)
     desk.until(lambda: desk.window.exporting is None)
