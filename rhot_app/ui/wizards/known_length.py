@@ -31,6 +31,7 @@ class LengthsStep(Step):
         self._baseline_mm = 0.0
         self._ruler_mm = 0.0
         self._live: Pictures = {}
+        self._holding = False  # also before the first pictures came, which are held then
         self.frozen: dict[str, Picture] = {}
         self._clicks: list[tuple[str, float, float]] = []
         self._known = KnownLengths()
@@ -58,12 +59,15 @@ class LengthsStep(Step):
     def accept_observation(self, seen: Pictures) -> None:
         """The pictures that Space would hold."""
         self._live = seen
+        if self._holding and not self.frozen:
+            self.frozen = dict(seen)
 
     def capture(self) -> bool:
         """Hold the pictures, to click in them; again lets them go."""
         if self._ruler_mm <= 0.0:
             return False
-        self.frozen = {} if self.frozen else dict(self._live)
+        self._holding = not self._holding
+        self.frozen = dict(self._live) if self._holding else {}
         self._clicks = []
         self._renew()
         return bool(self.frozen)
@@ -79,7 +83,7 @@ class LengthsStep(Step):
         if self._clicks:
             self._clicks.pop()
         elif self.frozen:
-            self.frozen = {}
+            self.frozen, self._holding = {}, False
         else:
             return False
         self._renew()

@@ -314,6 +314,16 @@ def test_two_markers_of_one_colour_are_refused_and_undo_mends_it(picks):
     assert blue < 90 < green < red and picks.chosen == "index"
 
 
+def test_pictures_can_be_held_before_the_first_ones_were_looked_at(rig, scene):
+    picks = PickStep(rig.markers, ("left", "right"))
+    assert not picks.capture()
+    look(picks, scene)
+    assert picks.held == scene.at_rest and "held" in picks.view().sentence
+    assert not picks.capture() and not picks.held
+    look(picks, scene)
+    assert not picks.held, "let go for good"
+
+
 def test_a_click_is_read_in_the_picture_that_was_clicked(picks, scene):
     rotated = dict(zip(NAMES, [PAINTS[name] for name in (*NAMES[1:], NAMES[0])], strict=True))
     late = picks.observe(PaintScene(rotated).at_rest)

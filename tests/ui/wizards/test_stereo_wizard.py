@@ -229,6 +229,18 @@ def test_undo_forgets_the_last_shot_and_another_board_all(scene):
     assert not show.views.shots and show.views.board.cols == 8
 
 
+def test_pictures_of_a_ruler_can_be_held_before_the_first_ones_came():
+    pictures = {name: Picture(name, np.zeros((480, 640, 3), np.uint8), 1, 0, 0) for name in CAMERAS}
+    step = LengthsStep(CAMERAS)
+    step.set_lengths(0.0, 200.0)
+    assert not step.capture()
+    step.accept_observation(pictures)
+    assert step.frozen == pictures
+    assert step.undo() and not step.frozen
+    step.accept_observation(pictures)
+    assert not step.frozen, "let go for good"
+
+
 def test_a_ruler_needs_both_ends_in_two_pictures():
     blank = np.zeros((480, 640, 3), np.uint8)
     step = LengthsStep(CAMERAS)

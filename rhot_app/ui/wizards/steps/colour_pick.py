@@ -148,6 +148,7 @@ class PickStep(Step):
         self.problem = ""
         self.held: dict[str, Picture] = {}
         self._live: Pictures = {}
+        self._holding = False  # also before the first pictures came, which are held then
         self._masked: MaskedPictures = {}
         self._maker = MaskMaker()
         self._markers = markers
@@ -181,13 +182,16 @@ class PickStep(Step):
     def accept_observation(self, seen: tuple[Pictures, MaskedPictures]) -> None:
         """Gather where markers show something new."""
         self._live, self._masked = seen
+        if self._holding and not self.held:
+            self.held = dict(self._live)
         if not self.held:
             self.gathering.follow({name: picture.image for name, picture in self._masked.items()})
         self._learn()
 
     def capture(self) -> bool:
         """Hold the pictures, or let them go on."""
-        self.held = {} if self.held else dict(self._live)
+        self._holding = not self._holding
+        self.held = dict(self._live) if self._holding else {}
         return bool(self.held)
 
     def pick(self, picture: Picture, x: float, y: float, width: float, height: float) -> bool:
