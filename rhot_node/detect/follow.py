@@ -274,7 +274,7 @@ def _state(track, fitted, outline, noise, report):
 ARC_VARIANCE = 2.0 / 3.0 - ARC * ARC  # of sqrt(1 - u^2) over -1..1
 START_AWAY = 0.35
 """Chroma px that outline and careful measurement may differ by. Where they differ by more, a marker would jump whenever
-it changes lanes: so does the cube's green face, beside the cyan one, in `../shared/data/trifinger_cube`."""
+it changes lanes: so does a real cube's green face, beside the cyan one (TriFinger, `tests/detect`)."""
 
 
 @njit(**c.FAST)
