@@ -6,6 +6,7 @@ from PySide6.QtCore import QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence, QPainter
 from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
 
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.shapes import shape_icon, show_overflow
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.state_badge import StateBadge
@@ -13,13 +14,15 @@ from rhot_app.ui.scene.ellipsoid_mesh import LARGER
 from rhot_app.ui.scene.page import SceneBar
 from rhot_app.ui.wizards.framework.definition import WIZARDS
 
-CLOUD_KINDS = (("joints", "Of the hand's inner joints; the estimator estimates them."),
-               ("fingertips", "Of the fingertips; the estimator estimates them."),
-               ("markers", "Of the markers, as far as they are not the fingertips drawn already."))
-"""Whose uncertainty can be drawn; the words are the settings' names too."""
+CLOUD_KINDS = (
+    ("joints", tr_noop("of joints"), tr_noop("Of the hand's inner joints; the estimator estimates them.")),
+    ("fingertips", tr_noop("of fingertips"), tr_noop("Of the fingertips; the estimator estimates them.")),
+    ("markers", tr_noop("of markers"), tr_noop("Of the markers, as far as they are not the fingertips drawn already.")))
+"""Whose uncertainty can be drawn: name in the settings, title, meaning."""
 
 _SOURCE_PX = 220  # of a long file's name no more is shown, so that the window's word stays in sight
-_START_WORDS, _RECORD_WORDS = ("Start", "Stop"), ("Record", "Stop recording")  # idle, at work
+_START_WORDS = tr_noop("Start"), tr_noop("Stop")  # idle, at work
+_RECORD_WORDS = tr_noop("Record"), tr_noop("Stop recording")
 _CALM_MS = 100  # the system may report the mouse over the button once more when the menu above it has gone
 
 
@@ -28,81 +31,92 @@ class Actions(QObject):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
-        self.start = self._make("Start", "", "Tell the nodes to stream, or to stop.")
-        self.record = self._make("Record", "R", "Write the raw log of all datagrams, or end it.")
-        self.bookmark = self._make("Bookmark", "B", "Write a few words about this moment into the recording.")
-        self.video = self._make("Record video, too", "", "Each camera writes its own frames as long as the next "
-                                "recording lasts. Rig, Recordings fetches them afterwards.", checkable=True)
-        self.twin = self._make("Simulated rig", "", "Start two simulated cameras that look at a simulated hand.")
-        self.shows = QMenu("Simulated hand does", parent)
-        self.caps = QMenu("Cover a simulated camera", parent)
+        self.start = self._make(tr("Start"), "", tr("Tell the nodes to stream, or to stop."))
+        self.record = self._make(tr("Record"), "R", tr("Write the raw log of all datagrams, or end it."))
+        self.bookmark = self._make(tr("Bookmark"), "B", tr("Write a few words about this moment into the recording."))
+        self.video = self._make(tr("Record video, too"), "",
+                                tr("Each camera writes its own frames as long as the next recording lasts. Rig, "
+                                   "Recordings fetches them afterwards."), checkable=True)
+        self.twin = self._make(tr("Simulated rig"), "",
+                               tr("Start two simulated cameras that look at a simulated hand."))
+        self.shows = QMenu(tr("Simulated hand does"), parent)
+        self.caps = QMenu(tr("Cover a simulated camera"), parent)
         self.caps.setToolTipsVisible(True)
-        self.open = self._make("Open rig file …", "Ctrl+O", "Open a rig that was set up before.")
-        self.own_cameras = self._make("Cameras of this computer …", "", "Choose webcams, films or network cameras, "
-                                      "look at them, and track with them.")
-        self.nodes = self._make("Connect nodes …", "", "Enter the addresses of two nodes, see whether they answer, and "
-                                "write a rig file for them.")
-        self.export = self._make("Export recording …", "Ctrl+E", "Write a recording's hand as a file for other "
-                                 "programs: tables, motion capture, animation.")
-        self.open_recording = self._make("Open recording …", "Ctrl+Shift+O", "Track a recording and play it, in a "
-                                         "window of its own.")
-        self.recordings = self._make("Recordings …", "", "All recordings: how long and how well tracked; open, rename, "
-                                     "delete.")
-        self.films = self._make("Track films …", "", "Track a bare hand in films that you have already, and replay it "
-                                "beside their pictures.")
-        self.outputs = self._make("Outputs …", "", "Live streams to other programs: OSC, VMC, WebSocket, web view and "
-                                  "others; which run, and how they go.")
-        self.mouse = self._make("3-D mouse …", "", "Work a cursor in three dimensions with the hand: pick balls, "
-                                "move them, and take a target test.")
-        self.add_object = self._make("Add a tracked object …", "", "Track an object with tags or colour markers beside "
-                                     "the hand: choose its object file.")
-        self.objects = QMenu("Remove a tracked object", parent)
+        self.open = self._make(tr("Open rig file …"), "Ctrl+O", tr("Open a rig that was set up before."))
+        self.own_cameras = self._make(tr("Cameras of this computer …"), "",
+                                      tr("Choose webcams, films or network cameras, look at them, and track with "
+                                         "them."))
+        self.nodes = self._make(tr("Connect nodes …"), "", tr("Enter the addresses of two nodes, see whether they "
+                                                              "answer, and write a rig file for them."))
+        self.export = self._make(tr("Export recording …"), "Ctrl+E",
+                                 tr("Write a recording's hand as a file for other programs: tables, motion capture, "
+                                    "animation."))
+        self.open_recording = self._make(tr("Open recording …"), "Ctrl+Shift+O",
+                                         tr("Track a recording and play it, in a window of its own."))
+        self.recordings = self._make(tr("Recordings …"), "",
+                                     tr("All recordings: how long and how well tracked; open, rename, delete."))
+        self.films = self._make(tr("Track films …"), "", tr("Track a bare hand in films that you have already, and "
+                                                            "replay it beside their pictures."))
+        self.outputs = self._make(tr("Outputs …"), "", tr("Live streams to other programs: OSC, VMC, WebSocket, web "
+                                                          "view and others; which run, and how they go."))
+        self.mouse = self._make(tr("3-D mouse …"), "", tr("Work a cursor in three dimensions with the hand: pick "
+                                                          "balls, move them, and take a target test."))
+        self.add_object = self._make(tr("Add a tracked object …"), "",
+                                     tr("Track an object with tags or colour markers beside the hand: choose its "
+                                        "object file."))
+        self.objects = QMenu(tr("Remove a tracked object"), parent)
         self.objects.setToolTipsVisible(True)
-        self.save_rig = self._make("Save rig", "Ctrl+S", "Write the rig as it is now to its file; what stood there is "
-                                   "kept beside it.")
-        self.close_rig = self._make("Close rig", "Ctrl+W", "End what the app started and go back to the first page.")
-        self.settings = self._make("Settings …", "Ctrl+,", "Look, folders, what opens at the start, and keys.")
-        self.quit = self._make("Quit", "Ctrl+Q", "End what the app started and close it.")
-        self.next_steps = self._make("What to do next …", "", "Say what you have, and see the steps that are missing.")
+        self.save_rig = self._make(tr("Save rig"), "Ctrl+S",
+                                   tr("Write the rig as it is now to its file; what stood there is kept beside it."))
+        self.close_rig = self._make(tr("Close rig"), "Ctrl+W",
+                                    tr("End what the app started and go back to the first page."))
+        self.settings = self._make(tr("Settings …"), "Ctrl+,", tr("Look, folders, what opens at the start, and keys."))
+        self.quit = self._make(tr("Quit"), "Ctrl+Q", tr("End what the app started and close it."))
+        self.next_steps = self._make(tr("What to do next …"), "",
+                                     tr("Say what you have, and see the steps that are missing."))
         self.wizards = [self._make(f"{wizard.title} …", "", wizard.meaning) for wizard in WIZARDS]
-        self.fit = self._make("Fit the hand to pictures …", "", "Drag joints in the cameras' pictures, move sliders, "
-                              "and let edges finish it: the hand's lengths and pose.")
-        self.earlier = self._make("Bring back an earlier calibration …", "", "Every calibration keeps what it "
-                                  "replaced; choose one by date and reason.")
-        self.tracker = self._make("Tracker …", "", "Which tracker makes a hand of the markers, and what it may assume.")
-        self.networks = self._make("Hand networks …", "", "Install the networks that find landmarks of a bare hand on "
-                                   "this computer.")
-        self.cameras = self._make("Cameras …", "", "Lenses and positions that the rig file says.")
-        self.markers = self._make("Markers …", "", "The marker set that the rig file says.")
-        self.hand = self._make("Hand …", "", "The hand's bones that the rig file says.")
-        self.properties = QMenu("Properties", parent)
+        self.fit = self._make(tr("Fit the hand to pictures …"), "",
+                              tr("Drag joints in the cameras' pictures, move sliders, and let edges finish it: the "
+                                 "hand's lengths and pose."))
+        self.earlier = self._make(tr("Bring back an earlier calibration …"), "",
+                                  tr("Every calibration keeps what it replaced; choose one by date and reason."))
+        self.tracker = self._make(tr("Tracker …"), "",
+                                  tr("Which tracker makes a hand of the markers, and what it may assume."))
+        self.networks = self._make(tr("Hand networks …"), "",
+                                   tr("Install the networks that find landmarks of a bare hand on this computer."))
+        self.cameras = self._make(tr("Cameras …"), "", tr("Lenses and positions that the rig file says."))
+        self.markers = self._make(tr("Markers …"), "", tr("The marker set that the rig file says."))
+        self.hand = self._make(tr("Hand …"), "", tr("The hand's bones that the rig file says."))
+        self.properties = QMenu(tr("Properties"), parent)
         self.properties.setToolTipsVisible(True)
-        self.properties.menuAction().setToolTip("What the rig file says, to read.")
+        self.properties.menuAction().setToolTip(tr("What the rig file says, to read."))
         self.properties.addActions([self.cameras, self.markers, self.hand])
-        self.files = self._make("How to calibrate", "", "Opens the guide.")
-        self.frame = self._make("Frame the hand", "F", "Bring the hand into the middle of the scene.")
-        self.home = self._make("Reset the view", "Home", "Back to the view from behind the cameras.")
-        self.names = self._make("Marker names", "", "Names beside the markers in the scene.", checkable=True)
-        self.now = self._make("Hand as of now", "N", "Draw the hand where it is when you see it, not where it was in "
-                              "the newest pictures, 10 to 40 ms before. The estimator predicts it.",
-                              checkable=True)
-        self.clouds = self._make("Uncertainty", "U", "How well places are known, as ellipsoids: the true place lies "
-                                 "inside in 97 of 100 cases (three sigma).", checkable=True)
-        self.cloud_kinds = [self._make(f"of {kind}", "", meaning, checkable=True) for kind, meaning in CLOUD_KINDS]
+        self.files = self._make(tr("How to calibrate"), "", tr("Opens the guide."))
+        self.frame = self._make(tr("Frame the hand"), "F", tr("Bring the hand into the middle of the scene."))
+        self.home = self._make(tr("Reset the view"), "Home", tr("Back to the view from behind the cameras."))
+        self.names = self._make(tr("Marker names"), "", tr("Names beside the markers in the scene."), checkable=True)
+        self.now = self._make(tr("Hand as of now"), "N", tr("Draw the hand where it is when you see it, not where it "
+                                                            "was in the newest pictures, 10 to 40 ms before. The "
+                                                            "estimator predicts it."), checkable=True)
+        self.clouds = self._make(tr("Uncertainty"), "U", tr("How well places are known, as ellipsoids: the true place "
+                                                            "lies inside in 97 of 100 cases (three sigma)."),
+                                 checkable=True)
+        self.cloud_kinds = [self._make(tr(title), "", tr(meaning), checkable=True) for _, title, meaning in CLOUD_KINDS]
         self.cloud_sizes = [
-            self._make("1 ×", "", "Ellipsoids in true size.", checkable=True),
-            self._make(f"{LARGER} ×", "", f"Ellipsoids {LARGER} times as large, because a good place is known to a "
-                       "millimetre.", checkable=True)]
-        self.layers = self._make("Layers of the hand …", "", "Which link of the tracked hand hides which before a "
-                                 "camera, as masks over its picture.")
-        self.alone = self._make("Scene alone", "6", "Hide every panel, to look from afar; again brings them back.",
-                                checkable=True)
-        self.dark = self._make("Dark", "", "Light text on dark ground.", checkable=True)
-        self.light = self._make("Light", "", "Dark text on light ground.", checkable=True)
-        self.reset = self._make("Reset layout and settings", "", "Forget layout, last rig and switches.")
-        self.guide = self._make("Guide", "F1", "The page of the guide that explains the panel in use.")
-        self.keys = self._make("Keys", "", "The guide's page about keys.")
-        self.about = self._make("About RHOT …", "", "Versions for a report of a fault, and licences.")
+            self._make("1 ×", "", tr("Ellipsoids in true size."), checkable=True),
+            self._make(f"{LARGER} ×", "", tr("Ellipsoids {larger} times as large, because a good place is known to a "
+                                             "millimetre.", larger=LARGER), checkable=True)]
+        self.layers = self._make(tr("Layers of the hand …"), "",
+                                 tr("Which link of the tracked hand hides which before a camera, as masks over its "
+                                    "picture."))
+        self.alone = self._make(tr("Scene alone"), "6",
+                                tr("Hide every panel, to look from afar; again brings them back."), checkable=True)
+        self.dark = self._make(tr("Dark"), "", tr("Light text on dark ground."), checkable=True)
+        self.light = self._make(tr("Light"), "", tr("Dark text on light ground."), checkable=True)
+        self.reset = self._make(tr("Reset layout and settings"), "", tr("Forget layout, last rig and switches."))
+        self.guide = self._make(tr("Guide"), "F1", tr("The page of the guide that explains the panel in use."))
+        self.keys = self._make(tr("Keys"), "", tr("The guide's page about keys."))
+        self.about = self._make(tr("About RHOT …"), "", tr("Versions for a report of a fault, and licences."))
         for action, role in ((self.settings, QAction.MenuRole.PreferencesRole), (self.quit, QAction.MenuRole.QuitRole),
                              (self.about, QAction.MenuRole.AboutRole)):
             action.setMenuRole(role)
@@ -126,7 +140,7 @@ class Actions(QObject):
             if isinstance(action, QAction):
                 action.setObjectName(name)
         for prefix, actions, names in (("wizard", self.wizards, [wizard.name for wizard in WIZARDS]),
-                                       ("cloud", self.cloud_kinds, [kind for kind, _ in CLOUD_KINDS]),
+                                       ("cloud", self.cloud_kinds, [kind for kind, _, _ in CLOUD_KINDS]),
                                        ("cloud", self.cloud_sizes, ["in true size", "larger"])):
             for action, name in zip(actions, names, strict=True):
                 action.setObjectName(f"{prefix} {name}")
@@ -164,12 +178,12 @@ class MainToolBar(QToolBar):
     """
 
     def __init__(self, actions: Actions, panels: list[QAction], scheme: Scheme, parent: QWidget) -> None:
-        super().__init__("Main", parent)
+        super().__init__(tr("Main"), parent)
         self.setObjectName("main toolbar")
         self.setMovable(False)
         self.setFloatable(False)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        self.controls = QToolBar("Controls", self)
+        self.controls = QToolBar(tr("Controls"), self)
         self.controls.setObjectName("controls")
         self.controls.setIconSize(QSize(24, 18))
         self.controls.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
@@ -183,17 +197,17 @@ class MainToolBar(QToolBar):
             self.controls.addAction(action)
         self.controls.addSeparator()
         a = actions
-        self.rig_button, self.rig_menu = self._add_menu("Rig", [
+        self.rig_button, self.rig_menu = self._add_menu(tr("Rig"), [
             a.twin, a.own_cameras, a.open, a.nodes, None, a.open_recording, a.recordings, a.films, a.video, a.bookmark,
             a.export, None, a.add_object, a.objects.menuAction(), None,
             a.outputs, a.mouse, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig,
             a.close_rig, None, a.settings, a.quit])
-        self.calibrate_button, self.calibrate_menu = self._add_menu("Calibrate", [
+        self.calibrate_button, self.calibrate_menu = self._add_menu(tr("Calibrate"), [
             a.next_steps, None, *a.wizards, a.fit, None, a.earlier, None, a.tracker, a.networks, None, a.files])
-        self.view_button, self.view_menu = self._add_menu("View", [
+        self.view_button, self.view_menu = self._add_menu(tr("View"), [
             *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, a.layers, None,
             a.dark, a.light, None, a.reset])
-        self.help_button, self.help_menu = self._add_menu("Help", [a.guide, a.keys, None, a.about])
+        self.help_button, self.help_menu = self._add_menu(tr("Help"), [a.guide, a.keys, None, a.about])
         self.source_label = QToolButton()
         self.source_label.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.source_label.clicked.connect(actions.bookmark.trigger)
@@ -226,11 +240,12 @@ class MainToolBar(QToolBar):
 
     def show_rig(self, name: str, path: str, *, edited: bool) -> None:
         """Name of the rig, "" for none; `edited` says that its file does not say the same."""
-        text = f"rig: {name}{' (edited)' if edited else ''}  " if name else ""
+        text = tr("rig: {name} (edited)", name=name) if edited else tr("rig: {name}", name=name) if name else ""
+        text += "  " if text else ""
         if text != self.rig_label.text() or path not in self.rig_label.toolTip():
             self.rig_label.setText(text)
-            unsaved = "\nThe engine's rig differs from this file; Rig, Save rig writes it." if edited else ""
-            self.rig_label.setToolTip(f"{path}{unsaved}")
+            unsaved = tr("The engine's rig differs from this file; Rig, Save rig writes it.") if edited else ""
+            self.rig_label.setToolTip(f"{path}\n{unsaved}".rstrip())
 
     def show_source(self, text: str, meaning: str) -> None:
         """That what is seen is being recorded, or is a replay; "" for neither. While recording a click sets a bookmark.
@@ -245,9 +260,9 @@ class MainToolBar(QToolBar):
         """Words and icons of the two buttons that change."""
         ratio = self.devicePixelRatioF()
         self._fix_widths(scheme)
-        actions.start.setText(_START_WORDS[running])
+        actions.start.setText(tr(_START_WORDS[running]))
         actions.start.setIcon(shape_icon("stop" if running else "play", scheme.accent, ratio))
-        actions.record.setText(_RECORD_WORDS[recording])
+        actions.record.setText(tr(_RECORD_WORDS[recording]))
         actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault, ratio))
         show_overflow(self.controls, scheme.text)
         self.badge.set_scheme(scheme)
@@ -260,7 +275,7 @@ class MainToolBar(QToolBar):
             action.setIcon(shape_icon("stop", scheme.accent, self.devicePixelRatioF()))
             widths = []
             for word in words:
-                action.setText(word)
+                action.setText(tr(word))
                 widths.append(button.sizeHint().width())
             button.setFixedWidth(max(widths))
 

@@ -89,6 +89,7 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     from PySide6.QtWidgets import QApplication
 
     from rhot_app.ui.common.controller import Controller
+    from rhot_app.ui.common.language import use_language
     from rhot_app.ui.common.settings import Settings
     from rhot_app.ui.common.theme import apply_theme, scheme_named
     from rhot_app.ui.main_window import MainWindow
@@ -103,6 +104,7 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     assert isinstance(app, QApplication)
     app.setApplicationName("RHOT")
     choose_format()
+    use_language(settings.language)
     apply_theme(app, scheme_named(settings.scheme))
     controller = Controller(session)
     window = MainWindow(controller, settings)

@@ -47,7 +47,7 @@ class DisplayPrediction:
 # -- Switches of the View menu -----------------------------------------------------------------------------------------
 
 _LARGER = "clouds larger"
-_CLOUD_FLAGS = {"clouds": True, **{f"clouds of {kind}": True for kind, _ in CLOUD_KINDS}, _LARGER: False}
+_CLOUD_FLAGS = {"clouds": True, **{f"clouds of {kind}": True for kind, _, _ in CLOUD_KINDS}, _LARGER: False}
 """The switches of the ellipsoids by their names in the settings, with what they are at first."""
 
 

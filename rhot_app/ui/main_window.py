@@ -24,6 +24,7 @@ from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.guide import page_of
 from rhot_app.ui.common.keys import ActionKeys, bind_space
+from rhot_app.ui.common.language import tr_noop
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import show_overflow
 from rhot_app.ui.common.theme import scheme_named
@@ -110,17 +111,17 @@ class MainWindow(QMainWindow):
 
     def _add_docks(self) -> None:
         parts = self.screen_parts
-        self.docks.add("Nodes", parts.nodes, "left", scroll=True)
-        self.docks.add("Markers", parts.markers, "left", scroll=True)
-        self.docks.add("Cameras", parts.cameras, "right")
-        self.docks.add("Hand", parts.hand_and_objects, "right")
+        self.docks.add(tr_noop("Nodes"), parts.nodes, "left", scroll=True)
+        self.docks.add(tr_noop("Markers"), parts.markers, "left", scroll=True)
+        self.docks.add(tr_noop("Cameras"), parts.cameras, "right")
+        self.docks.add(tr_noop("Hand"), parts.hand_and_objects, "right")
         below = QWidget()
         column = QVBoxLayout(below)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(parts.plots)
         column.addWidget(self.next_steps)
         self.next_steps.hide()
-        self.docks.add("Plots", below, "bottom", title=False)
+        self.docks.add(tr_noop("Plots"), below, "bottom", title=False)
 
     def _connect_actions(self) -> None:
         a, c = self.actions_, self.controller

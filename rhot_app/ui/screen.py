@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QSplitter, QVBoxLayout, 
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState
 from rhot_app.ui.backend.live import SILENCE_S, Live
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.scrolled import scrolled
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme
@@ -175,7 +176,7 @@ class Docks:
 
     def add(self, name: str, widget: QWidget, area: str, *, scroll: bool = False, title: bool = True) -> QDockWidget:
         """Put `widget` into a dock; without a title it can only be moved from the View menu."""
-        dock = QDockWidget(name, self._window)
+        dock = QDockWidget(tr(name), self._window)
         dock.setObjectName(f"dock {name}")
         dock.setWidget(scrolled(widget) if scroll else widget)
         if not title:
@@ -186,7 +187,7 @@ class Docks:
         action = dock.toggleViewAction()
         action.setShortcut(QKeySequence(key))
         action.setObjectName(f"panel {name}")
-        action.setToolTip("Show or hide the panel.")
+        action.setToolTip(tr("Show or hide the panel."))
         self._window.addDockWidget(_AREAS[area], dock)
         return dock
 

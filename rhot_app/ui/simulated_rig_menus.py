@@ -11,23 +11,27 @@ from PySide6.QtWidgets import QMenu, QWidget
 
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.words import shipped_motions
 
-TITLE = "Simulated hand does"
-FIRST = {"still": "Holds still", "wave": "Waves", "brisk": "Waves briskly", "sweep": "Moves every joint",
-          "roam": "Moves and turns"}
+TITLE = tr_noop("Simulated hand does")
+FIRST = {"still": tr_noop("Holds still"), "wave": tr_noop("Waves"), "brisk": tr_noop("Waves briskly"),
+         "sweep": tr_noop("Moves every joint"), "roam": tr_noop("Moves and turns")}
 """The motions that calibrations ask for; the others stand in a menu of their own."""
 
-THINGS = (("held:wave", "Holds a tagged cube", "The hand waves with a cube of 40 mm that has a tag on each face. Rig, "
-            "Add a tracked object offers its file."),
-           ("bare:grasp", "Takes its markers off", "A bare hand that opens and closes."),
-           ("bare:still", "Holds a bare hand still", "A bare hand that does not move. Calibrate, Tracker chooses what "
-            "follows it."),
-           ("empty", "Leaves the pictures", "The background alone: Calibrate, Background and skin begins with it."),
-           ("board", "Shows a board", "A chessboard of 9 x 6 corners, 25 mm squares, moved about with pauses."),
-           ("table", "Lays the board on the table", "The same board, lying on the table."),
-           ("ruler", "Shows a ruler", "A paper ruler with two crosses, 200 mm apart."))
+THINGS = (("held:wave", tr_noop("Holds a tagged cube"),
+           tr_noop("The hand waves with a cube of 40 mm that has a tag on each face. Rig, Add a tracked object offers "
+                   "its file.")),
+          ("bare:grasp", tr_noop("Takes its markers off"), tr_noop("A bare hand that opens and closes.")),
+          ("bare:still", tr_noop("Holds a bare hand still"),
+           tr_noop("A bare hand that does not move. Calibrate, Tracker chooses what follows it.")),
+          ("empty", tr_noop("Leaves the pictures"),
+           tr_noop("The background alone: Calibrate, Background and skin begins with it.")),
+          ("board", tr_noop("Shows a board"),
+           tr_noop("A chessboard of 9 x 6 corners, 25 mm squares, moved about with pauses.")),
+          ("table", tr_noop("Lays the board on the table"), tr_noop("The same board, lying on the table.")),
+          ("ruler", tr_noop("Shows a ruler"), tr_noop("A paper ruler with two crosses, 200 mm apart.")))
 DISTANCES_CM = (20, 25, 30, 40, 50, 65, 80, 100)
 
 
@@ -46,12 +50,13 @@ class TwinShows(QObject):
         self.actions: dict[str, QAction] = {}
         motions = {info.name: info.description for info in shipped_motions()}
         for name, text in FIRST.items():
-            self._make(f"hand:{name}", text, motions.get(name, ""))
+            self._make(f"hand:{name}", tr(text), motions.get(name, ""))
         for key, text, meaning in THINGS:
-            self._make(key, text, meaning)
+            self._make(key, tr(text), tr(meaning))
         for distance in DISTANCES_CM:
             self._make(f"marker:{0.01 * distance:g}", f"{distance} cm",
-                       f"One painted ball, {distance} cm from the cameras, before the middle between them.")
+                       tr("One painted ball, {distance} cm from the cameras, before the middle between them.",
+                          distance=distance))
         for name, meaning in motions.items():
             if name not in FIRST:
                 self._make(f"hand:{name}", name, meaning)
@@ -69,7 +74,7 @@ class TwinShows(QObject):
         """A menu of the choices for another window; None without the simulated rig."""
         if not self._simulated:
             return None
-        menu = QMenu(TITLE, parent)
+        menu = QMenu(tr(TITLE), parent)
         self._fill(menu)
         menu.aboutToShow.connect(self._look)
         return menu
@@ -84,7 +89,7 @@ class TwinShows(QObject):
         self.actions[key] = action
 
     def _fill(self, menu: QMenu) -> None:
-        one_marker, others = QMenu("Shows one marker at", menu), QMenu("Another motion", menu)
+        one_marker, others = QMenu(tr("Shows one marker at"), menu), QMenu(tr("Another motion"), menu)
         for each in (menu, one_marker, others):
             each.setToolTipsVisible(True)
         for key, action in self.actions.items():
@@ -140,7 +145,8 @@ class LensCaps(QObject):
         for cap, name in zip(self._caps, names, strict=True):
             cap.setData(name)
             cap.setCheckable(True)
-            cap.setToolTip(f"A cap on the lens of the camera {name}: it sees nothing until it is taken off.")
+            cap.setToolTip(tr("A cap on the lens of the camera {name}: it sees nothing until it is taken off.",
+                              name=name))
             cap.triggered.connect(self._cover)
 
     def _look(self) -> None:

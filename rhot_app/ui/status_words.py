@@ -13,6 +13,7 @@ from rhot_app.errors import RigError
 from rhot_app.project import Rig, load_rig, parse_rig
 from rhot_app.ui.backend.contract import Asker, TwinPace
 from rhot_app.ui.common.controller import RESTART_ENGINE, RESTART_TWIN, Controller
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
 from rhot_app.ui.models.words import NO_ENGINE, NO_RIG, STARTING, Look, condition_look
@@ -37,15 +38,16 @@ def notices_of(controller: Controller) -> list[Notice]:
     elif controller.problem:
         notices.append(Notice("error", controller.problem, subject="tracking"))
     if controller.twin_gone:
-        notices.append(Notice("error", "The simulated cameras have stopped.", "Start them again", RESTART_TWIN,
+        notices.append(Notice("error", tr("The simulated cameras have stopped."), tr("Start them again"), RESTART_TWIN,
                               subject="tracking"))
     if controller.opened is not None and not controller.opened.ours:
-        notices.append(Notice("info", "This engine was started outside the app; closing the app lets it run on."))
+        notices.append(Notice("info", tr("This engine was started outside the app; closing the app lets it run on.")))
     status = controller.live.status
     if status is not None and not controller.engine_gone:
         notices += [_advice_notice(advice) for advice in status.advice]
         if status.log_path:
-            notices.append(Notice("info", f"Recording to {status.log_path} ({recording_text(status)})."))
+            notices.append(Notice("info", tr("Recording to {path} ({size}).", path=status.log_path,
+                                             size=recording_text(status))))
     if controller.twin_pace is not None and controller.running:
         notices.append(_pace_notice(controller.twin_pace))
     if controller.background and controller.opened is not None:
@@ -67,9 +69,11 @@ def label_of(controller: Controller) -> tuple[str, str]:
     if status is None or controller.engine_gone:
         return "", ""
     if status.log_path:
-        return f"REC {recording_text(status)}", f"Recording to {status.log_path}. A click here, or B, sets a bookmark."
+        return (tr("REC {size}", size=recording_text(status)),
+                tr("Recording to {path}. A click here, or B, sets a bookmark.", path=status.log_path))
     if status.replaying:
-        return f"REPLAY {Path(status.replaying).name}", f"An engine replays {status.replaying}; Start replays it again."
+        return (tr("REPLAY {name}", name=Path(status.replaying).name),
+                tr("An engine replays {path}; Start replays it again.", path=status.replaying))
     return "", ""
 
 
@@ -78,34 +82,35 @@ def _advice_notice(advice: Advice) -> Notice:
     wizard = wizard_named(advice.mender)
     if wizard is None:
         return Notice(advice.level, advice.text, lasting=advice.lasting, subject=advice.subject)
-    action = "Calibrate …" if advice.lasting else f"{wizard.title} …"
+    action = tr("Calibrate …") if advice.lasting else f"{tr(wizard.title)} …"
     return Notice(advice.level, advice.text, action, f"{OPEN_WIZARD}{wizard.name}", advice.lasting,
                   advice.subject)
 
 
 def _pace_notice(pace: TwinPace) -> Notice:
-    return Notice("info", f"This computer renders the simulated cameras at {pace.achieved_hz:.0f} of "
-                          f"{pace.preset_hz:.0f} Hz; the tracking is real all the same.")
+    return Notice("info", tr("This computer renders the simulated cameras at {achieved:.0f} of {preset:.0f} Hz; "
+                             "the tracking is real all the same.", achieved=pace.achieved_hz,
+                             preset=pace.preset_hz))
 
 
 def _engine_notice(controller: Controller) -> Notice:
     if controller.working:
-        return Notice("error", "The engine stopped. The app is starting it again; the nodes re-join by themselves.",
+        return Notice("error", tr("The engine stopped. The app is starting it again; the nodes re-join by themselves."),
                       subject="tracking")
     reason = f" {controller.problem}" if controller.problem else ""
-    return Notice("error", f"The engine stopped and could not be started again.{reason}", "Try again", RESTART_ENGINE,
-                  subject="tracking")
+    return Notice("error", tr("The engine stopped and could not be started again.{reason}", reason=reason),
+                  tr("Try again"), RESTART_ENGINE, subject="tracking")
 
 
 def _quiet_sentence(controller: Controller, *, in_order: bool) -> str:
     if controller.opened is None and controller.working:
-        return "One moment. Cancel ends what was started."
+        return tr("One moment. Cancel ends what was started.")
     if controller.opened is None:
-        return "Choose how to begin. F1 opens the guide."
+        return tr("Choose how to begin. F1 opens the guide.")
     if not controller.running:
-        return "Press Start, or the space bar, to begin tracking."
+        return tr("Press Start, or the space bar, to begin tracking.")
     look = look_of(controller)
-    return "Everything is in order." if look.tone == "good" and in_order else look.meaning
+    return tr("Everything is in order.") if look.tone == "good" and in_order else tr(look.meaning)
 
 
 # -- Unsaved changes of the rig ----------------------------------------------------------------------------------------
@@ -168,7 +173,8 @@ class RigFileWatch:
 
     def _confirm(self, path: Path, tell: Callable[[Notice], None]) -> None:
         self.look_soon()
-        tell(Notice("info", f"The rig was saved to {path}. What stood there before is kept in {path.name}.history."))
+        tell(Notice("info", tr("The rig was saved to {path}. What stood there before is kept in {name}.history.",
+                               path=path, name=path.name)))
 
     def _rest(self) -> None:
         """An engine that does not answer is told of elsewhere."""

@@ -17,15 +17,16 @@ from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 from rhot_app.project import Rig, parse_rig, with_object
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.controller import Controller
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.models.notice import Notice
 from rhot_node.files import resource_path
 
-TITLE = "Add a tracked object"
+TITLE = tr_noop("Add a tracked object")
 
 
 def choose_object(parent: QWidget, start: Path) -> Path | None:
     """An object file; None when the person thought better of it."""
-    name, _ = QFileDialog.getOpenFileName(parent, TITLE, str(start), "Object files (*.json);;All files (*)")
+    name, _ = QFileDialog.getOpenFileName(parent, tr(TITLE), str(start), tr("Object files (*.json);;All files (*)"))
     return Path(name) if name else None
 
 
@@ -56,7 +57,7 @@ class TrackedObjects(QObject):
         self._menu.clear()
         for name in names:
             entry = self._menu.addAction(name)
-            entry.setToolTip(f"Take {name} out of the rig; its file stays.")
+            entry.setToolTip(tr("Take {name} out of the rig; its file stays.", name=name))
             entry.triggered.connect(lambda checked=False, name=name: self.remove(name))
         self._menu.menuAction().setEnabled(bool(names))
 
@@ -68,14 +69,14 @@ class TrackedObjects(QObject):
     def add(self, path: Path) -> None:
         """Add the object of a file to the engine's rig."""
         self._change(lambda rig: with_object(rig, path),
-                     lambda rig: f"{rig.models[-1].name} is tracked from now on, and stands in the rig.")
+                     lambda rig: tr("{name} is tracked from now on, and stands in the rig.", name=rig.models[-1].name))
 
     def remove(self, name: str) -> None:
         """Take an object out of the engine's rig."""
         def without(rig: Rig) -> Rig:
             kept = tuple(one for one in rig.objects if one.model is None or one.model.name != name)
             return msgspec.structs.replace(rig, objects=kept)
-        self._change(without, lambda rig: f"{name} is not tracked any more.")
+        self._change(without, lambda rig: tr("{name} is not tracked any more.", name=name))
 
     def _change(self, change: Callable[[Rig], Rig], words: Callable[[Rig], str]) -> None:
         def work(client: Asker) -> Rig:
@@ -88,5 +89,6 @@ class TrackedObjects(QObject):
 
         def done(rig: Any) -> None:
             self._changed()
-            self._tell(Notice("info", f"{words(rig)} Calibrate, Bring back an earlier calibration undoes it."))
+            self._tell(Notice("info",
+                              tr("{words} Calibrate, Bring back an earlier calibration undoes it.", words=words(rig))))
         self._controller.link.work(work, done, lambda sentence: self._tell(Notice("error", sentence)))

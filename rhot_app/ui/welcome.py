@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.ui.backend.contract import TwinChoice
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.words import shipped_motions
 
@@ -56,11 +57,11 @@ class WelcomePage(QWidget):
         layout.addWidget(scroll)
 
     def _choice_page(self, motion: str) -> QWidget:
-        title = QLabel("How do you want to begin?")
+        title = QLabel(tr("How do you want to begin?"))
         title.setFont(app_font(_TITLE_PT, bold=True))
         title.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        line = QLabel("RHOT tracks a hand with cheap cameras: a bare hand with one, a hand that wears six colour "
-                      "markers with two. No camera at hand? The simulated rig shows everything.")
+        line = QLabel(tr("RHOT tracks a hand with cheap cameras: a bare hand with one, a hand that wears six colour "
+                         "markers with two. No camera at hand? The simulated rig shows everything."))
         line.setWordWrap(True)
         line.setProperty("muted", True)
         line.setAlignment(Qt.AlignmentFlag.AlignHCenter)
@@ -69,29 +70,33 @@ class WelcomePage(QWidget):
             self.motion_box.addItem(info.name, info.name)
             self.motion_box.setItemData(self.motion_box.count() - 1, info.description, Qt.ItemDataRole.ToolTipRole)
         self.motion_box.setCurrentIndex(max(0, self.motion_box.findData(motion)))
-        self.motion_box.setToolTip("What the simulated hand does.")
-        self.motion_box.setAccessibleName("Motion of the simulated hand")
-        self.twin_button = QPushButton("Start the simulated rig")
+        self.motion_box.setToolTip(tr("What the simulated hand does."))
+        self.motion_box.setAccessibleName(tr("Motion of the simulated hand"))
+        self.twin_button = QPushButton(tr("Start the simulated rig"))
         self.twin_button.setProperty("primary", True)
         self.twin_button.clicked.connect(lambda: self.twin_asked.emit(TwinChoice(motion=self.motion)))
-        self.file_button = QPushButton("Open a rig file …")
+        self.file_button = QPushButton(tr("Open a rig file …"))
         self.file_button.clicked.connect(self.file_asked)
         self.last_button = QPushButton()
         self.last_button.clicked.connect(self.last_asked)
-        self.nodes_button = QPushButton("Connect nodes …")
+        self.nodes_button = QPushButton(tr("Connect nodes …"))
         self.nodes_button.clicked.connect(self.nodes_asked)
-        self.cameras_button = QPushButton("Choose cameras …")
+        self.cameras_button = QPushButton(tr("Choose cameras …"))
         self.cameras_button.clicked.connect(self.cameras_asked)
         self.show_last("")
         cards = QGridLayout()
         cards.setSpacing(16)
-        cards.addWidget(_card("Simulated rig", "Two simulated cameras look at a simulated hand, through real node "
-                              "programs and the real network path.", self.motion_box, self.twin_button), 0, 0)
-        cards.addWidget(_card("Cameras of this computer", "A webcam or two, films, or a network camera such as a "
-                              "phone. One is enough to begin with a bare hand.", self.cameras_button), 0, 1)
-        cards.addWidget(_card("Two nodes", "Enter the addresses of two Raspberry Pis that run rhot-node, see whether "
-                              "they answer, and write a first rig file.", self.nodes_button), 1, 0)
-        cards.addWidget(_card("Rig file", "A rig that was set up before: its cameras, lenses, marker set and hand.",
+        cards.addWidget(_card(tr("Simulated rig"), tr("Two simulated cameras look at a simulated hand, through real "
+                                                      "node programs and the real network path."), self.motion_box,
+                              self.twin_button), 0, 0)
+        cards.addWidget(_card(tr("Cameras of this computer"),
+                              tr("A webcam or two, films, or a network camera such as a phone. One is enough to begin "
+                                 "with a bare hand."), self.cameras_button), 0, 1)
+        cards.addWidget(_card(tr("Two nodes"), tr("Enter the addresses of two Raspberry Pis that run rhot-node, see "
+                                                  "whether they answer, and write a first rig file."),
+                              self.nodes_button), 1, 0)
+        cards.addWidget(_card(tr("Rig file"),
+                              tr("A rig that was set up before: its cameras, lenses, marker set and hand."),
                               self.last_button, self.file_button), 1, 1)
         page = QWidget()
         layout = QVBoxLayout(page)
@@ -109,7 +114,7 @@ class WelcomePage(QWidget):
         self.progress_bar.setRange(0, 100)
         self.progress_bar.setTextVisible(False)
         self.progress_bar.setFixedWidth(420)
-        self.cancel_button = QPushButton("Cancel")
+        self.cancel_button = QPushButton(tr("Cancel"))
         self.cancel_button.clicked.connect(self.cancel_asked)
         page = QWidget()
         layout = QVBoxLayout(page)
@@ -128,8 +133,8 @@ class WelcomePage(QWidget):
     def show_last(self, name: str) -> None:
         """Offer the rig opened last; "" offers none."""
         self.last_button.setVisible(bool(name))
-        self.last_button.setText(f"Open {name}")
-        self.last_button.setToolTip(f"The rig opened last: {name}")
+        self.last_button.setText(tr("Open {name}", name=name))
+        self.last_button.setToolTip(tr("The rig opened last: {name}", name=name))
 
     def show_busy(self, busy: tuple[str, float] | None) -> None:
         """Progress of what is under way; None shows the choices."""

@@ -18,6 +18,7 @@ from rhot_app.project import Rig
 from rhot_app.ui.backend.contract import Asker, Backend, Listener, Opened, TwinChoice, TwinPace
 from rhot_app.ui.backend.live import SILENCE_S, Live
 from rhot_app.ui.common.job import Job, Progress
+from rhot_app.ui.common.language import tr
 
 # -- The window's client of the engine ---------------------------------------------------------------------------------
 
@@ -138,17 +139,17 @@ class Controller(QObject):
 
     def attach(self) -> None:
         """Attach to the engine that runs already."""
-        self._open("Attaching to the running engine …", self.backend.attach)
+        self._open(tr("Attaching to the running engine …"), self.backend.attach)
 
     def open_rig(self, path: Path) -> None:
         """Open a rig file."""
-        self._open("Opening the rig …", lambda report: self.backend.open_rig(path, report))
+        self._open(tr("Opening the rig …"), lambda report: self.backend.open_rig(path, report))
 
     def open_twin(self, choice: TwinChoice, *, begin: bool = True) -> None:
         """Start the simulated rig; `begin` starts the tracking as soon as it is there."""
         self.twin_choice = choice
         self._begin_after_opening = begin
-        self._open("Starting the simulated rig …", lambda report: self.backend.open_twin(choice, report))
+        self._open(tr("Starting the simulated rig …"), lambda report: self.backend.open_twin(choice, report))
 
     def _open(self, text: str, op: Callable[[Callable[[str, float], None]], Opened]) -> None:
         if self._job is not None:
@@ -208,14 +209,14 @@ class Controller(QObject):
             job.wait(_CLOSE_WAIT_S)
             return self.backend.close()
 
-        self._start_job("Cancelling …", end_all, self._on_closed)
+        self._start_job(tr("Cancelling …"), end_all, self._on_closed)
 
     def close_rig(self) -> None:
         """Back to the first page; ends what the app started."""
         if self._job is not None:
             return
         self._forget_rig()
-        self._start_job("Closing the rig …", lambda progress: self.backend.close(), self._on_closed)
+        self._start_job(tr("Closing the rig …"), lambda progress: self.backend.close(), self._on_closed)
 
     def _on_closed(self, left_running: str) -> None:
         self._job = None
@@ -332,7 +333,7 @@ class Controller(QObject):
         self._restarts.append(now)
         self._restarting = True
         path, start = self.opened.rig_path, self._was_running
-        self._start_job("The engine stopped. Starting it again …",
+        self._start_job(tr("The engine stopped. Starting it again …"),
                         lambda progress: self.backend.restart_engine(path, start, progress.report), self._on_opened)
 
     def press(self, key: str) -> None:

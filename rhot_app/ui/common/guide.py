@@ -9,16 +9,20 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QImage, QKeySequence, QShortcut, QTextDocument
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QListWidgetItem, QTextBrowser, QVBoxLayout, QWidget
 
+from rhot_app.ui.common.language import language, tr, tr_noop
+
 GUIDE = Path(__file__).resolve().parents[3] / "docs" / "guide"
 
 PAGES: tuple[tuple[str, str], ...] = (
-    ("start", "Getting started"), ("window", "The window"), ("nodes", "Nodes"), ("markers", "Markers"),
-    ("cameras", "Cameras"), ("hand", "The hand"), ("scene", "The scene"), ("plots", "The plots"),
-    ("calibration", "Calibration"), ("fitting", "Fitting the hand to pictures"),
-    ("tracker", "The tracker"), ("outputs", "Streams to other programs"),
-    ("mouse", "The 3-D mouse"),
-    ("recording", "Recording and replay"), ("settings", "Settings"),
-    ("troubles", "When something is wrong"), ("keys", "Keys"),
+    ("start", tr_noop("Getting started")), ("window", tr_noop("The window")), ("nodes", tr_noop("Nodes")),
+    ("markers", tr_noop("Markers")), ("cameras", tr_noop("Cameras")), ("hand", tr_noop("The hand")),
+    ("scene", tr_noop("The scene")),
+    ("plots", tr_noop("The plots")),
+    ("calibration", tr_noop("Calibration")), ("fitting", tr_noop("Fitting the hand to pictures")),
+    ("tracker", tr_noop("The tracker")), ("outputs", tr_noop("Streams to other programs")),
+    ("mouse", tr_noop("The 3-D mouse")),
+    ("recording", tr_noop("Recording and replay")), ("settings", tr_noop("Settings")),
+    ("troubles", tr_noop("When something is wrong")), ("keys", tr_noop("Keys")),
 )
 """Name of each page's file and its title, in reading order."""
 
@@ -29,8 +33,9 @@ _SPACING_PX = 3
 
 
 def page_path(name: str) -> Path:
-    """Where a page's text stands."""
-    return GUIDE / f"{name}.md"
+    """Where a page's text stands: in the window's language if there is one."""
+    translated = GUIDE / f"{name}.{language()}.md"
+    return translated if translated.is_file() else GUIDE / f"{name}.md"
 
 
 def page_of(widget: QWidget | None) -> str:
@@ -69,11 +74,11 @@ class GuideViewer(QDialog):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("RHOT guide")
+        self.setWindowTitle(tr("RHOT guide"))
         self.resize(960, 680)
         self.list = QListWidget()
         for name, title in PAGES:
-            item = QListWidgetItem(title)
+            item = QListWidgetItem(tr(title))
             item.setData(Qt.ItemDataRole.UserRole, name)
             self.list.addItem(item)
         self.list.setSpacing(_SPACING_PX)
@@ -121,11 +126,12 @@ class GuideViewer(QDialog):
         try:
             text = path.read_text(encoding="utf-8")
         except OSError:
-            text = f"The guide's pages are not installed here ({path}). They are in the project's docs/guide folder."
+            text = tr("The guide's pages are not installed here ({path}). They are in the project's docs/guide folder.",
+                      path=path)
         self.browser.setMarkdown(text)
 
     def _follow(self, url: QUrl) -> None:
         """Links between pages stay in the viewer; others are left to the reader's own browser."""
         target = Path(url.path())
         if url.isRelative() and target.suffix == ".md":
-            self.open_page(target.stem, url.fragment())
+            self.open_page(target.name.partition(".")[0], url.fragment())

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 from PySide6.QtCore import QObject, Qt, Signal, SignalInstance
 
 from rhot_app.errors import RhotError
+from rhot_app.ui.common.language import tr
 from rhot_node.errors import NodeError
 
 log = logging.getLogger(__name__)
@@ -59,7 +60,7 @@ class Progress:
     def report(self, text: str, fraction: float) -> None:
         """Say what is being done and how much is done, 0..1; raises CancelledError once it was cancelled."""
         if self._cancelled.is_set():
-            raise CancelledError("Cancelled.")
+            raise CancelledError(tr("Cancelled."))
         self._report(text, fraction)
 
     @property
@@ -125,7 +126,8 @@ class Job(QObject):
         except (RhotError, NodeError, OSError) as exc:
             _emit(self._broke, str(exc))
         except Exception as exc:
-            _emit(self._broke, f"The program made a mistake ({type(exc).__name__}: {exc}). Please report it.")
+            _emit(self._broke,
+                  tr("The program made a mistake ({name}: {exc}). Please report it.", name=type(exc).__name__, exc=exc))
             raise
         else:
             _emit(self._finished, result)

@@ -9,9 +9,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence, QShortcut
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QPushButton, QToolButton, QWidget
 
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.settings import Settings
 
-_FIXED: Final = {"Space": "Start and Stop", "Alt+Down": "opening menus", "Alt+M": "the list of sentences"}
+_FIXED: Final = {"Space": tr_noop("Start and Stop"), "Alt+Down": tr_noop("opening menus"),
+                 "Alt+M": tr_noop("the list of sentences")}
 """Keys that no action can have, and what they serve."""
 
 _ALWAYS: Final = {"start": "Space"}
@@ -46,10 +48,11 @@ class ActionKeys:
     def choose(self, action: QAction, key: QKeySequence) -> str:
         """Give an action another key, or none. The sentence that says why it cannot have it, else ""."""
         text = key.toString()
-        holder = _FIXED.get(text) or next((title_of(one) for one in self.actions
+        holder = tr(_FIXED.get(text, "")) or next((title_of(one) for one in self.actions
                                            if one is not action and text and one.shortcut() == key), "")
         if holder:
-            return f"{text} is the key of {holder}. Choose another, or take it from there first."
+            return tr("{text} is the key of {holder}. Choose another, or take it from there first.", text=text,
+                      holder=holder)
         own = key == self._own[action.objectName()]
         self._settings.set_key(action.objectName(), None if own else text)
         self._set(action, key)

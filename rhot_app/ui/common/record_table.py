@@ -9,6 +9,8 @@ from typing import Any, Generic, TypeVar
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt, Signal
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
+from rhot_app.ui.common.language import tr
+
 R = TypeVar("R")
 Index = QModelIndex | QPersistentModelIndex
 
@@ -75,7 +77,7 @@ class RecordModel(QAbstractTableModel, Generic[R]):
         """The columns' heads, and the rows' numbers where a table shows them."""
         if role != Qt.ItemDataRole.DisplayRole:
             return None
-        return self.columns[section].head if orientation == Qt.Orientation.Horizontal else section + 1
+        return tr(self.columns[section].head) if orientation == Qt.Orientation.Horizontal else section + 1
 
     def flags(self, index: Index) -> Qt.ItemFlag:
         """Cells with a `write` can be typed over."""

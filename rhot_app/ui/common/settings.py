@@ -8,9 +8,12 @@ from typing import Final
 from platformdirs import user_config_path, user_documents_path
 from PySide6.QtCore import QByteArray, QObject, QSettings, Signal
 
+from rhot_app.ui.common.language import tr_noop
+
 _FILE = "app.ini"
-STARTS: Final = (("page", "the first page"), ("last", "the rig that was opened last"), ("twin", "the simulated rig"))
-"""What can be opened at the start, with its words."""
+STARTS: Final = (("page", tr_noop("The first page")), ("last", tr_noop("The rig that was opened last")),
+                 ("twin", tr_noop("The simulated rig")))
+"""What can be opened at the start, with its title."""
 
 
 class Settings(QObject):
@@ -53,6 +56,15 @@ class Settings(QObject):
     @scheme.setter
     def scheme(self, name: str) -> None:
         self._store.setValue("look/scheme", name)
+
+    @property
+    def language(self) -> str:
+        """Code of the language of the window, "system" for the desktop's."""
+        return self._text("look/language", "system")
+
+    @language.setter
+    def language(self, code: str) -> None:
+        self._store.setValue("look/language", code)
 
     @property
     def start(self) -> str:

@@ -8,6 +8,8 @@ from PySide6.QtCore import QLineF, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetricsF, QIcon, QPainter, QPen, QPixmap, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QToolBar, QToolButton, QWidget
 
+from rhot_app.ui.common.language import tr
+
 
 def paint_shape(painter: QPainter, shape: str, box: QRectF, colour: QColor) -> None:
     """Draw one shape into the largest square of `box`."""
@@ -147,7 +149,7 @@ def show_overflow(bar: QToolBar, colour: str) -> None:
         painter.end()
         arrow.setIcon(QIcon(picture))
         arrow.setIconSize(QSize(10, 16))
-        arrow.setToolTip("More controls")
+        arrow.setToolTip(tr("More controls"))
 
 
 class ShapeMark(QWidget):

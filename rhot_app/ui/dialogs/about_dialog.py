@@ -25,6 +25,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.engine.offline.report import package_versions
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.record_table import Column, RecordTable
 
 _SIZE: Final = (680, 560)
@@ -96,7 +97,7 @@ def licence_of(package: Distribution) -> str:
                   if text.startswith(_CLASSIFIER)]
     if stated and len(stated) <= _LONGEST and stated.upper() != "UNKNOWN":
         return stated
-    return ", ".join(classified) or _STATED.get(package.name, "see the package's own files")
+    return ", ".join(classified) or _STATED.get(package.name, tr("see the package's own files"))
 
 
 class AboutDialog(QDialog):
@@ -104,32 +105,32 @@ class AboutDialog(QDialog):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("About RHOT")
+        self.setWindowTitle(tr("About RHOT"))
         self.setProperty("guide", "troubles")
         self.resize(*_SIZE)
         title = QLabel(f"RHOT {version('rhot')}")
         title.setProperty("title", True)
-        meaning = QLabel("Low-cost hand and object tracking with cheap cameras. RHOT itself has the MIT licence.")
+        meaning = QLabel(tr("Low-cost hand and object tracking with cheap cameras. RHOT itself has the MIT licence."))
         meaning.setWordWrap(True)
         self.versions = QPlainTextEdit(versions_text())
         self.versions.setReadOnly(True)
-        self.versions.setToolTip("Put this into a report of a fault. `rhot report` collects more.")
+        self.versions.setToolTip(tr("Put this into a report of a fault. `rhot report` collects more."))
         self.table: RecordTable[Part] = RecordTable((
-            Column("Package", lambda part: part.name), Column("Version", lambda part: part.version),
-            Column("Licence", lambda part: part.licence,
+            Column(tr("Package"), lambda part: part.name), Column(tr("Version"), lambda part: part.version),
+            Column(tr("Licence"), lambda part: part.licence,
                    roles=lambda part: {Qt.ItemDataRole.ToolTipRole: part.licence})))
         self.table.setShowGrid(False)
-        self.table.setAccessibleName("Packages and licences")
+        self.table.setAccessibleName(tr("Packages and licences"))
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.table.show_records(parts())
         self.table.fit_columns()
         self.tabs = QTabWidget()
-        self.tabs.addTab(self.versions, "Versions")
-        self.tabs.addTab(self.table, "Licences")
-        self.copy_button = QPushButton("Copy")
-        self.copy_button.setToolTip("Copy the versions, for a report of a fault.")
+        self.tabs.addTab(self.versions, tr("Versions"))
+        self.tabs.addTab(self.table, tr("Licences"))
+        self.copy_button = QPushButton(tr("Copy"))
+        self.copy_button.setToolTip(tr("Copy the versions, for a report of a fault."))
         self.copy_button.clicked.connect(self._copy)
-        self.close_button = QPushButton("Close")
+        self.close_button = QPushButton(tr("Close"))
         self.close_button.clicked.connect(self.close)
         buttons = QHBoxLayout()
         buttons.addWidget(self.copy_button)

@@ -20,6 +20,7 @@ from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.disposal import dispose, release_style
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.keys import ActionKeys
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.about_dialog import AboutDialog
 from rhot_app.ui.dialogs.cameras_dialog import CamerasDialog
@@ -65,8 +66,8 @@ class Dialogs:
         """A rig file, looked for beside the one opened last; None when the person thought better of it."""
         last = Path(last_rig)
         start = str(last.parent) if last_rig and last.parent.is_dir() else str(Path.home())
-        name, _ = QFileDialog.getOpenFileName(self._parent, "Open a rig file", start,
-                                              "Rig files (*.json);;All files (*)")
+        name, _ = QFileDialog.getOpenFileName(self._parent, tr("Open a rig file"), start,
+                                              tr("Rig files (*.json);;All files (*)"))
         return Path(name) if name else None
 
     def connect_nodes(self, scheme: Scheme) -> Path | None:

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QInputDialog, QWidget
 from rhot_app.engine.status import Level
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.disposal import dispose
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
@@ -29,8 +30,8 @@ class BookmarkDialog(QInputDialog):
 
     def __init__(self, taken: Callable[[str], None], parent: QWidget) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Bookmark")
-        self.setLabelText("What happens here?")
+        self.setWindowTitle(tr("Bookmark"))
+        self.setLabelText(tr("What happens here?"))
         self.textValueSelected.connect(lambda text: taken(text.strip() or NO_WORDS))
         self.open()
 
@@ -38,7 +39,7 @@ class BookmarkDialog(QInputDialog):
 # -- Recordings and their files ----------------------------------------------------------------------------------------
 
 LOG_SUFFIX = ".rhotlog"
-LOG_FILTER = f"Recordings (*{LOG_SUFFIX});;All files (*)"
+LOG_FILTER = tr_noop("Recordings (*.rhotlog);;All files (*)")
 SHOW_FOLDER = "show the recording's folder"
 
 
@@ -76,14 +77,15 @@ class Recordings:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as exc:
-            self._say("error", f"{folder}: cannot be made ({exc.strerror}), so nothing is recorded.")
+            self._say("error", tr("{folder}: cannot be made ({strerror}), so nothing is recorded.", folder=folder,
+                                  strerror=exc.strerror))
             return
         self._controller.record(folder / f"{datetime.now():%Y-%m-%d_%H-%M-%S}{LOG_SUFFIX}", video=video)
 
     def ask_for_bookmark(self, window: QWidget) -> None:
         """Ask for a few words about this moment, and have the engine write them into the log."""
         if not self._controller.recording:
-            self._say("info", "Nothing is being recorded, so there is nothing to put a bookmark into. R records.")
+            self._say("info", tr("Nothing is being recorded, so there is nothing to put a bookmark into. R records."))
             return
         if self.dialog is not None:
             return
@@ -93,7 +95,7 @@ class Recordings:
 
     def _set_bookmark(self, text: str, at_ns: int) -> None:
         self._controller.link.work(lambda client: client.command("bookmark", text=text, t_master_ns=at_ns),
-                                   lambda answer: self._say("info", f"Bookmark “{text}” is set."))
+                                   lambda answer: self._say("info", tr("Bookmark “{text}” is set.", text=text)))
 
     def _forget_dialog(self) -> None:
         if self.dialog is not None:
@@ -114,16 +116,18 @@ class Recordings:
         try:
             size = bytes_text(path.stat().st_size)
         except OSError as exc:
-            self._say("error", f"{path}: the recording cannot be found ({exc.strerror}).")
+            self._say("error",
+                      tr("{path}: the recording cannot be found ({strerror}).", path=path, strerror=exc.strerror))
             return
-        video = " The cameras keep its videos until Rig, Recordings collects them." if self._video else ""
-        self._tell(Notice("info", f"Recorded {size} to {path}.{video}", "Show in folder", SHOW_FOLDER))
+        video = tr(" The cameras keep its videos until Rig, Recordings collects them.") if self._video else ""
+        self._tell(Notice("info", tr("Recorded {size} to {path}.{video}", size=size, path=path, video=video),
+                          tr("Show in folder"), SHOW_FOLDER))
 
     def show_folder(self) -> None:
         """Open the folder of the last recording in the desktop's own file manager."""
         folder = self._finished.parent
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self._say("info", f"This desktop opens no folders. The recording lies in {folder}.")
+            self._say("info", tr("This desktop opens no folders. The recording lies in {folder}.", folder=folder))
 
     def _say(self, level: Level, sentence: str) -> None:
         self._tell(Notice(level, sentence))

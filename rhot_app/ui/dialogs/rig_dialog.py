@@ -15,7 +15,9 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import FingerAnatomy
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig, RigNode
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.record_table import Column, RecordTable
+from rhot_app.ui.models.words import HANDS
 from rhot_node.markers import Marker
 
 _MARGIN_PX = 40
@@ -27,13 +29,13 @@ def _field_of_view(node: RigNode) -> str:
 
 
 CAMERA_COLUMNS: tuple[Column[RigNode], ...] = (
-    Column("camera", lambda node: node.name),
-    Column("picture [px]", lambda node: f"{node.intrinsics.width} × {node.intrinsics.height}"),
-    Column("field of view", _field_of_view),
-    Column("focal length [px]", lambda node: f"{node.intrinsics.fx:.1f}, {node.intrinsics.fy:.1f}"),
-    Column("centre [px]", lambda node: f"{node.intrinsics.cx:.1f}, {node.intrinsics.cy:.1f}"),
+    Column(tr_noop("camera"), lambda node: node.name),
+    Column(tr_noop("picture [px]"), lambda node: f"{node.intrinsics.width} × {node.intrinsics.height}"),
+    Column(tr_noop("field of view"), _field_of_view),
+    Column(tr_noop("focal length [px]"), lambda node: f"{node.intrinsics.fx:.1f}, {node.intrinsics.fy:.1f}"),
+    Column(tr_noop("centre [px]"), lambda node: f"{node.intrinsics.cx:.1f}, {node.intrinsics.cy:.1f}"),
     Column("k1, k2", lambda node: "{:.3f}, {:.3f}".format(*node.intrinsics.distortion[:2])),
-    Column("address : port", lambda node: f"{node.address}:{node.control_port}"))
+    Column(tr_noop("address : port"), lambda node: f"{node.address}:{node.control_port}"))
 
 
 def _colours(marker: Marker) -> dict[int, QColor]:
@@ -45,11 +47,11 @@ def _colours(marker: Marker) -> dict[int, QColor]:
 
 
 MARKER_COLUMNS: tuple[Column[Marker], ...] = (
-    Column("marker", lambda marker: marker.id),
-    Column("colour", lambda marker: hex_of(marker.display_rgb), roles=_colours),
-    Column("place", lambda marker: (marker.role or "free").replace("_", " ")),
-    Column("shape", lambda marker: marker.shape),
-    Column("radius [mm]", lambda marker: f"{marker.radius_mm:.1f}" if marker.radius_mm else "–"))
+    Column(tr_noop("marker"), lambda marker: marker.id),
+    Column(tr_noop("colour"), lambda marker: hex_of(marker.display_rgb), roles=_colours),
+    Column(tr_noop("place"), lambda marker: tr((marker.role or "free").replace("_", " "))),
+    Column(tr_noop("shape"), lambda marker: tr(marker.shape)),
+    Column(tr_noop("radius [mm]"), lambda marker: f"{marker.radius_mm:.1f}" if marker.radius_mm else "–"))
 
 
 def _bone(number: int) -> Callable[[tuple[str, FingerAnatomy]], str]:
@@ -57,18 +59,22 @@ def _bone(number: int) -> Callable[[tuple[str, FingerAnatomy]], str]:
 
 
 HAND_COLUMNS: tuple[Column[tuple[str, FingerAnatomy]], ...] = (
-    Column("finger", lambda named: named[0]), Column("first bone [mm]", _bone(0)), Column("second [mm]", _bone(1)),
-    Column("last [mm]", _bone(2)), Column("marker to last joint [mm]", lambda named: f"{named[1].marker_mm:.1f}"))
+    Column(tr_noop("finger"), lambda named: tr(named[0])), Column(tr_noop("first bone [mm]"), _bone(0)),
+    Column(tr_noop("second [mm]"), _bone(1)),
+    Column(tr_noop("last [mm]"), _bone(2)),
+    Column(tr_noop("marker to last joint [mm]"), lambda named: f"{named[1].marker_mm:.1f}"))
 
 
 def baseline_text(rig: Rig) -> str:
     """Distance of the first two cameras in words."""
     if len(rig.nodes) < 2:
-        return "The rig has one camera; depth needs two."
+        return tr("The rig has one camera; depth needs two.")
     if not all(rig.tracked_with[:2]):
-        return f"Where {rig.nodes[0].name} and {rig.nodes[1].name} stand to each other is not known."
+        return tr("Where {first} and {second} stand to each other is not known.", first=rig.nodes[0].name,
+                  second=rig.nodes[1].name)
     first, second = (np.array(node.pose.translation_m) for node in rig.nodes[:2])
-    return f"{rig.nodes[0].name} and {rig.nodes[1].name} stand {1e3 * np.linalg.norm(second - first):.1f} mm apart."
+    return tr("{first} and {second} stand {distance:.1f} mm apart.", first=rig.nodes[0].name, second=rig.nodes[1].name,
+              distance=1e3 * np.linalg.norm(second - first))
 
 
 class RigDialog(QDialog):
@@ -76,18 +82,20 @@ class RigDialog(QDialog):
 
     def __init__(self, rig: Rig, page: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle(f"Rig {rig.name}")
+        self.setWindowTitle(tr("Rig {name}", name=rig.name))
         self.setProperty("guide", "calibration")
         self.tabs = QTabWidget()
-        self.tabs.addTab(_page(_table(CAMERA_COLUMNS, rig.nodes), baseline_text(rig)), "Cameras")
+        self.tabs.addTab(_page(_table(CAMERA_COLUMNS, rig.nodes), baseline_text(rig)), tr("Cameras"))
         self.tabs.addTab(_page(_table(MARKER_COLUMNS, rig.markers.markers),
-                               f"Marker set {rig.markers.name or 'without a name'}. Nodes and master must use the same "
-                               "one."), "Markers")
+                               tr("Marker set {name}. Nodes and master must use the same one.",
+                                  name=rig.markers.name or tr("without a name"))), tr("Markers"))
         self.tabs.addTab(_page(_table(HAND_COLUMNS, [(name, rig.hand.fingers[name]) for name in FINGERS]),
-                               f"{rig.hand.name or 'Hand'}, {rig.hand.side} side; wrist "
-                               f"{rig.hand.wrist_breadth_mm:.0f} × {rig.hand.wrist_thickness_mm:.0f} mm."), "Hand")
+                               tr("{name}, {hand}; wrist {breadth:.0f} × {thickness:.0f} mm.",
+                                  name=rig.hand.name or tr("Hand"), hand=tr(HANDS[rig.hand.side]),
+                                  breadth=rig.hand.wrist_breadth_mm, thickness=rig.hand.wrist_thickness_mm)),
+                         tr("Hand"))
         self.tabs.setCurrentIndex(("cameras", "markers", "hand").index(page))
-        close = QPushButton("Close")
+        close = QPushButton(tr("Close"))
         close.clicked.connect(self.reject)
         layout = QVBoxLayout(self)
         layout.addWidget(self.tabs)

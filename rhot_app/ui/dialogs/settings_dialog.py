@@ -1,4 +1,5 @@
-"""What the app remembers, to be changed: look, folders, start, recording, keys. Every change holds at once."""
+"""What the app remembers, to be changed: look, language, folders, start, recording, keys. Every change holds at once,
+but the language from the next start on."""
 
 from __future__ import annotations
 
@@ -24,6 +25,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.ui.common.keys import ActionKeys, title_of
+from rhot_app.ui.common.language import LANGUAGES, language, language_of, tr, tr_noop
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.settings import STARTS, Settings
@@ -32,7 +34,7 @@ from rhot_app.ui.dialogs.next_steps import NEXT_STEPS
 _SIZE: Final = (720, 520)
 _KEY_PX: Final = 170
 _ROW_PX: Final = 30
-_BESIDE: Final = "beside the recording"
+_BESIDE: Final = tr_noop("beside the recording")
 
 
 class SettingsDialog(QDialog):
@@ -40,22 +42,22 @@ class SettingsDialog(QDialog):
 
     def __init__(self, settings: Settings, actions: ActionKeys, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Settings")
+        self.setWindowTitle(tr("Settings"))
         self.setProperty("guide", "settings")
         self.resize(*_SIZE)
         self._settings = settings
         self.tabs = QTabWidget()
         self.general = GeneralPage(settings, actions)
         self.keys = KeysPage(actions)
-        self.tabs.addTab(self.general, "General")
-        self.tabs.addTab(self.keys, "Keys")
-        self.reset_button = _button("Reset all", "Forget layout, last rig, switches, folders and keys.")
+        self.tabs.addTab(self.general, tr("General"))
+        self.tabs.addTab(self.keys, tr("Keys"))
+        self.reset_button = _button(tr("Reset all"), tr("Forget layout, last rig, switches, folders and keys."))
         self.reset_button.clicked.connect(actions.named("reset").trigger)
         self.reset_button.clicked.connect(self.refresh)
-        self.close_button = _button("Close", "Every change holds already.")
+        self.close_button = _button(tr("Close"), tr("Every change holds already."))
         self.close_button.clicked.connect(self.close)
         self.file_label = where = QLabel(str(settings.path))
-        where.setToolTip("The file in which the app remembers all this.")
+        where.setToolTip(tr("The file in which the app remembers all this."))
         where.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         where.setWordWrap(True)
         where.setProperty("muted", True)
@@ -87,45 +89,55 @@ class GeneralPage(QWidget):
     def __init__(self, settings: Settings, actions: ActionKeys, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._settings = settings
-        self.look_box, self.start_box = QComboBox(), QComboBox()
-        self.look_box.setToolTip("Light text on dark ground, or the other way round. The View menu has it, too.")
+        self.look_box, self.language_box, self.start_box = QComboBox(), QComboBox(), QComboBox()
+        self.look_box.setToolTip(tr("Light text on dark ground, or the other way round. The View menu has it, too."))
         self._looks = (actions.named("dark"), actions.named("light"))
         for look in self._looks:
             self.look_box.addItem(look.text())
             look.toggled.connect(self._show_look)
         self.look_box.currentIndexChanged.connect(self._choose_look)
-        self.start_box.setToolTip("What the app opens when it starts without a rig. An engine that runs already comes "
-                                  "first.")
+        self.language_box.setToolTip(tr("The language of the windows, from the next start on."))
+        for code, name in (("system", tr("As the desktop")), *LANGUAGES.items()):
+            self.language_box.addItem(name, code)
+        self.language_box.currentIndexChanged.connect(self._choose_language)
+        self.language_note = QLabel()
+        speaks = QHBoxLayout()
+        speaks.addWidget(self.language_box, 1)
+        speaks.addWidget(self.language_note, 1)
+        self.start_box.setToolTip(tr("What the app opens when it starts without a rig. An engine that runs already "
+                                     "comes first."))
         for name, words in STARTS:
-            self.start_box.addItem(words[0].upper() + words[1:], name)
+            self.start_box.addItem(tr(words), name)
         self.start_box.currentIndexChanged.connect(self._choose_start)
-        self.steps_check = QCheckBox("Show what to do next when cameras of this computer are opened")
+        self.steps_check = QCheckBox(tr("Show what to do next when cameras of this computer are opened"))
         self.steps_check.toggled.connect(lambda on: settings.set_flag(NEXT_STEPS, on))
         settings.flag_changed.connect(self._show_steps)
         self.video_check = _switch(actions.named("video"))
-        self.recordings = FolderRow("Where recordings are made and listed.")
-        self.exports = FolderRow("Where exported files are offered to be written.")
+        self.recordings = FolderRow(tr("Where recordings are made and listed."))
+        self.exports = FolderRow(tr("Where exported files are offered to be written."))
         self.recordings.chosen.connect(lambda path: self._choose_folder("recordings", path))
         self.exports.chosen.connect(lambda path: self._choose_folder("exports", path))
         form = QFormLayout(self)
         form.setContentsMargins(16, 16, 16, 16)
         form.setSpacing(12)
-        form.addRow("Look", self.look_box)
-        form.addRow("At the start, open", self.start_box)
+        form.addRow(tr("Look"), self.look_box)
+        form.addRow(tr("Language"), speaks)
+        form.addRow(tr("At the start, open"), self.start_box)
         form.addRow("", self.steps_check)
-        form.addRow("Recordings", self.recordings)
+        form.addRow(tr("Recordings"), self.recordings)
         form.addRow("", self.video_check)
-        form.addRow("Exported files", self.exports)
+        form.addRow(tr("Exported files"), self.exports)
         self.refresh()
 
     def refresh(self) -> None:
         """Show what the settings say now."""
         self._show_look()
         self._show_steps()
+        self.language_box.setCurrentIndex(max(self.language_box.findData(self._settings.language), 0))
         self.start_box.setCurrentIndex(self.start_box.findData(self._settings.start))
         exports = self._settings.exports_folder
         self.recordings.show_folder(str(self._settings.recordings_folder))
-        self.exports.show_folder(_BESIDE if exports is None else str(exports))
+        self.exports.show_folder(tr(_BESIDE) if exports is None else str(exports))
 
     def _show_look(self, on: bool = True) -> None:
         if on:
@@ -134,6 +146,11 @@ class GeneralPage(QWidget):
     def _choose_look(self, number: int) -> None:
         if not self._looks[number].isChecked():
             self._looks[number].trigger()
+
+    def _choose_language(self) -> None:
+        self._settings.language = self.language_box.currentData()
+        changes = language_of(self._settings.language) != language()
+        self.language_note.setText(tr("From the next start on.") if changes else "")
 
     def _choose_start(self) -> None:
         self._settings.start = self.start_box.currentData()
@@ -157,8 +174,8 @@ class FolderRow(QWidget):
         self._meaning = meaning
         self.label = QLabel()
         self.label.setWordWrap(True)
-        self.choose_button = _button("Choose …", "Another folder.")
-        self.own_button = _button("As at first", "The folder that it was on the first start.")
+        self.choose_button = _button(tr("Choose …"), tr("Another folder."))
+        self.own_button = _button(tr("As at first"), tr("The folder that it was on the first start."))
         self.choose_button.clicked.connect(self._choose)
         self.own_button.clicked.connect(lambda: self.chosen.emit(None))
         layout = QHBoxLayout(self)
@@ -186,25 +203,25 @@ class KeysPage(QWidget):
         super().__init__(parent)
         self._keys = keys
         self.table: RecordTable[QAction] = RecordTable((
-            Column("Action", title_of, roles=lambda action: {Qt.ItemDataRole.ToolTipRole: action.toolTip()}),
-            Column("Key", lambda action: action.shortcut().toString(QKeySequence.SequenceFormat.NativeText))))
+            Column(tr("Action"), title_of, roles=lambda action: {Qt.ItemDataRole.ToolTipRole: action.toolTip()}),
+            Column(tr("Key"), lambda action: action.shortcut().toString(QKeySequence.SequenceFormat.NativeText))))
         self.table.setShowGrid(False)
-        self.table.setAccessibleName("Keys of all actions")
+        self.table.setAccessibleName(tr("Keys of all actions"))
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.table.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         self.table.setColumnWidth(1, _KEY_PX)
         self.edit = QKeySequenceEdit()
         self.edit.setMaximumSequenceLength(1)
         self.edit.setClearButtonEnabled(True)
-        self.edit.setToolTip("Press the new key here; the cross takes the key away.")
-        self.edit.setAccessibleName("Key")
-        self.own_button = _button("As at first", "The key that the action had on the first start.")
+        self.edit.setToolTip(tr("Press the new key here; the cross takes the key away."))
+        self.edit.setAccessibleName(tr("Key"))
+        self.own_button = _button(tr("As at first"), tr("The key that the action had on the first start."))
         self.sentence = Sentence(2)
         self.table.chosen_changed.connect(self._show_chosen)
         self.edit.editingFinished.connect(self._choose)
         self.own_button.clicked.connect(self._choose_own)
         below = QHBoxLayout()
-        below.addWidget(QLabel("Key of the selected action"))
+        below.addWidget(QLabel(tr("Key of the selected action")))
         below.addWidget(self.edit, 1)
         below.addWidget(self.own_button)
         layout = QVBoxLayout(self)
@@ -227,8 +244,8 @@ class KeysPage(QWidget):
         self.own_button.setEnabled(action is not None and not self._keys.is_own(action))
         if action is not None:
             self.edit.setKeySequence(action.shortcut())
-            self.sentence.setText("Space starts and stops always. Windows beside the main one have keys of their own; "
-                                  "the guide lists them.")
+            self.sentence.setText(tr("Space starts and stops always. Windows beside the main one have keys of their "
+                                     "own; the guide lists them."))
 
     def _choose(self) -> None:
         action = self.table.chosen

@@ -12,6 +12,7 @@ from rhot_app.calibration.proposal import Change, Command, Proposal
 from rhot_app.engine.compilation import TITLE, compile_part, is_missing, part_of
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
+from rhot_app.ui.common.language import tr
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +37,10 @@ class RigChange:
     def way_back(self) -> str:
         """Only a file has a history."""
         if self.path is None or not self.path.exists():
-            return "This rig has no file, so nothing is kept: it can be brought back here, until this window closes."
-        return ("What is in the rig file now is kept, and can be brought back at any time with Calibrate, Bring back "
-                "an earlier calibration.")
+            return tr("This rig has no file, so nothing is kept: it can be brought back here, until this window "
+                      "closes.")
+        return tr("What is in the rig file now is kept, and can be brought back at any time with Calibrate, Bring "
+                  "back an earlier calibration.")
 
     def _change(self, command: Command, old: Rig, new: Rig, reason: str) -> None:
         set_rig(command, new)
@@ -77,12 +79,14 @@ def restore_all(changes: tuple[Change, ...], command: Command) -> None:
 
 def ways_back(changes: tuple[Change, ...]) -> str:
     """How what is there now can be brought back, each way once."""
-    return " ".join(dict.fromkeys(change.way_back for change in changes)) or "Nothing changes."
+    return " ".join(dict.fromkeys(change.way_back for change in changes)) or tr("Nothing changes.")
 
 
 def progress_text(rig: Rig) -> str:
     """What happens while `set_rig` runs."""
-    return f"{TITLE}. Then the engine changes over." if is_missing(part_of(rig)) else "The engine changes over …"
+    if is_missing(part_of(rig)):
+        return tr("{title}. Then the engine changes over.", title=TITLE)
+    return tr("The engine changes over …")
 
 
 def set_rig(command: Command, rig: Rig) -> None:

@@ -14,8 +14,9 @@ from rhot_app.calibration.check.camera_calibration import (
 )
 from rhot_app.engine.status import NodeStatus
 from rhot_app.state import HandState, Knowledge
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.models.meters import unused_frames
-from rhot_app.ui.models.words import KNOWLEDGE, NODES, Look, marker_look
+from rhot_app.ui.models.words import KNOWLEDGE, NODES, UNKNOWN_STATE, Look, marker_look
 
 # -- standard deviation along the worst axis ---------------------------------------------------------------------------
 
@@ -81,50 +82,55 @@ _USUAL_LOSS = 0.01
 """A hand moves on by some millimetres in a frame: one in a hundred that is missing changes nothing to be seen."""
 
 _UNUSED = {
-    "lost": "never arrived: the network lost them",
-    "time": "came too late: this computer or the network is busy",
-    "kernel_overflow": "could not be read in time: this computer is busy",
-    "marker_set": "of another marker set than the rig's",
-    "no_landmarks": "landmarks, but no marker of the rig is one",
-    "image_size": "of another picture size than the rig's",
-    "foreign_node": "of another node",
-    "duplicate": "came twice",
-    "failed": "an observation kind failed over them",
-    "tag": "not signed with the node's key",
-    "untagged": "not signed",
+    "lost": tr_noop("never arrived: the network lost them"),
+    "time": tr_noop("came too late: this computer or the network is busy"),
+    "kernel_overflow": tr_noop("could not be read in time: this computer is busy"),
+    "marker_set": tr_noop("of another marker set than the rig's"),
+    "no_landmarks": tr_noop("landmarks, but no marker of the rig is one"),
+    "image_size": tr_noop("of another picture size than the rig's"),
+    "foreign_node": tr_noop("of another node"),
+    "duplicate": tr_noop("came twice"),
+    "failed": tr_noop("an observation kind failed over them"),
+    "tag": tr_noop("not signed with the node's key"),
+    "untagged": tr_noop("not signed"),
 }
 
 
 def node_row(node: NodeStatus) -> NodeRow:
     """Text of one node's card."""
-    look = NODES.get(node.state, Look(node.state, "octagon", "fault", "This state is not known to this version."))
+    look = NODES.get(node.state, Look(node.state, "octagon", "fault", UNKNOWN_STATE))
     unused = unused_frames(node)
     count, total = sum(unused.values()), node.received + unused.get("lost", 0)
-    losses = f"{count} frames unused" if count > _USUAL_LOSS * total else ""
-    reasons = "".join(f"\n  {many} × {_UNUSED.get(reason, f'refused ({reason})')}"
-                      for reason, many in sorted(unused.items()))
-    tooltip = f"{look.meaning}\n{node.received} frames received." + (f"\nUnused:{reasons}" if reasons else "")
+    losses = tr("{n} frame unused", "{n} frames unused", count) if count > _USUAL_LOSS * total else ""
+    lines = [tr(look.meaning), tr("{n} frame received.", "{n} frames received.", node.received)]
+    if unused:
+        lines += [tr("Unused:"), *(f"  {many} × {_unused_text(reason)}" for reason, many in sorted(unused.items()))]
     return NodeRow(
         name=node.name, look=look, rate=f"{node.rate_hz:.0f} /s" if node.rate_hz > 0 else DASH, losses=losses,
         clock=clock_text(node), message=node.message,
-        tooltip=tooltip + trust_text(node),
+        tooltip="\n".join(filter(None, (*lines, trust_text(node)))),
     )
+
+
+def _unused_text(reason: str) -> str:
+    return tr(_UNUSED[reason]) if reason in _UNUSED else tr("refused ({reason})", reason=reason)
 
 
 def trust_text(node: NodeStatus) -> str:
     """A line about a node whose word cannot be trusted; nothing about one that is paired."""
     if node.text_datagrams:
-        return "\nSends the thesis's text datagrams: untrusted."
-    return "" if node.paired else "\nNot paired: untrusted; anybody on the network may steer it or speak in its place."
+        return tr("Sends the thesis's text datagrams: untrusted.")
+    return "" if node.paired else tr("Not paired: untrusted; anybody on the network may steer it or speak in its "
+                                     "place.")
 
 
 def clock_text(node: NodeStatus) -> str:
     """Bound of the clock offset, e.g. "clock ± 0.08 ms"; text nodes have no clock."""
     if node.text_datagrams:
-        return "no clock (text)"
+        return tr("no clock (text)")
     if node.clock_bound_s is None:
-        return "clock unknown"
-    return f"clock ± {node.clock_bound_s * 1e3:.2f} ms"
+        return tr("clock unknown")
+    return tr("clock ± {bound:.2f} ms", bound=1e3 * node.clock_bound_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,12 +173,14 @@ def marker_detail(state: HandState, marker: int, by_calibration: CalibrationAccu
     variances = np.diagonal(state.marker_covariances[marker])
     if np.isfinite(variances).all() and (variances >= 0).all():
         more = float(by_calibration.at(state.marker_positions[marker])) if by_calibration.known else 0.0
-        lines.append("± " + ", ".join(f"{math.hypot(math.sqrt(v), more) * 1e3:.2f}" for v in variances)
-                     + " mm (one sigma)" + (f", {1e3 * more:.2f} mm of it by the calibration" if more > 0.0 else ""))
+        spread = ", ".join(f"{math.hypot(math.sqrt(v), more) * 1e3:.2f}" for v in variances)
+        lines.append(tr("± {spread} mm (one sigma)", spread=spread) + (
+            tr(", {more:.2f} mm of it by the calibration", more=1e3 * more) if more > 0.0 else ""))
     if not by_calibration.known:
-        lines.append(f"At least: {by_calibration.reason[:1].lower()}{by_calibration.reason[1:]}")
+        reason = by_calibration.reason
+        lines.append(tr("At least: {reason}", reason=reason[:1].lower() + reason[1:]))
     if np.isfinite(state.epipolar_error_px[marker]):
-        lines.append(f"epipolar error {state.epipolar_error_px[marker]:.2f} px")
+        lines.append(tr("epipolar error {error:.2f} px", error=state.epipolar_error_px[marker]))
     return "\n".join(lines)
 
 

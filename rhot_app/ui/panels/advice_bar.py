@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QWidgetAction,
 )
 
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.palette import Scheme
@@ -144,7 +145,7 @@ class AdviceBar(QWidget):
         policy = more.sizePolicy()
         policy.setRetainSizeWhenHidden(True)  # or sentences would wrap elsewhere when it comes
         more.setSizePolicy(policy)
-        more.setText("0 &more")
+        more.setText(tr("{n} &more", "{n} &more", 0))
         more.hide()
         return more
 
@@ -187,7 +188,7 @@ class AdviceBar(QWidget):
             whole.append(self._lasting.notice)
             height += _GAP_PX + self._lasting.fit(self.width() - _MARGINS_PX[0] - _MARGINS_PX[2])[0]
         self._waiting = [notice for notice in self._all or () if notice not in whole]
-        self.more.setText(f"{len(self._waiting)} &more")
+        self.more.setText(tr("{n} &more", "{n} &more", len(self._waiting)))
         self.more.setToolTip("\n".join(self.waiting))
         self.more.setVisible(bool(self._waiting))
         self.setFixedHeight(height)
@@ -243,7 +244,7 @@ class AdviceBar(QWidget):
 
 def toolbar_of(advice: AdviceBar, parent: QWidget) -> QToolBar:
     """A toolbar that holds nothing but `advice` and cannot be moved or hidden."""
-    bar = QToolBar("Advice", parent)
+    bar = QToolBar(tr("Advice"), parent)
     bar.setObjectName("advicebar")
     bar.setMovable(False)
     bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)

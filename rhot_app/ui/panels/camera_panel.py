@@ -15,6 +15,7 @@ from rhot_app.engine.status import Preview
 from rhot_app.project import Rig
 from rhot_app.state import Knowledge, SeenContour
 from rhot_app.ui.backend.live import Live
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.label_layout import place_at_sides
 from rhot_app.ui.models.palette import Scheme, visible_on
@@ -31,7 +32,7 @@ HAND_COLOUR, OTHER_COLOUR, SHOWN_COLOUR, BONE_COLOUR = "#ff2828", "#ffdc00", "#f
 """As in `export.overlay`: the contour before the background and within the hand, slices; edges, the hand's and
 others; and a pose that the hand is to take."""
 
-TAKE_POSE, TAKE_POSE_SHORT = "Take this pose with {hands}, and hold it", "Take this pose"
+TAKE_POSE, TAKE_POSE_SHORT = tr_noop("Take this pose with {hands}, and hold it"), tr_noop("Take this pose")
 
 _RING_PX = (4.0, 7.0)  # radius in small and in large pictures
 _ROOM_FOR_NAMES_PX = 320.0
@@ -67,16 +68,16 @@ class CameraView(QWidget):
         self.marks: list[Mark] = []
         self.contours: list[SeenContour] = []
         self.skeletons: list[Skeleton] = []
-        self.hands = "the hand"
+        self.hands = tr("the hand", "Take this pose with the hand")
         self._pointed_at = False
         self.setMinimumSize(120, 90)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName(f"Picture of camera {name}")
-        self.setToolTip(f"Camera {name}: what it saw a moment ago, and the markers found in that picture.\n"
-                        "A full ring is a marker seen whole, a broken ring one that is half hidden or doubtful.\n"
-                        "Names stand in large pictures, and in small ones while the mouse is over them.\n"
-                        "Of a bare hand: green its outline, blue contours within it, red the edges that are its, "
-                        "yellow others; white a pose that the hand is to take before it is followed.")
+        self.setAccessibleName(tr("Picture of camera {name}", name=name))
+        self.setToolTip(tr("Camera {name}: what it saw a moment ago, and the markers found in that picture.\nA full "
+                           "ring is a marker seen whole, a broken ring one that is half hidden or doubtful.\nNames "
+                           "stand in large pictures, and in small ones while the mouse is over them.\nOf a bare hand: "
+                           "green its outline, blue contours within it, red the edges that are its, yellow others; "
+                           "white a pose that the hand is to take before it is followed.", name=name))
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Four by three."""
@@ -168,7 +169,7 @@ class CameraView(QWidget):
         painter.translate(-target.topLeft())
         if self._image.isNull():
             painter.setPen(QColor(self._scheme.muted))
-            painter.drawText(target, Qt.AlignmentFlag.AlignCenter, "no picture yet")
+            painter.drawText(target, Qt.AlignmentFlag.AlignCenter, tr("no picture yet"))
         painter.end()
 
     def _paint_request(self, painter: QPainter, picture: QSizeF) -> None:
@@ -231,6 +232,14 @@ def paint_skeleton(painter: QPainter, skeleton: Skeleton, scale: float) -> None:
             painter.drawLine(line)
 
 
+def hands_to_take(rig: Rig) -> str:
+    """The words for the hands of a rig in `TAKE_POSE`."""
+    if rig.other_hand is not None:
+        return tr("each hand", "Take this pose with each hand")
+    return (tr("the left hand", "Take this pose with the left hand") if rig.hand.side == "left" else
+            tr("the right hand", "Take this pose with the right hand"))
+
+
 class CameraPanel(QWidget):
     """The cameras of the rig, one above the other."""
 
@@ -243,7 +252,7 @@ class CameraPanel(QWidget):
         self._rig: Rig | None = None
         self._shown: dict[str, Preview] = {}
         self.views: dict[str, CameraView] = {}
-        self.empty = EmptyState("Pictures appear here once a rig is open and its nodes answer.")
+        self.empty = EmptyState(tr("Pictures appear here once a rig is open and its nodes answer."))
         self._layout = QBoxLayout(QBoxLayout.Direction.TopToBottom, self)
         self._layout.setContentsMargins(8, 4, 8, 8)
         self._layout.setSpacing(8)
@@ -264,7 +273,7 @@ class CameraPanel(QWidget):
         self._shown = {}
         for view in self.views.values():
             if rig is not None:
-                view.hands = f"the {rig.hand.side} hand" if rig.other_hand is None else "each hand"
+                view.hands = hands_to_take(rig)
             self._layout.addWidget(view, 1)
         self.empty.setVisible(rig is None)
 

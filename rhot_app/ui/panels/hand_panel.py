@@ -22,13 +22,25 @@ from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibra
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.shapes import ShapeMark, shape_icon
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import DASH, angle_text, palm_text
-from rhot_app.ui.models.words import KNOWLEDGE, Look, condition_look, each_hand, hand_names, scale_text, size_known, tip
+from rhot_app.ui.models.words import (
+    HANDS,
+    KNOWLEDGE,
+    Look,
+    condition_look,
+    each_hand,
+    hand_names,
+    scale_text,
+    size_known,
+    tip,
+)
 
-FINGER_HEADS = (("spread", "abduction"), ("MCP", "MCP"), ("PIP", "PIP"), ("DIP", "DIP"))
-THUMB_HEADS = (("spread", "abduction"), ("CMC", "CMC"), ("turn", "abduction"), ("MCP", "MCP"), ("IP", "IP"))
+FINGER_HEADS = ((tr_noop("spread"), "abduction"), ("MCP", "MCP"), ("PIP", "PIP"), ("DIP", "DIP"))
+THUMB_HEADS = ((tr_noop("spread"), "abduction"), ("CMC", "CMC"), (tr_noop("turn"), "abduction"), ("MCP", "MCP"),
+               ("IP", "IP"))
 
 _WIDEST, _WIDE = "-88 ±88°", "-88 ±8°"
 
@@ -70,7 +82,7 @@ class AngleCell(QLabel):
             colour = self._scheme.text if knowledge == Knowledge.MEASURED else self._scheme.muted
             self.setStyleSheet(f"color: {colour}; font-weight: {600 if knowledge == Knowledge.MEASURED else 400};")
             look = KNOWLEDGE[knowledge]
-            self.setToolTip(f"{self._title}: {look.word}.\n{look.meaning}")
+            self.setToolTip(f"{self._title}: {tr(look.word)}.\n{tr(look.meaning)}")
 
     def paintEvent(self, event: object) -> None:  # noqa: N802
         """Hatch under a guessed value, then the text."""
@@ -125,7 +137,7 @@ class HandPanel(QWidget):
         cells: dict[str, list[AngleCell]] = {}
         for name, part in zip(FINGERS, ANGLE_SLICES, strict=True):
             heads = THUMB_HEADS if name == "thumb" else FINGER_HEADS
-            cells[name] = [AngleCell(f"{name} {head}", self._scheme) for head, _ in heads]
+            cells[name] = [AngleCell(f"{tr(name)} {tr(head)}", self._scheme) for head, _ in heads]
             assert len(cells[name]) == part.stop - part.start
             self.cells += cells[name]
         for row, name in enumerate(FINGERS[1:], start=1):
@@ -136,10 +148,10 @@ class HandPanel(QWidget):
         self._fill_whole()
         for knowledge in (Knowledge.MEASURED, Knowledge.INFERRED, Knowledge.GUESSED):
             look = KNOWLEDGE[knowledge]
-            mark, word = ShapeMark(12), QLabel(look.word)
+            mark, word = ShapeMark(12), QLabel(tr(look.word))
             mark.set_shape(look.shape, self._scheme.tone(look.tone))
             word.setProperty("muted", True)
-            word.setToolTip(look.meaning)
+            word.setToolTip(tr(look.meaning))
             self._key.addWidget(mark)
             self._key.addWidget(word)
             self._key.addStretch(1)
@@ -148,14 +160,14 @@ class HandPanel(QWidget):
         self._palm_mark, self.palm = ShapeMark(12), QLabel(DASH)
         self.palm.setToolTip(f"{tip('palm')}\n{tip('hand size')}")
         self.palm.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)  # it must not widen the dock
-        self._whole.addWidget(QLabel("palm"))
+        self._whole.addWidget(QLabel(tr("palm")))
         self._whole.addSpacing(8)
         self._whole.addWidget(self._palm_mark)
         self._whole.addWidget(self.palm, 1)
 
     def _add_heads(self, row: int, heads: tuple[tuple[str, str], ...]) -> None:
         for column, (head, term) in enumerate(heads, start=1):
-            label = QLabel(head)
+            label = QLabel(tr(head))
             label.setProperty("muted", True)
             label.setAlignment(Qt.AlignmentFlag.AlignRight)
             label.setContentsMargins(2, 0, 2, 0)
@@ -163,7 +175,7 @@ class HandPanel(QWidget):
             self._grid.addWidget(label, row, column)
 
     def _add_row(self, row: int, name: str, cells: list[AngleCell]) -> None:
-        self._grid.addWidget(QLabel(name), row, 0)
+        self._grid.addWidget(QLabel(tr(name)), row, 0)
         for column, cell in enumerate(cells, start=1):
             self._grid.addWidget(cell, row, column)
             self._grid.setColumnStretch(column, 1)
@@ -194,10 +206,10 @@ class HandPanel(QWidget):
         if state is None:
             text = DASH
         else:
-            text = ", ".join(part for part in (KNOWLEDGE[knowledge].word, palm_text(state, self._by_calibration))
+            text = ", ".join(part for part in (tr(KNOWLEDGE[knowledge].word), palm_text(state, self._by_calibration))
                              if part)
             if size_known(state):
-                text += f"; size {scale_text(state, known=self._by_calibration.known)}"
+                text += tr("; size {size}", size=scale_text(state, known=self._by_calibration.known))
         if text != self.palm.text():
             self.palm.setText(text)
             look = KNOWLEDGE[knowledge]
@@ -236,7 +248,7 @@ class HandChoice(QWidget):
         direction = QBoxLayout.Direction
         self._row.setDirection(direction.LeftToRight if names == tuple(sorted(names)) else direction.RightToLeft)
         for button, name in zip(self.buttons, names, strict=False):
-            button.setText(f"{name} hand")
+            button.setText(tr(HANDS.get(name, "")))
         self._looks = [None, None]
         self.buttons[0].setChecked(True)
         self.setVisible(len(names) > 1)
@@ -250,7 +262,7 @@ class HandChoice(QWidget):
             if look != self._looks[k]:
                 self._looks[k] = look
                 button.setIcon(shape_icon(look.shape, self._scheme.tone(look.tone), self.devicePixelRatioF()))
-                button.setToolTip(f"Show the {button.text()}'s angles. It is {look.word}.")
+                button.setToolTip(tr("Show the {hand}'s angles. It is {word}.", hand=button.text(), word=tr(look.word)))
 
     def chosen(self, state: HandState | None) -> HandState | None:
         """The chosen hand's part of `state`, None where that has none."""

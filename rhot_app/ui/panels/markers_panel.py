@@ -10,14 +10,15 @@ from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibra
 from rhot_app.charts import hex_of
 from rhot_app.project import Rig
 from rhot_app.state import HandState
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import MarkerRow, marker_rows, short_name
 from rhot_app.ui.models.words import Look, tip
 from rhot_app.ui.panels.empty_state import EmptyState
 
-_IDLE = Look("not tracking", "square", "neutral", "The nodes do not stream. Press Start.")
-_UNSEEN = Look("not seen", "ring", "neutral", "Nothing has been seen of it for a second.")
+_IDLE = Look(tr_noop("not tracking"), "square", "neutral", tr_noop("The nodes do not stream. Press Start."))
+_UNSEEN = Look(tr_noop("not seen"), "ring", "neutral", tr_noop("Nothing has been seen of it for a second."))
 
 _WORD_PX = 96
 """A word that names a camera may be long; the panel is no wider than its dock."""
@@ -59,7 +60,7 @@ class MarkersPanel(QWidget):
         self._by_calibration = KNOWN_EXACTLY
         self._lines: list[tuple[ShapeMark, QLabel, QLabel]] = []
         self._shown: list[MarkerRow | None] = []
-        self.empty = EmptyState("No rig is open.")
+        self.empty = EmptyState(tr("No rig is open."))
         self._body = QWidget()
         self._grid = QGridLayout(self._body)
         self._grid.setContentsMargins(8, 0, 8, 0)
@@ -92,7 +93,7 @@ class MarkersPanel(QWidget):
             mark, spread, word = ShapeMark(12), _muted("", meaning), _muted("", "")
             spread.setMinimumWidth(spread.fontMetrics().horizontalAdvance("0.00"))
             self._grid.addWidget(Swatch(hex_of(marker.display_rgb), self._scheme.muted), row, 0)
-            self._grid.addWidget(QLabel(short_name(marker.id)), row, 1)
+            self._grid.addWidget(QLabel(tr(short_name(marker.id))), row, 1)
             self._grid.addWidget(spread, row, 2)
             self._grid.addWidget(word, row, 3)
             self._grid.addWidget(mark, row, 4)
@@ -112,10 +113,10 @@ class MarkersPanel(QWidget):
             self._shown[k] = row
             look = row.look if row is not None else absent
             mark.set_shape(look.shape, self._scheme.tone(look.tone))
-            word.setText(word.fontMetrics().elidedText(look.word, Qt.TextElideMode.ElideMiddle, _WORD_PX))
-            word.setAccessibleName(look.word)
+            word.setText(word.fontMetrics().elidedText(tr(look.word), Qt.TextElideMode.ElideMiddle, _WORD_PX))
+            word.setAccessibleName(tr(look.word))
             spread.setText(row.spread if row is not None else "")
-            word.setToolTip(f"{look.meaning}\n{row.detail}" if row is not None else look.meaning)
+            word.setToolTip(f"{tr(look.meaning)}\n{row.detail}" if row is not None else tr(look.meaning))
 
     @property
     def words(self) -> list[str]:

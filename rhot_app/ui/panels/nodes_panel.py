@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from rhot_app.engine.status import EngineStatus, NodeStatus
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import NodeRow, node_row
@@ -51,13 +52,14 @@ class NodeCard(QFrame):
             return
         self.row = row
         self._mark.set_shape(row.look.shape, scheme.tone(row.look.tone))
-        for label, text in ((self._name, row.name), (self._word, row.look.word), (self._rate, row.rate),
+        for label, text in ((self._name, row.name), (self._word, tr(row.look.word)), (self._rate, row.rate),
                             (self._losses, row.losses), (self._clock, row.clock), (self._message, row.message)):
             label.setText(text)
         self._message.setVisible(bool(row.message))
-        self._word.setToolTip(row.look.meaning)
+        self._word.setToolTip(tr(row.look.meaning))
         self.setToolTip(row.tooltip)
-        self.setAccessibleName(f"Node {row.name}: {row.look.word}, {row.rate}, {row.losses}, {row.clock}")
+        self.setAccessibleName(tr("Node {name}: {word}, {rate}, {losses}, {clock}", name=row.name,
+                                  word=tr(row.look.word), rate=row.rate, losses=row.losses, clock=row.clock))
 
 
 class NodesPanel(QWidget):
@@ -71,7 +73,7 @@ class NodesPanel(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self._scheme = scheme
         self._cards: list[NodeCard] = []
-        self.empty = EmptyState("No word from the engine about its nodes.")
+        self.empty = EmptyState(tr("No word from the engine about its nodes."))
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(8, 4, 8, 8)
         self._layout.setSpacing(6)

@@ -11,16 +11,18 @@ from rhot_app.hand.skeleton import FINGERS
 from rhot_app.objects.state import ObjectState, Validity
 from rhot_app.project import Rig
 from rhot_app.state import HandState
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 
-WORDS = {Validity.SEARCHING: "SEARCHING", Validity.TRACKED: "TRACKING", Validity.AMBIGUOUS: "AMBIGUOUS",
-         Validity.PREDICTED: "PREDICTED", Validity.LOST: "LOST"}
+WORDS = {Validity.SEARCHING: tr_noop("SEARCHING"), Validity.TRACKED: tr_noop("TRACKING"),
+         Validity.AMBIGUOUS: tr_noop("AMBIGUOUS"), Validity.PREDICTED: tr_noop("PREDICTED"),
+         Validity.LOST: tr_noop("LOST")}
 MEANINGS = {
-    Validity.SEARCHING: "No camera has seen it yet. Are its tags in sight, sharp and at least 20 px large?",
-    Validity.TRACKED: "Seen within the last tenth of a second.",
-    Validity.AMBIGUOUS: "Two poses explain its tags. Show a second tag, or the tag to a second camera.",
-    Validity.PREDICTED: "Not seen for a tenth of a second; it is where it would be if it went on moving.",
-    Validity.LOST: "Not seen for half a second."}
+    Validity.SEARCHING: tr_noop("No camera has seen it yet. Are its tags in sight, sharp and at least 20 px large?"),
+    Validity.TRACKED: tr_noop("Seen within the last tenth of a second."),
+    Validity.AMBIGUOUS: tr_noop("Two poses explain its tags. Show a second tag, or the tag to a second camera."),
+    Validity.PREDICTED: tr_noop("Not seen for a tenth of a second; it is where it would be if it went on moving."),
+    Validity.LOST: tr_noop("Not seen for half a second.")}
 
 
 class ObjectsPanel(QWidget):
@@ -47,7 +49,7 @@ class ObjectsPanel(QWidget):
             label.deleteLater()
         self.labels = []
         for model in () if rig is None else rig.models:
-            label = QLabel(f"{model.name}: no state yet")
+            label = QLabel(tr("{name}: no state yet", name=model.name))
             label.setWordWrap(True)
             label.setTextFormat(Qt.TextFormat.PlainText)
             self._layout.addWidget(label)
@@ -62,18 +64,18 @@ class ObjectsPanel(QWidget):
             text = "\n".join(object_lines(one))
             if text != label.text():
                 label.setText(text)
-                label.setToolTip(MEANINGS[one.validity])
+                label.setToolTip(tr(MEANINGS[one.validity]))
 
 
 def object_lines(one: ObjectState) -> list[str]:
     """What is said of an object: its state and standard deviations, then its fingertips."""
     if not one.tracked:
-        return [f"{one.name}: {WORDS[one.validity]}"]
-    lines = [f"{one.name}: {WORDS[one.validity]}, ±{1e3 * one.translation_sd:.1f} mm, "
+        return [f"{one.name}: {tr(WORDS[one.validity])}"]
+    lines = [f"{one.name}: {tr(WORDS[one.validity])}, ±{1e3 * one.translation_sd:.1f} mm, "
              f"±{math.degrees(one.rotation_sd):.1f}°"]
     known = [(finger, distance, touching) for finger, distance, touching
              in zip(FINGERS, one.distances.tolist(), one.contacts.tolist(), strict=True) if math.isfinite(distance)]
     if known:
-        lines.append(", ".join(f"{finger} touches" if touching else f"{finger} {1e3 * distance:.0f} mm"
-                               for finger, distance, touching in known))
+        lines.append(", ".join(tr("{finger} touches", finger=tr(finger)) if touching
+                               else f"{tr(finger)} {1e3 * distance:.0f} mm" for finger, distance, touching in known))
     return lines

@@ -6,6 +6,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme
@@ -29,7 +30,7 @@ class StateBadge(QWidget):
     def sizeHint(self) -> QSize:  # noqa: N802
         """Room for every word."""
         metrics = QFontMetricsF(app_font(WORD_PT, bold=True))
-        widest = max(metrics.horizontalAdvance(look.word) for look in CONDITIONS.values())
+        widest = max(metrics.horizontalAdvance(tr(look.word)) for look in CONDITIONS.values())
         rate = QFontMetricsF(app_font()).horizontalAdvance(_RATE_TEXT)
         return QSize(round(_SHAPE_PX + 10 + widest + 12 + rate + 8), 40)
 
@@ -44,14 +45,14 @@ class StateBadge(QWidget):
         if (look, rate) == (self._look, self._rate):
             return
         self._look, self._rate = look, rate
-        self.setToolTip(f"{look.meaning}\n{tip('condition')}\n{tip('state rate')}")
-        self.setAccessibleName(f"State: {look.word} {rate}")
+        self.setToolTip(f"{tr(look.meaning)}\n{tip('condition')}\n{tip('state rate')}")
+        self.setAccessibleName(tr("State: {word} {rate}", word=tr(look.word), rate=rate))
         self.update()
 
     @property
     def word(self) -> str:
         """The word shown."""
-        return self._look.word
+        return tr(self._look.word)
 
     @property
     def rate(self) -> str:
@@ -65,13 +66,13 @@ class StateBadge(QWidget):
         colour = self._scheme.tone(self._look.tone)
         big, small = app_font(WORD_PT, bold=True), app_font()
         rate_width = QFontMetricsF(small).horizontalAdvance(_RATE_TEXT) + 8
-        word_width = QFontMetricsF(big).horizontalAdvance(self._look.word)
+        word_width = QFontMetricsF(big).horizontalAdvance(self.word)
         left = self.width() - rate_width - 12 - word_width
         painter.drawPixmap(round(left - 10 - _SHAPE_PX), round((self.height() - _SHAPE_PX) / 2),
                            shape_pixmap(self._look.shape, colour, _SHAPE_PX, self.devicePixelRatioF()))
         painter.setPen(QColor(colour))
         painter.setFont(big)
-        painter.drawText(QRectF(left, 0, word_width + 4, self.height()), Qt.AlignmentFlag.AlignVCenter, self._look.word)
+        painter.drawText(QRectF(left, 0, word_width + 4, self.height()), Qt.AlignmentFlag.AlignVCenter, self.word)
         painter.setPen(QColor(self._scheme.text))
         painter.setFont(small)
         painter.drawText(QRectF(self.width() - rate_width, 0, rate_width - 4, self.height()),

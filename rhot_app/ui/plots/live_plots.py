@@ -13,6 +13,7 @@ from rhot_app.charts import hex_of
 from rhot_app.latency import STACKED
 from rhot_app.project import Rig
 from rhot_app.ui.backend.live import LATENCY_COLUMNS, LOST
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.models.meters import BUDGET_S
 from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme, visible_on
 from rhot_app.ui.models.rows import short_name
@@ -26,8 +27,8 @@ class JitterPlot(PlotPanel):
     """One line per marker."""
 
     term = "jitter"
-    title = "Jitter per marker"
-    unit = "mm rms"
+    title = tr_noop("Jitter per marker")
+    unit = tr_noop("mm rms")
     least_span = 0.5
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
@@ -48,7 +49,7 @@ class JitterPlot(PlotPanel):
             colour = visible_on(hex_of(marker.display_rgb), self._scheme.panel)
             dash = DASHES[k % len(DASHES)]
             self._curves.append(self.plot.plot(pen=pg.mkPen(colour, width=2, style=dash), connect="finite"))
-            entries.append(LegendEntry(short_name(marker.id), colour, dash))
+            entries.append(LegendEntry(tr(short_name(marker.id)), colour, dash))
         self.legend.set_entries(entries)
 
     def draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
@@ -81,7 +82,7 @@ class LatencyPlot(PlotPanel):
     """One of `bands` per stage from the bottom up in the order of the way."""
 
     term = "latency"
-    title = "Latency by stage"
+    title = tr_noop("Latency by stage")
     unit = "ms"
     least_span = 15.0
 
@@ -94,7 +95,7 @@ class LatencyPlot(PlotPanel):
         self._budget = pg.InfiniteLine(1e3 * BUDGET_S, angle=0)
         for item in (*self._edges, *self.bands, *self._whole, self._budget):
             self.plot.addItem(item)
-        self.legend.setToolTip("\n".join([f"{STAGES[stage]}: {tip(stage)}" for stage in STACKED] + [tip("budget")]))
+        self.legend.setToolTip("\n".join([f"{tr(STAGES[stage])}: {tip(stage)}" for stage in STACKED] + [tip("budget")]))
         self._colour()
 
     def _colour(self) -> None:
@@ -108,9 +109,9 @@ class LatencyPlot(PlotPanel):
         self._whole[1].setPen(pg.mkPen(self._scheme.text, width=2, style=Qt.PenStyle.DashLine))
         self._budget.setPen(_dotted(self._scheme.accent))
         self.legend.set_entries([
-            LegendEntry("budget", self._scheme.accent, Qt.PenStyle.DotLine),
-            LegendEntry("all", self._scheme.text),
-            *(LegendEntry(STAGES[stage], colour, band=True)
+            LegendEntry(tr("budget"), self._scheme.accent, Qt.PenStyle.DotLine),
+            LegendEntry(tr("all"), self._scheme.text),
+            *(LegendEntry(tr(STAGES[stage]), colour, band=True)
               for stage, colour in reversed(list(zip(STACKED, STAGE_COLOURS, strict=False))))])
 
     def draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:
@@ -130,8 +131,8 @@ class LatencyPlot(PlotPanel):
         self.legend.set_values([("", number(1e3 * BUDGET_S, 1)),
                                 *((number(newest(seconds, p50, k), 2), number(newest(seconds, p99, k), 2))
                                   for k in order)])
-        self._fit(seconds, [Line("p50 of all", self._scheme.text, p50[:, -1]),
-                            Line("p99 of all", self._scheme.text, p99[:, -1])])
+        self._fit(seconds, [Line(tr("p50 of all"), self._scheme.text, p50[:, -1]),
+                            Line(tr("p99 of all"), self._scheme.text, p99[:, -1])])
 
 
 # -- Rates and lost datagrams ------------------------------------------------------------------------------------------
@@ -140,8 +141,8 @@ class RatePlot(PlotPanel):
     """States and datagrams per second, and what is lost of them."""
 
     term = "rate"
-    title = "Rate and losses"
-    unit = "per second"
+    title = tr_noop("Rate and losses")
+    unit = tr_noop("per second")
     least_span = 50.0
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
@@ -150,7 +151,7 @@ class RatePlot(PlotPanel):
         self._curves: list[pg.PlotDataItem] = []
         self._bars = pg.BarGraphItem(x=[], height=[], width=0.1)
         self.plot.addItem(self._bars)
-        self._make_curves(("states", LOST))
+        self._make_curves((tr_noop("states"), LOST))
 
     def _colour(self) -> None:
         self._make_curves(self._names)
@@ -163,8 +164,8 @@ class RatePlot(PlotPanel):
             colour = self._scheme.text if k == 0 else STAGE_COLOURS[(k - 1) % len(STAGE_COLOURS)]
             dash = DASHES[k % len(DASHES)]
             self._curves.append(self.plot.plot(pen=pg.mkPen(colour, width=2, style=dash), connect="finite"))
-            entries.append(LegendEntry(name, colour, dash))
-        entries.append(LegendEntry("lost /s", self._scheme.bad, Qt.PenStyle.SolidLine, band=True))
+            entries.append(LegendEntry(tr(name), colour, dash))
+        entries.append(LegendEntry(tr("lost /s"), self._scheme.bad, Qt.PenStyle.SolidLine, band=True))
         self._bars.setOpts(brush=self._scheme.bad, pen=pg.mkPen(self._scheme.bad))
         self.legend.set_entries(entries)
 

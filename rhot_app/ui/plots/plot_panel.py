@@ -13,6 +13,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QGuiApplication, QPainter, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QPushButton, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 from rhot_app.ui.common.disposal import plot_widget
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.series import Peak, Series, peaks_above, round_top, to_csv, usual_top
 from rhot_app.ui.models.words import tip
@@ -58,7 +59,7 @@ class OverflowMarks:
         return [(point.pos().x(), point.pos().y(), point.brush().color().name()) for point in self._item.points()]
 
     def _words(self, x: float, y: float, data: tuple[str, float]) -> str:
-        return f"{data[0]}: {data[1]:.3g} {self._unit}, above the axis"
+        return tr("{name}: {value:.3g} {unit}, above the axis", name=data[0], value=data[1], unit=self._unit)
 
 
 # -- Legend: line sample, name and newest value ------------------------------------------------------------------------
@@ -147,7 +148,7 @@ class Legend(QWidget):
         if more > 0:
             painter.setPen(QColor(self._scheme.muted))
             place = QRectF(0.0, y, self.width(), step)
-            painter.drawText(place, Qt.AlignmentFlag.AlignVCenter, f"{more + 1} more: scroll")
+            painter.drawText(place, Qt.AlignmentFlag.AlignVCenter, tr("{more} more: scroll", more=more + 1))
         painter.end()
 
     def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802
@@ -187,7 +188,7 @@ class PlotHead(QWidget):
         self.arrow = QToolButton()
         self.arrow.setArrowType(Qt.ArrowType.RightArrow)
         self.arrow.setAutoRaise(True)
-        self.arrow.setToolTip("More buttons")
+        self.arrow.setToolTip(tr("More buttons"))
         self.arrow.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self.arrow.setMenu(QMenu(self.arrow))
         self._fill_menu()
@@ -249,18 +250,18 @@ class PlotPanel(QWidget):
         self._scheme = scheme
         self._window: tuple[Array, Array, tuple[str, ...]] = (np.empty(0), np.empty((0, 0)), ())
         self._reset_ns = 0
-        self.pause_button = self._button("Pause", "Stop the plot to look at it; the measurement goes on.")
+        self.pause_button = self._button(tr("Pause"), tr("Stop the plot to look at it; the measurement goes on."))
         self.pause_button.setCheckable(True)
-        self.reset_button = self._button("Reset", "Begin the plot anew and fit the axes.")
-        self.copy_button = self._button("Copy CSV",
-                                        "Copy what the plot shows to the clipboard as comma-separated text.")
+        self.reset_button = self._button(tr("Reset"), tr("Begin the plot anew and fit the axes."))
+        self.copy_button = self._button(tr("Copy CSV"),
+                                        tr("Copy what the plot shows to the clipboard as comma-separated text."))
         self.reset_button.clicked.connect(self.begin_anew)
         self.copy_button.clicked.connect(self.copy_csv)
         self.plot = plot_widget()
         self.legend = Legend(scheme, heads, widest_value)
         self._lay_out()
         self._style_plot()
-        self.overflow = OverflowMarks(self.plot, self.unit)
+        self.overflow = OverflowMarks(self.plot, tr(self.unit))
 
     def _button(self, text: str, meaning: str) -> QPushButton:
         button = QPushButton(text)
@@ -269,7 +270,7 @@ class PlotPanel(QWidget):
         return button
 
     def _lay_out(self) -> None:
-        label = QLabel(self.title)
+        label = QLabel(tr(self.title))
         label.setProperty("title", True)
         label.setToolTip(tip(self.term))
         self.setToolTip(tip(self.term))
@@ -298,8 +299,8 @@ class PlotPanel(QWidget):
             axis = item.getAxis(side)
             axis.setPen(pg.mkPen(self._scheme.border))
             axis.setTextPen(pg.mkPen(self._scheme.muted))
-        item.setLabel("left", self.unit, **style)
-        item.setLabel("bottom", "time before now [s]", **style)
+        item.setLabel("left", tr(self.unit), **style)
+        item.setLabel("bottom", tr("time before now [s]"), **style)
         for side in ("left", "bottom"):  # after the labels, which reset it; switching it off would keep an old scale
             item.getAxis(side).setSIPrefixEnableRanges(())
             item.getAxis(side).updateAutoSIPrefix()
@@ -368,8 +369,12 @@ class PlotPanel(QWidget):
         """Put `csv` on the clipboard."""
         QGuiApplication.clipboard().setText(self.csv())
         count = len(self._window[0])
-        self.copied.emit(f"Copied “{self.title}” to the clipboard: {count} rows of comma-separated text."
-                         if count else f"“{self.title}” shows nothing yet, so only the headings were copied.")
+        if count:
+            self.copied.emit(tr("Copied “{title}” to the clipboard: {n} row of comma-separated text.",
+                                "Copied “{title}” to the clipboard: {n} rows of comma-separated text.", count,
+                                title=tr(self.title)))
+        else:
+            self.copied.emit(tr("“{title}” shows nothing yet, so only the headings were copied.", title=tr(self.title)))
 
 
 def newest(seconds: Array, rows: Array, column: int) -> float:

@@ -31,6 +31,7 @@ from rhot_app.project import Rig, load_rig
 from rhot_app.sources.film_offset import FilmOffset, offsets_of
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import LOG_FILTER
 from rhot_app.ui.replay.run_dialog import FileChoice
@@ -261,7 +262,7 @@ class FilmsDialog(QDialog):
             return
         first = self.films[0].path
         name, _ = QFileDialog.getSaveFileName(self, "Write the recording to",
-                                              str(first.with_name(f"{first.stem}-hand.rhotlog")), LOG_FILTER)
+                                              str(first.with_name(f"{first.stem}-hand.rhotlog")), tr(LOG_FILTER))
         if name:
             self.track(Path(name))
 

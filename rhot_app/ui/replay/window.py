@@ -22,6 +22,7 @@ from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.tool_window import AS_MAIN, WindowTools
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
@@ -134,7 +135,7 @@ class ReplayWindow(QMainWindow):
         """Ask for a recording and open it."""
         folder = self.replay.path.parent if self.replay is not None else self._settings.recordings_folder
         start = newest_recording(folder) or folder
-        name, _ = QFileDialog.getOpenFileName(self, "Open a recording", str(start), LOG_FILTER)
+        name, _ = QFileDialog.getOpenFileName(self, "Open a recording", str(start), tr(LOG_FILTER))
         if name:
             self.open(Path(name))
 
@@ -227,7 +228,7 @@ class ReplayWindow(QMainWindow):
             return
         log = self.replay.path
         start = str(log.with_stem(f"{log.stem}-part"))
-        name, _ = QFileDialog.getSaveFileName(self, "Save the repeated range as", start, LOG_FILTER)
+        name, _ = QFileDialog.getSaveFileName(self, "Save the repeated range as", start, tr(LOG_FILTER))
         if name:
             self.trim(Path(name), *loop)
 

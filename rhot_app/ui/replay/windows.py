@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from rhot_app.project import Rig
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.disposal import dispose
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording
 from rhot_app.ui.models.palette import Scheme
@@ -34,7 +35,7 @@ class ReplayWindows:
         """Ask for a recording and replay it."""
         folder = self._settings.recordings_folder
         start = newest_recording(folder) or folder
-        name, _ = QFileDialog.getOpenFileName(self._parent, "Open a recording", str(start), LOG_FILTER)
+        name, _ = QFileDialog.getOpenFileName(self._parent, "Open a recording", str(start), tr(LOG_FILTER))
         if name:
             self.open(Path(name))
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rhot_app.geometry.camera import lens_parameters, lens_rays
 from rhot_app.project import CameraPose, Intrinsics
 from rhot_app.state import HandState
+from rhot_app.ui.common.language import tr
 
 # -- Floor grid and axes -----------------------------------------------------------------------------------------------
 
@@ -102,7 +103,7 @@ def tick_labels(*, on_table: bool = False) -> list[Label]:
     labels.append(Label((X_RANGE[1] + 0.03, 0.9, FLOOR_M), f"{away} [mm]"))
     labels += [Label((X_RANGE[0] - 0.05, Y_RANGE[1], float(z)), f"{abs(z - floor) * 1e3:.0f}")
                for z in _steps(floor, Z_RANGE[1], TICK_M)]
-    labels.append(Label((X_RANGE[0] - 0.05, Y_RANGE[1], Z_RANGE[1] - 0.1), "up [mm]"))
+    labels.append(Label((X_RANGE[0] - 0.05, Y_RANGE[1], Z_RANGE[1] - 0.1), tr("up [mm]")))
     return labels
 
 

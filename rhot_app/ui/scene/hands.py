@@ -14,6 +14,7 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND, Rig
 from rhot_app.state import HandState, Knowledge
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.models.rows import position_text, sd_text, short_name, total_sd
 from rhot_app.ui.models.words import KNOWLEDGE, each_hand
 from rhot_app.ui.scene.hand_mesh import TIPS
@@ -92,17 +93,17 @@ class Spot:
     def text(self, by_calibration: CalibrationAccuracy) -> str:
         """Its tooltip."""
         spread = sd_text(float(total_sd(self.covariance, self.place, by_calibration)))
-        unknown = by_calibration.reason or "its uncertainty is not estimated"
-        lines = [f"{self.name}: {KNOWLEDGE[self.knowledge].word}",
-                 f"{spread} along the worst axis (one sigma)" if spread else unknown,
+        unknown = by_calibration.reason or tr("its uncertainty is not estimated")
+        lines = [f"{self.name}: {tr(KNOWLEDGE[self.knowledge].word)}",
+                 tr("{spread} along the worst axis (one sigma)", spread=spread) if spread else unknown,
                  f"x, y, z: {position_text(self.place)}"]
         return "\n".join(lines)
 
 
 def spots(state: HandState, hands: Sequence[str] = ("",)) -> list[Spot]:
     """Markers first, then the joints that no marker's middle stands for; `hands` are their names, "" for none."""
-    found = [Spot(f"marker {short_name(name)}", Knowledge(int(state.marker_knowledge[k])), state.marker_positions[k],
-                  state.marker_covariances[k]) for k, name in enumerate(state.marker_ids)]
+    found = [Spot(tr("marker {name}", name=tr(short_name(name))), Knowledge(int(state.marker_knowledge[k])),
+                  state.marker_positions[k], state.marker_covariances[k]) for k, name in enumerate(state.marker_ids)]
     for name, hand in zip(hands, each_hand(state), strict=False):  # the other hand is not there with every tracker
         found += [Spot(f"{name} {joint_name(JOINTS[k])}".lstrip(), Knowledge(int(hand.joint_knowledge[k])),
                        hand.joint_positions[k], hand.joint_covariances[k])
@@ -113,7 +114,9 @@ def spots(state: HandState, hands: Sequence[str] = ("",)) -> list[Spot]:
 def joint_name(joint: str) -> str:
     """A joint as people say it: "index_pip" is "index PIP joint"."""
     finger, _, name = joint.partition("_")
-    return f"{finger} {name.upper()} joint" if name else f"{finger} joint"
+    if not name:
+        return tr("{finger} joint", finger=tr(finger))
+    return tr("{finger} {name} joint", finger=tr(finger), name=name.upper())
 
 
 def nearest(pixels: Array, at: tuple[float, float]) -> int | None:

@@ -10,6 +10,7 @@ from PySide6.QtCore import QLineF, QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QMatrix4x4, QPainter, QPen, QPixmap
 
 from rhot_app.state import Knowledge
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.models.label_layout import place_labels
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import KNOWLEDGE
@@ -128,9 +129,9 @@ def ellipsoid_text(choice: EllipsoidChoice | None, *, cut: bool, pictures_alone:
     """What an ellipsoid shows, "" when none is drawn; `pictures_alone`: the calibration's own error is not in it."""
     if choice is None or not choice.any:
         return ""
-    size = "true size" if choice.factor == 1 else f"drawn {choice.factor} × larger"
-    sigma = f"{SIGMAS:.0f} sigma of the pictures alone" if pictures_alone else f"{SIGMAS:.0f} sigma"
-    return f"{sigma}, {size}" + (f", cut at {1e3 * LARGEST_M:.0f} mm" if cut else "")
+    size = tr("true size") if choice.factor == 1 else tr("drawn {factor} × larger", factor=choice.factor)
+    sigma = tr("{sigma:.0f} sigma of the pictures alone", sigma=SIGMAS) if pictures_alone else f"{SIGMAS:.0f} sigma"
+    return f"{sigma}, {size}" + (tr(", cut at {most:.0f} mm", most=1000.0 * LARGEST_M) if cut else "")
 
 
 class Legend:
@@ -153,7 +154,7 @@ class Legend:
         key = (scheme.name, text, tracker, ratio, size[0], painter.font().key())
         if key != self._key:
             widest = min(size[0] - 4 * _PAD_PX - _BONE_PX[0] - _KEY_GAP_PX, _WIDEST_PX)
-            self.rows = (*(KNOWLEDGE[kind].word for kind in KINDS),
+            self.rows = (*(tr(KNOWLEDGE[kind].word) for kind in KINDS),
                          *_wrapped(text, QFontMetricsF(painter.font()), widest))
             self._key = key
             self._picture = _draw_key(scheme, self.rows, tracker, painter.font(), ratio)
@@ -177,7 +178,7 @@ def _draw_key(scheme: Scheme, rows: tuple[str, ...], tracker: str, font: QFont, 
     metrics = QFontMetricsF(font)
     step = float(np.ceil(metrics.height())) + 3
     width = max(metrics.horizontalAdvance(row) for row in rows) + _BONE_PX[0] + _KEY_GAP_PX + 2 * _PAD_PX
-    head = f"tracker: {tracker}" if tracker else ""
+    head = tr("tracker: {tracker}", tracker=tracker) if tracker else ""
     width = max(width, metrics.horizontalAdvance(head) + 2 * _PAD_PX)
     above = 1 if head else 0
     box = QRectF(0, 0, np.ceil(width), (above + len(rows)) * step + _PAD_PX)

@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolBar, QToolButton, QVBoxLayout, QWidget
 
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.scene.view import SceneView
 
 
@@ -14,7 +15,7 @@ class SceneBar(QToolBar):
 
     def __init__(self, uncertainty: QAction, kinds: list[QAction], sizes: list[QAction], switches: list[QAction],
                  parent: QWidget | None = None) -> None:
-        super().__init__("Scene", parent)
+        super().__init__(tr("Scene"), parent)
         self.setObjectName("scene toolbar")
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
         self.uncertainty_button = QToolButton()

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QPushButton, QToolTip, QWidget
 from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.project import Rig
 from rhot_app.state import HandState
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.models.words import KINDS, each_hand, hand_names
@@ -63,7 +64,7 @@ class SceneView(GLViewWidget):
         self.setObjectName("scene")
         self.setMinimumSize(320, 200)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName("Three-dimensional scene of the hand and the cameras")
+        self.setAccessibleName(tr("Three-dimensional scene of the hand and the cameras"))
         self._scheme = scheme
         self._rig: Rig | None = None
         self._by_calibration = KNOWN_EXACTLY
@@ -78,9 +79,9 @@ class SceneView(GLViewWidget):
         self._show_labels = True
         self._ellipsoids: EllipsoidChoice | None = EllipsoidChoice()
         self._cameras: list[tuple[str, Array]] = []
-        self.start_button = QPushButton("Start tracking", self)
+        self.start_button = QPushButton(tr("Start tracking"), self)
         self.start_button.setProperty("primary", True)
-        self.start_button.setToolTip("Tell the nodes to stream (Space).")
+        self.start_button.setToolTip(tr("Tell the nodes to stream (Space)."))
         self.start_button.hide()
         self._rebuild()
         self.reset_view()
@@ -259,7 +260,7 @@ class SceneView(GLViewWidget):
     @property
     def tracker_word(self) -> str:
         """What makes a hand of the markers; "" without a rig."""
-        return "" if self._rig is None else KINDS[self._rig.tracker.kind][0].lower()
+        return "" if self._rig is None else tr(KINDS[self._rig.tracker.kind][0]).lower()
 
     @property
     def _up(self) -> Up:

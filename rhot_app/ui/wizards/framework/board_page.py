@@ -243,7 +243,7 @@ def _count() -> QSpinBox:
 
 def _paper() -> str:
     """What printers hold here."""
-    return "letter" if QLocale().measurementSystem() is QLocale.MeasurementSystem.ImperialUSSystem else "A4"
+    return "letter" if QLocale.system().measurementSystem() is QLocale.MeasurementSystem.ImperialUSSystem else "A4"
 
 
 def _told(path: Path) -> str:

@@ -1,0 +1,45 @@
+"""Renew the translations: ``python resources/translations/update.py [--new CODE]``.
+
+`pyside6-lupdate` collects the sentences of `rhot_app/ui` into each `rhot_CODE.ts`, which a translator fills as text or
+with Qt Linguist. `pyside6-lrelease` makes the `rhot_CODE.qm` of it that the app loads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+UI = HERE.parents[1] / "rhot_app" / "ui"
+
+
+def collect(path: Path) -> None:
+    """Bring the sentences of a .ts file up to date; translations stay, those of no sentence go."""
+    _run("lupdate", "-silent", "-no-obsolete", "-locations", "none", "-tr-function-alias", "QT_TR_NOOP+=tr_noop",
+         "-source-language", "en", "-target-language", path.stem.partition("_")[2],
+         *(str(source) for source in sorted(UI.rglob("*.py"))), "-ts", str(path))
+
+
+def release(path: Path, out: Path) -> None:
+    """Make the .qm file of a .ts file, of what is translated."""
+    _run("lrelease", "-silent", "-nounfinished", str(path), "-qm", str(out))
+
+
+def _run(tool: str, *arguments: str) -> None:
+    subprocess.run([str(Path(sys.executable).with_name(f"pyside6-{tool}")), *arguments], check=True)
+
+
+def main() -> None:
+    """Renew all languages, or begin a new one."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--new", metavar="CODE", help="begin this language, such as fr")
+    new = parser.parse_args().new
+    for path in [HERE / f"rhot_{new}.ts"] if new else sorted(HERE.glob("rhot_*.ts")):
+        collect(path)
+        release(path, path.with_suffix(".qm"))
+
+
+if __name__ == "__main__":
+    main()
