@@ -5,2262 +5,2281 @@
     <name></name>
     <message>
         <source>of joints</source>
-        <translation type="unfinished"></translation>
+        <translation>der Gelenke</translation>
     </message>
     <message>
         <source>Of the hand&apos;s inner joints; the estimator estimates them.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der inneren Gelenke der Hand; der Schätzer schätzt sie.</translation>
     </message>
     <message>
         <source>of fingertips</source>
-        <translation type="unfinished"></translation>
+        <translation>der Fingerspitzen</translation>
     </message>
     <message>
         <source>Of the fingertips; the estimator estimates them.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Fingerspitzen; der Schätzer schätzt sie.</translation>
     </message>
     <message>
         <source>of markers</source>
-        <translation type="unfinished"></translation>
+        <translation>der Marker</translation>
     </message>
     <message>
         <source>Of the markers, as far as they are not the fingertips drawn already.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Marker, soweit sie nicht schon als Fingerspitzen gezeichnet sind.</translation>
     </message>
     <message>
         <source>Start</source>
-        <translation type="unfinished"></translation>
+        <translation>Start</translation>
     </message>
     <message>
         <source>Stop</source>
-        <translation type="unfinished"></translation>
+        <translation>Stopp</translation>
     </message>
     <message>
         <source>Record</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnehmen</translation>
     </message>
     <message>
         <source>Stop recording</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahme beenden</translation>
     </message>
     <message>
         <source>Tell the nodes to stream, or to stop.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Knoten senden lassen oder anhalten.</translation>
     </message>
     <message>
         <source>Write the raw log of all datagrams, or end it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Alle Datagramme roh in eine Aufnahme schreiben oder sie beenden.</translation>
     </message>
     <message>
         <source>Bookmark</source>
-        <translation type="unfinished"></translation>
+        <translation>Lesezeichen</translation>
     </message>
     <message>
         <source>Write a few words about this moment into the recording.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein paar Worte über diesen Augenblick in die Aufnahme schreiben.</translation>
     </message>
     <message>
         <source>Record video, too</source>
-        <translation type="unfinished"></translation>
+        <translation>Auch Video aufnehmen</translation>
     </message>
     <message>
         <source>Each camera writes its own frames as long as the next recording lasts. Rig, Recordings fetches them afterwards.</source>
-        <translation type="unfinished"></translation>
+        <translation>Jede Kamera schreibt ihre eigenen Bilder, solange die nächste Aufnahme dauert. Rig, Aufnahmen holt sie danach ab.</translation>
     </message>
     <message>
         <source>Simulated rig</source>
-        <translation type="unfinished"></translation>
+        <translation>Simuliertes Rig</translation>
     </message>
     <message>
         <source>Start two simulated cameras that look at a simulated hand.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zwei simulierte Kameras starten, die eine simulierte Hand sehen.</translation>
     </message>
     <message>
         <source>Simulated hand does</source>
-        <translation type="unfinished"></translation>
+        <translation>Was die simulierte Hand tut</translation>
     </message>
     <message>
         <source>Cover a simulated camera</source>
-        <translation type="unfinished"></translation>
+        <translation>Simulierte Kamera abdecken</translation>
     </message>
     <message>
         <source>Open rig file …</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig-Datei öffnen …</translation>
     </message>
     <message>
         <source>Open a rig that was set up before.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Rig öffnen, das schon eingerichtet ist.</translation>
     </message>
     <message>
         <source>Cameras of this computer …</source>
-        <translation type="unfinished"></translation>
+        <translation>Kameras dieses Rechners …</translation>
     </message>
     <message>
         <source>Choose webcams, films or network cameras, look at them, and track with them.</source>
-        <translation type="unfinished"></translation>
+        <translation>Webcams, Filme oder Netzwerkkameras auswählen, ansehen und mit ihnen verfolgen.</translation>
     </message>
     <message>
         <source>Connect nodes …</source>
-        <translation type="unfinished"></translation>
+        <translation>Knoten verbinden …</translation>
     </message>
     <message>
         <source>Enter the addresses of two nodes, see whether they answer, and write a rig file for them.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Adressen zweier Knoten eingeben, prüfen, ob sie antworten, und eine Rig-Datei für sie schreiben.</translation>
     </message>
     <message>
         <source>Export recording …</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahme exportieren …</translation>
     </message>
     <message>
         <source>Write a recording&apos;s hand as a file for other programs: tables, motion capture, animation.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand einer Aufnahme als Datei für andere Programme schreiben: Tabellen, Motion Capture, Animation.</translation>
     </message>
     <message>
         <source>Open recording …</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahme öffnen …</translation>
     </message>
     <message>
         <source>Track a recording and play it, in a window of its own.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Aufnahme verfolgen und in einem eigenen Fenster abspielen.</translation>
     </message>
     <message>
         <source>Recordings …</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahmen …</translation>
     </message>
     <message>
         <source>All recordings: how long and how well tracked; open, rename, delete.</source>
-        <translation type="unfinished"></translation>
+        <translation>Alle Aufnahmen: wie lang und wie gut verfolgt; öffnen, umbenennen, löschen.</translation>
     </message>
     <message>
         <source>Track films …</source>
-        <translation type="unfinished"></translation>
+        <translation>Filme verfolgen …</translation>
     </message>
     <message>
         <source>Track a bare hand in films that you have already, and replay it beside their pictures.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine bloße Hand in vorhandenen Filmen verfolgen und neben deren Bildern abspielen.</translation>
     </message>
     <message>
         <source>Outputs …</source>
-        <translation type="unfinished"></translation>
+        <translation>Ausgaben …</translation>
     </message>
     <message>
         <source>Live streams to other programs: OSC, VMC, WebSocket, web view and others; which run, and how they go.</source>
-        <translation type="unfinished"></translation>
+        <translation>Live-Datenströme an andere Programme: OSC, VMC, WebSocket, Webansicht und weitere; welche laufen und wie gut.</translation>
     </message>
     <message>
         <source>3-D mouse …</source>
-        <translation type="unfinished"></translation>
+        <translation>3-D-Maus …</translation>
     </message>
     <message>
         <source>Work a cursor in three dimensions with the hand: pick balls, move them, and take a target test.</source>
-        <translation type="unfinished"></translation>
+        <translation>Mit der Hand einen Zeiger im Raum führen: Kugeln greifen, bewegen und einen Zieltest machen.</translation>
     </message>
     <message>
         <source>Add a tracked object …</source>
-        <translation type="unfinished"></translation>
+        <translation>Verfolgtes Objekt hinzufügen …</translation>
     </message>
     <message>
         <source>Track an object with tags or colour markers beside the hand: choose its object file.</source>
-        <translation type="unfinished"></translation>
+        <translation>Neben der Hand ein Objekt mit Tags oder Farbmarkern verfolgen: seine Objektdatei auswählen.</translation>
     </message>
     <message>
         <source>Remove a tracked object</source>
-        <translation type="unfinished"></translation>
+        <translation>Verfolgtes Objekt entfernen</translation>
     </message>
     <message>
         <source>Save rig</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig speichern</translation>
     </message>
     <message>
         <source>Write the rig as it is now to its file; what stood there is kept beside it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Rig, wie es jetzt ist, in seine Datei schreiben; was dort stand, bleibt daneben erhalten.</translation>
     </message>
     <message>
         <source>Close rig</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig schließen</translation>
     </message>
     <message>
         <source>End what the app started and go back to the first page.</source>
-        <translation type="unfinished"></translation>
+        <translation>Beenden, was die App gestartet hat, und zurück zur ersten Seite.</translation>
     </message>
     <message>
         <source>Settings …</source>
-        <translation type="unfinished"></translation>
+        <translation>Einstellungen …</translation>
     </message>
     <message>
         <source>Look, folders, what opens at the start, and keys.</source>
-        <translation type="unfinished"></translation>
+        <translation>Aussehen, Ordner, was beim Start geöffnet wird, und Tasten.</translation>
     </message>
     <message>
         <source>Quit</source>
-        <translation type="unfinished"></translation>
+        <translation>Beenden</translation>
     </message>
     <message>
         <source>End what the app started and close it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Beenden, was die App gestartet hat, und sie schließen.</translation>
     </message>
     <message>
         <source>What to do next …</source>
-        <translation type="unfinished"></translation>
+        <translation>Was als Nächstes zu tun ist …</translation>
     </message>
     <message>
         <source>Say what you have, and see the steps that are missing.</source>
-        <translation type="unfinished"></translation>
+        <translation>Angeben, was vorhanden ist, und sehen, welche Schritte fehlen.</translation>
     </message>
     <message>
         <source>Fit the hand to pictures …</source>
-        <translation type="unfinished"></translation>
+        <translation>Hand an Bilder anpassen …</translation>
     </message>
     <message>
         <source>Drag joints in the cameras&apos; pictures, move sliders, and let edges finish it: the hand&apos;s lengths and pose.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gelenke in den Kamerabildern ziehen, Regler verschieben und die Kanten den Rest machen lassen: Längen und Pose der Hand.</translation>
     </message>
     <message>
         <source>Bring back an earlier calibration …</source>
-        <translation type="unfinished"></translation>
+        <translation>Frühere Kalibrierung zurückholen …</translation>
     </message>
     <message>
         <source>Every calibration keeps what it replaced; choose one by date and reason.</source>
-        <translation type="unfinished"></translation>
+        <translation>Jede Kalibrierung bewahrt, was sie ersetzt hat; nach Datum und Grund auswählen.</translation>
     </message>
     <message>
         <source>Tracker …</source>
-        <translation type="unfinished"></translation>
+        <translation>Tracker …</translation>
     </message>
     <message>
         <source>Which tracker makes a hand of the markers, and what it may assume.</source>
-        <translation type="unfinished"></translation>
+        <translation>Welcher Tracker aus den Markern eine Hand macht und was er annehmen darf.</translation>
     </message>
     <message>
         <source>Hand networks …</source>
-        <translation type="unfinished"></translation>
+        <translation>Hand-Netze …</translation>
     </message>
     <message>
         <source>Install the networks that find landmarks of a bare hand on this computer.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Netze, die Landmarken einer bloßen Hand finden, auf diesem Rechner installieren.</translation>
     </message>
     <message>
         <source>Cameras …</source>
-        <translation type="unfinished"></translation>
+        <translation>Kameras …</translation>
     </message>
     <message>
         <source>Lenses and positions that the rig file says.</source>
-        <translation type="unfinished"></translation>
+        <translation>Objektive und Positionen, wie sie in der Rig-Datei stehen.</translation>
     </message>
     <message>
         <source>Markers …</source>
-        <translation type="unfinished"></translation>
+        <translation>Marker …</translation>
     </message>
     <message>
         <source>The marker set that the rig file says.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Markersatz, wie er in der Rig-Datei steht.</translation>
     </message>
     <message>
         <source>Hand …</source>
-        <translation type="unfinished"></translation>
+        <translation>Hand …</translation>
     </message>
     <message>
         <source>The hand&apos;s bones that the rig file says.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Knochen der Hand, wie sie in der Rig-Datei stehen.</translation>
     </message>
     <message>
         <source>Properties</source>
-        <translation type="unfinished"></translation>
+        <translation>Eigenschaften</translation>
     </message>
     <message>
         <source>What the rig file says, to read.</source>
-        <translation type="unfinished"></translation>
+        <translation>Was die Rig-Datei sagt, zum Nachlesen.</translation>
     </message>
     <message>
         <source>How to calibrate</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie man kalibriert</translation>
     </message>
     <message>
         <source>Opens the guide.</source>
-        <translation type="unfinished"></translation>
+        <translation>Öffnet die Anleitung.</translation>
     </message>
     <message>
         <source>Frame the hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Auf die Hand zoomen</translation>
     </message>
     <message>
         <source>Bring the hand into the middle of the scene.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand in die Mitte der Szene holen.</translation>
     </message>
     <message>
         <source>Reset the view</source>
-        <translation type="unfinished"></translation>
+        <translation>Ansicht zurücksetzen</translation>
     </message>
     <message>
         <source>Back to the view from behind the cameras.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zurück zum Blick von hinter den Kameras.</translation>
     </message>
     <message>
         <source>Marker names</source>
-        <translation type="unfinished"></translation>
+        <translation>Markernamen</translation>
     </message>
     <message>
         <source>Names beside the markers in the scene.</source>
-        <translation type="unfinished"></translation>
+        <translation>Namen neben den Markern in der Szene.</translation>
     </message>
     <message>
         <source>Hand as of now</source>
-        <translation type="unfinished"></translation>
+        <translation>Hand von jetzt</translation>
     </message>
     <message>
         <source>Draw the hand where it is when you see it, not where it was in the newest pictures, 10 to 40 ms before. The estimator predicts it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand dort zeichnen, wo sie beim Hinsehen ist, nicht dort, wo sie in den neuesten Bildern 10 bis 40 ms vorher war. Der Schätzer sagt sie voraus.</translation>
     </message>
     <message>
         <source>Uncertainty</source>
-        <translation type="unfinished"></translation>
+        <translation>Unsicherheit</translation>
     </message>
     <message>
         <source>How well places are known, as ellipsoids: the true place lies inside in 97 of 100 cases (three sigma).</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie gut Orte bekannt sind, als Ellipsoide: In 97 von 100 Fällen liegt der wahre Ort darin (drei Sigma).</translation>
     </message>
     <message>
         <source>Ellipsoids in true size.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ellipsoide in wahrer Größe.</translation>
     </message>
     <message>
         <source>Ellipsoids {larger} times as large, because a good place is known to a millimetre.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ellipsoide {larger}-mal so groß, weil ein guter Ort auf einen Millimeter bekannt ist.</translation>
     </message>
     <message>
         <source>Layers of the hand …</source>
-        <translation type="unfinished"></translation>
+        <translation>Ebenen der Hand …</translation>
     </message>
     <message>
         <source>Which link of the tracked hand hides which before a camera, as masks over its picture.</source>
-        <translation type="unfinished"></translation>
+        <translation>Welches Glied der verfolgten Hand vor einer Kamera welches verdeckt, als Masken über ihrem Bild.</translation>
     </message>
     <message>
         <source>Scene alone</source>
-        <translation type="unfinished"></translation>
+        <translation>Nur die Szene</translation>
     </message>
     <message>
         <source>Hide every panel, to look from afar; again brings them back.</source>
-        <translation type="unfinished"></translation>
+        <translation>Alle Felder ausblenden, um von weitem zu sehen; noch einmal holt sie zurück.</translation>
     </message>
     <message>
         <source>Dark</source>
-        <translation type="unfinished"></translation>
+        <translation>Dunkel</translation>
     </message>
     <message>
         <source>Light text on dark ground.</source>
-        <translation type="unfinished"></translation>
+        <translation>Heller Text auf dunklem Grund.</translation>
     </message>
     <message>
         <source>Light</source>
-        <translation type="unfinished"></translation>
+        <translation>Hell</translation>
     </message>
     <message>
         <source>Dark text on light ground.</source>
-        <translation type="unfinished"></translation>
+        <translation>Dunkler Text auf hellem Grund.</translation>
     </message>
     <message>
         <source>Reset layout and settings</source>
-        <translation type="unfinished"></translation>
+        <translation>Anordnung und Einstellungen zurücksetzen</translation>
     </message>
     <message>
         <source>Forget layout, last rig and switches.</source>
-        <translation type="unfinished"></translation>
+        <translation>Anordnung, letztes Rig und Schalter vergessen.</translation>
     </message>
     <message>
         <source>Guide</source>
-        <translation type="unfinished"></translation>
+        <translation>Anleitung</translation>
     </message>
     <message>
         <source>The page of the guide that explains the panel in use.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Seite der Anleitung, die das benutzte Feld erklärt.</translation>
     </message>
     <message>
         <source>Keys</source>
-        <translation type="unfinished"></translation>
+        <translation>Tasten</translation>
     </message>
     <message>
         <source>The guide&apos;s page about keys.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Seite der Anleitung über Tasten.</translation>
     </message>
     <message>
         <source>About RHOT …</source>
-        <translation type="unfinished"></translation>
+        <translation>Über RHOT …</translation>
     </message>
     <message>
         <source>Versions for a report of a fault, and licences.</source>
-        <translation type="unfinished"></translation>
+        <translation>Versionen für einen Fehlerbericht und Lizenzen.</translation>
     </message>
     <message>
         <source>Main</source>
-        <translation type="unfinished"></translation>
+        <translation>Hauptleiste</translation>
     </message>
     <message>
         <source>Controls</source>
-        <translation type="unfinished"></translation>
+        <translation>Bedienelemente</translation>
     </message>
     <message>
         <source>Rig</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig</translation>
     </message>
     <message>
         <source>Calibrate</source>
-        <translation type="unfinished"></translation>
+        <translation>Kalibrieren</translation>
     </message>
     <message>
         <source>View</source>
-        <translation type="unfinished"></translation>
+        <translation>Ansicht</translation>
     </message>
     <message>
         <source>Help</source>
-        <translation type="unfinished"></translation>
+        <translation>Hilfe</translation>
     </message>
     <message>
         <source>rig: {name} (edited)</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig: {name} (geändert)</translation>
     </message>
     <message>
         <source>rig: {name}</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig: {name}</translation>
     </message>
     <message>
         <source>The engine&apos;s rig differs from this file; Rig, Save rig writes it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Rig der Engine weicht von dieser Datei ab; Rig, Rig speichern schreibt es.</translation>
     </message>
     <message>
         <source>Attaching to the running engine …</source>
-        <translation type="unfinished"></translation>
+        <translation>Verbindung mit der laufenden Engine …</translation>
     </message>
     <message>
         <source>Opening the rig …</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Rig wird geöffnet …</translation>
     </message>
     <message>
         <source>Starting the simulated rig …</source>
-        <translation type="unfinished"></translation>
+        <translation>Das simulierte Rig wird gestartet …</translation>
     </message>
     <message>
         <source>Cancelling …</source>
-        <translation type="unfinished"></translation>
+        <translation>Wird abgebrochen …</translation>
     </message>
     <message>
         <source>Closing the rig …</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Rig wird geschlossen …</translation>
     </message>
     <message>
         <source>The engine stopped. Starting it again …</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine ist stehen geblieben. Sie wird neu gestartet …</translation>
     </message>
     <message>
         <source>Getting started</source>
-        <translation type="unfinished"></translation>
+        <translation>Erste Schritte</translation>
     </message>
     <message>
         <source>The window</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Fenster</translation>
     </message>
     <message>
         <source>Nodes</source>
-        <translation type="unfinished"></translation>
+        <translation>Knoten</translation>
     </message>
     <message>
         <source>Markers</source>
-        <translation type="unfinished"></translation>
+        <translation>Marker</translation>
     </message>
     <message>
         <source>Cameras</source>
-        <translation type="unfinished"></translation>
+        <translation>Kameras</translation>
     </message>
     <message>
         <source>The hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand</translation>
     </message>
     <message>
         <source>The scene</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Szene</translation>
     </message>
     <message>
         <source>The plots</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Diagramme</translation>
     </message>
     <message>
         <source>Calibration</source>
-        <translation type="unfinished"></translation>
+        <translation>Kalibrierung</translation>
     </message>
     <message>
         <source>Fitting the hand to pictures</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand an Bilder anpassen</translation>
     </message>
     <message>
         <source>The tracker</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Tracker</translation>
     </message>
     <message>
         <source>Streams to other programs</source>
-        <translation type="unfinished"></translation>
+        <translation>Datenströme an andere Programme</translation>
     </message>
     <message>
         <source>The 3-D mouse</source>
-        <translation type="unfinished"></translation>
+        <translation>Die 3-D-Maus</translation>
     </message>
     <message>
         <source>Recording and replay</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahme und Wiedergabe</translation>
     </message>
     <message>
         <source>Settings</source>
-        <translation type="unfinished"></translation>
+        <translation>Einstellungen</translation>
     </message>
     <message>
         <source>When something is wrong</source>
-        <translation type="unfinished"></translation>
+        <translation>Wenn etwas nicht stimmt</translation>
     </message>
     <message>
         <source>RHOT guide</source>
-        <translation type="unfinished"></translation>
+        <translation>RHOT-Anleitung</translation>
     </message>
     <message>
         <source>The guide&apos;s pages are not installed here ({path}). They are in the project&apos;s docs/guide folder.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Seiten der Anleitung sind hier nicht installiert ({path}). Sie liegen im Ordner docs/guide des Projekts.</translation>
     </message>
     <message>
         <source>Cancelled.</source>
-        <translation type="unfinished"></translation>
+        <translation>Abgebrochen.</translation>
     </message>
     <message>
         <source>The program made a mistake ({name}: {exc}). Please report it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Programm hat einen Fehler gemacht ({name}: {exc}). Bitte melden.</translation>
     </message>
     <message>
         <source>Start and Stop</source>
-        <translation type="unfinished"></translation>
+        <translation>Start und Stopp</translation>
     </message>
     <message>
         <source>opening menus</source>
-        <translation type="unfinished"></translation>
+        <translation>das Öffnen der Menüs</translation>
     </message>
     <message>
         <source>the list of sentences</source>
-        <translation type="unfinished"></translation>
+        <translation>die Liste der Meldungen</translation>
     </message>
     <message>
         <source>{text} is the key of {holder}. Choose another, or take it from there first.</source>
-        <translation type="unfinished"></translation>
+        <translation>{text} ist die Taste für „{holder}“. Eine andere wählen oder sie dort zuerst wegnehmen.</translation>
     </message>
     <message>
         <source>The first page</source>
-        <translation type="unfinished"></translation>
+        <translation>Die erste Seite</translation>
     </message>
     <message>
         <source>The rig that was opened last</source>
-        <translation type="unfinished"></translation>
+        <translation>Das zuletzt geöffnete Rig</translation>
     </message>
     <message>
         <source>The simulated rig</source>
-        <translation type="unfinished"></translation>
+        <translation>Das simulierte Rig</translation>
     </message>
     <message>
         <source>More controls</source>
-        <translation type="unfinished"></translation>
+        <translation>Weitere Bedienelemente</translation>
     </message>
     <message>
         <source>see the package&apos;s own files</source>
-        <translation type="unfinished"></translation>
+        <translation>siehe die Dateien des Pakets</translation>
     </message>
     <message>
         <source>About RHOT</source>
-        <translation type="unfinished"></translation>
+        <translation>Über RHOT</translation>
     </message>
     <message>
         <source>Low-cost hand and object tracking with cheap cameras. RHOT itself has the MIT licence.</source>
-        <translation type="unfinished"></translation>
+        <translation>Günstige Verfolgung von Hand und Objekten mit billigen Kameras. RHOT selbst steht unter der MIT-Lizenz.</translation>
     </message>
     <message>
         <source>Put this into a report of a fault. `rhot report` collects more.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gehört in einen Fehlerbericht. `rhot report` sammelt mehr.</translation>
     </message>
     <message>
         <source>Package</source>
-        <translation type="unfinished"></translation>
+        <translation>Paket</translation>
     </message>
     <message>
         <source>Version</source>
-        <translation type="unfinished"></translation>
+        <translation>Version</translation>
     </message>
     <message>
         <source>Licence</source>
-        <translation type="unfinished"></translation>
+        <translation>Lizenz</translation>
     </message>
     <message>
         <source>Packages and licences</source>
-        <translation type="unfinished"></translation>
+        <translation>Pakete und Lizenzen</translation>
     </message>
     <message>
         <source>Versions</source>
-        <translation type="unfinished"></translation>
+        <translation>Versionen</translation>
     </message>
     <message>
         <source>Licences</source>
-        <translation type="unfinished"></translation>
+        <translation>Lizenzen</translation>
     </message>
     <message>
         <source>Copy</source>
-        <translation type="unfinished"></translation>
+        <translation>Kopieren</translation>
     </message>
     <message>
         <source>Copy the versions, for a report of a fault.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Versionen für einen Fehlerbericht kopieren.</translation>
     </message>
     <message>
         <source>Close</source>
-        <translation type="unfinished"></translation>
+        <translation>Schließen</translation>
     </message>
     <message>
         <source>Open a rig file</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Rig-Datei öffnen</translation>
     </message>
     <message>
         <source>Rig files (*.json);;All files (*)</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig-Dateien (*.json);;Alle Dateien (*)</translation>
     </message>
     <message>
         <source>What happens here?</source>
-        <translation type="unfinished"></translation>
+        <translation>Was geschieht hier?</translation>
     </message>
     <message>
         <source>Recordings (*.rhotlog);;All files (*)</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahmen (*.rhotlog);;Alle Dateien (*)</translation>
     </message>
     <message>
         <source>{folder}: cannot be made ({strerror}), so nothing is recorded.</source>
-        <translation type="unfinished"></translation>
+        <translation>{folder}: lässt sich nicht anlegen ({strerror}), daher wird nichts aufgenommen.</translation>
     </message>
     <message>
         <source>Nothing is being recorded, so there is nothing to put a bookmark into. R records.</source>
-        <translation type="unfinished"></translation>
+        <translation>Es läuft keine Aufnahme, in die ein Lesezeichen passt. R nimmt auf.</translation>
     </message>
     <message>
         <source>Bookmark “{text}” is set.</source>
-        <translation type="unfinished"></translation>
+        <translation>Lesezeichen „{text}“ ist gesetzt.</translation>
     </message>
     <message>
         <source>{path}: the recording cannot be found ({strerror}).</source>
-        <translation type="unfinished"></translation>
+        <translation>{path}: Die Aufnahme ist nicht zu finden ({strerror}).</translation>
     </message>
     <message>
         <source> The cameras keep its videos until Rig, Recordings collects them.</source>
-        <translation type="unfinished"></translation>
+        <translation> Die Kameras behalten ihre Videos, bis Rig, Aufnahmen sie abholt.</translation>
     </message>
     <message>
         <source>Recorded {size} to {path}.{video}</source>
-        <translation type="unfinished"></translation>
+        <translation>{size} aufgenommen in {path}.{video}</translation>
     </message>
     <message>
         <source>Show in folder</source>
-        <translation type="unfinished"></translation>
+        <translation>Im Ordner zeigen</translation>
     </message>
     <message>
         <source>This desktop opens no folders. The recording lies in {folder}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Dieser Desktop öffnet keine Ordner. Die Aufnahme liegt in {folder}.</translation>
     </message>
     <message>
         <source>camera</source>
-        <translation type="unfinished"></translation>
+        <translation>Kamera</translation>
     </message>
     <message>
         <source>picture [px]</source>
-        <translation type="unfinished"></translation>
+        <translation>Bild [px]</translation>
     </message>
     <message>
         <source>field of view</source>
-        <translation type="unfinished"></translation>
+        <translation>Bildwinkel</translation>
     </message>
     <message>
         <source>focal length [px]</source>
-        <translation type="unfinished"></translation>
+        <translation>Brennweite [px]</translation>
     </message>
     <message>
         <source>centre [px]</source>
-        <translation type="unfinished"></translation>
+        <translation>Hauptpunkt [px]</translation>
     </message>
     <message>
         <source>address : port</source>
-        <translation type="unfinished"></translation>
+        <translation>Adresse : Port</translation>
     </message>
     <message>
         <source>marker</source>
-        <translation type="unfinished"></translation>
+        <translation>Marker</translation>
     </message>
     <message>
         <source>colour</source>
-        <translation type="unfinished"></translation>
+        <translation>Farbe</translation>
     </message>
     <message>
         <source>place</source>
-        <translation type="unfinished"></translation>
+        <translation>Ort</translation>
     </message>
     <message>
         <source>shape</source>
-        <translation type="unfinished"></translation>
+        <translation>Form</translation>
     </message>
     <message>
         <source>radius [mm]</source>
-        <translation type="unfinished"></translation>
+        <translation>Radius [mm]</translation>
     </message>
     <message>
         <source>finger</source>
-        <translation type="unfinished"></translation>
+        <translation>Finger</translation>
     </message>
     <message>
         <source>first bone [mm]</source>
-        <translation type="unfinished"></translation>
+        <translation>erster Knochen [mm]</translation>
     </message>
     <message>
         <source>second [mm]</source>
-        <translation type="unfinished"></translation>
+        <translation>zweiter [mm]</translation>
     </message>
     <message>
         <source>last [mm]</source>
-        <translation type="unfinished"></translation>
+        <translation>letzter [mm]</translation>
     </message>
     <message>
         <source>marker to last joint [mm]</source>
-        <translation type="unfinished"></translation>
+        <translation>Marker bis letztes Gelenk [mm]</translation>
     </message>
     <message>
         <source>The rig has one camera; depth needs two.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Rig hat eine Kamera; Tiefe braucht zwei.</translation>
     </message>
     <message>
         <source>Where {first} and {second} stand to each other is not known.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie {first} und {second} zueinander stehen, ist nicht bekannt.</translation>
     </message>
     <message>
         <source>{first} and {second} stand {distance:.1f} mm apart.</source>
-        <translation type="unfinished"></translation>
+        <translation>{first} und {second} stehen {distance:.1f} mm auseinander.</translation>
     </message>
     <message>
         <source>Rig {name}</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig {name}</translation>
     </message>
     <message>
         <source>Marker set {name}. Nodes and master must use the same one.</source>
-        <translation type="unfinished"></translation>
+        <translation>Markersatz {name}. Knoten und Master müssen denselben benutzen.</translation>
     </message>
     <message>
         <source>without a name</source>
-        <translation type="unfinished"></translation>
+        <translation>ohne Namen</translation>
     </message>
     <message>
         <source>{name}, {hand}; wrist {breadth:.0f} × {thickness:.0f} mm.</source>
-        <translation type="unfinished"></translation>
+        <translation>{name}, {hand}; Handgelenk {breadth:.0f} × {thickness:.0f} mm.</translation>
     </message>
     <message>
         <source>Hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Hand</translation>
     </message>
     <message>
         <source>beside the recording</source>
-        <translation type="unfinished"></translation>
+        <translation>neben der Aufnahme</translation>
     </message>
     <message>
         <source>General</source>
-        <translation type="unfinished"></translation>
+        <translation>Allgemein</translation>
     </message>
     <message>
         <source>Reset all</source>
-        <translation type="unfinished"></translation>
+        <translation>Alles zurücksetzen</translation>
     </message>
     <message>
         <source>Forget layout, last rig, switches, folders and keys.</source>
-        <translation type="unfinished"></translation>
+        <translation>Anordnung, letztes Rig, Schalter, Ordner und Tasten vergessen.</translation>
     </message>
     <message>
         <source>Every change holds already.</source>
-        <translation type="unfinished"></translation>
+        <translation>Jede Änderung gilt bereits.</translation>
     </message>
     <message>
         <source>The file in which the app remembers all this.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Datei, in der sich die App das alles merkt.</translation>
     </message>
     <message>
         <source>Light text on dark ground, or the other way round. The View menu has it, too.</source>
-        <translation type="unfinished"></translation>
+        <translation>Heller Text auf dunklem Grund oder umgekehrt. Auch im Menü Ansicht.</translation>
+    </message>
+    <message>
+        <source>The language of the windows, from the next start on.</source>
+        <translation>Die Sprache der Fenster, vom nächsten Start an.</translation>
+    </message>
+    <message>
+        <source>As the desktop</source>
+        <translation>Wie der Desktop</translation>
     </message>
     <message>
         <source>What the app opens when it starts without a rig. An engine that runs already comes first.</source>
-        <translation type="unfinished"></translation>
+        <translation>Was die App öffnet, wenn sie ohne Rig startet. Eine Engine, die schon läuft, geht vor.</translation>
     </message>
     <message>
         <source>Show what to do next when cameras of this computer are opened</source>
-        <translation type="unfinished"></translation>
+        <translation>Die nächsten Schritte zeigen, wenn Kameras dieses Rechners geöffnet werden</translation>
     </message>
     <message>
         <source>Where recordings are made and listed.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wo Aufnahmen angelegt und aufgelistet werden.</translation>
     </message>
     <message>
         <source>Where exported files are offered to be written.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wo exportierte Dateien gespeichert werden sollen.</translation>
     </message>
     <message>
         <source>Look</source>
-        <translation type="unfinished"></translation>
+        <translation>Aussehen</translation>
+    </message>
+    <message>
+        <source>Language</source>
+        <translation>Sprache</translation>
     </message>
     <message>
         <source>At the start, open</source>
-        <translation type="unfinished"></translation>
+        <translation>Beim Start öffnen</translation>
     </message>
     <message>
         <source>Recordings</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahmen</translation>
     </message>
     <message>
         <source>Exported files</source>
-        <translation type="unfinished"></translation>
+        <translation>Exportierte Dateien</translation>
+    </message>
+    <message>
+        <source>From the next start on.</source>
+        <translation>Gilt vom nächsten Start an.</translation>
     </message>
     <message>
         <source>Choose …</source>
-        <translation type="unfinished"></translation>
+        <translation>Auswählen …</translation>
     </message>
     <message>
         <source>Another folder.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein anderer Ordner.</translation>
     </message>
     <message>
         <source>As at first</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie anfangs</translation>
     </message>
     <message>
         <source>The folder that it was on the first start.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Ordner, der es beim ersten Start war.</translation>
     </message>
     <message>
         <source>Action</source>
-        <translation type="unfinished"></translation>
+        <translation>Aktion</translation>
     </message>
     <message>
         <source>Key</source>
-        <translation type="unfinished"></translation>
+        <translation>Taste</translation>
     </message>
     <message>
         <source>Keys of all actions</source>
-        <translation type="unfinished"></translation>
+        <translation>Tasten aller Aktionen</translation>
     </message>
     <message>
         <source>Press the new key here; the cross takes the key away.</source>
-        <translation type="unfinished"></translation>
+        <translation>Hier die neue Taste drücken; das Kreuz nimmt die Taste weg.</translation>
     </message>
     <message>
         <source>The key that the action had on the first start.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Taste, die die Aktion beim ersten Start hatte.</translation>
     </message>
     <message>
         <source>Key of the selected action</source>
-        <translation type="unfinished"></translation>
+        <translation>Taste der ausgewählten Aktion</translation>
     </message>
     <message>
         <source>Space starts and stops always. Windows beside the main one have keys of their own; the guide lists them.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Leertaste startet und stoppt immer. Fenster neben dem Hauptfenster haben eigene Tasten; die Anleitung führt sie auf.</translation>
     </message>
     <message>
         <source>Plots</source>
-        <translation type="unfinished"></translation>
+        <translation>Diagramme</translation>
     </message>
     <message>
         <source>This rig has no file, so nothing is kept: it can be brought back here, until this window closes.</source>
-        <translation type="unfinished"></translation>
+        <translation>Dieses Rig hat keine Datei, es wird also nichts aufbewahrt: Es lässt sich hier zurückholen, bis dieses Fenster schließt.</translation>
     </message>
     <message>
         <source>What is in the rig file now is kept, and can be brought back at any time with Calibrate, Bring back an earlier calibration.</source>
-        <translation type="unfinished"></translation>
+        <translation>Was jetzt in der Rig-Datei steht, bleibt erhalten und lässt sich jederzeit mit Kalibrieren, Frühere Kalibrierung zurückholen wiederherstellen.</translation>
     </message>
     <message>
         <source>Nothing changes.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nichts ändert sich.</translation>
     </message>
     <message>
         <source>{title}. Then the engine changes over.</source>
-        <translation type="unfinished"></translation>
+        <translation>{title}. Dann stellt sich die Engine um.</translation>
     </message>
     <message>
         <source>The engine changes over …</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine stellt sich um …</translation>
     </message>
     <message>
         <source>never arrived: the network lost them</source>
-        <translation type="unfinished"></translation>
+        <translation>nie angekommen: im Netz verloren</translation>
     </message>
     <message>
         <source>came too late: this computer or the network is busy</source>
-        <translation type="unfinished"></translation>
+        <translation>zu spät gekommen: dieser Rechner oder das Netz ist ausgelastet</translation>
     </message>
     <message>
         <source>could not be read in time: this computer is busy</source>
-        <translation type="unfinished"></translation>
+        <translation>nicht rechtzeitig gelesen: dieser Rechner ist ausgelastet</translation>
     </message>
     <message>
         <source>of another marker set than the rig&apos;s</source>
-        <translation type="unfinished"></translation>
+        <translation>von einem anderen Markersatz als dem des Rigs</translation>
     </message>
     <message>
         <source>landmarks, but no marker of the rig is one</source>
-        <translation type="unfinished"></translation>
+        <translation>Landmarken, aber kein Marker des Rigs ist eine</translation>
     </message>
     <message>
         <source>of another picture size than the rig&apos;s</source>
-        <translation type="unfinished"></translation>
+        <translation>von einer anderen Bildgröße als der des Rigs</translation>
     </message>
     <message>
         <source>of another node</source>
-        <translation type="unfinished"></translation>
+        <translation>von einem anderen Knoten</translation>
     </message>
     <message>
         <source>came twice</source>
-        <translation type="unfinished"></translation>
+        <translation>doppelt gekommen</translation>
     </message>
     <message>
         <source>an observation kind failed over them</source>
-        <translation type="unfinished"></translation>
+        <translation>an ihnen scheiterte eine Beobachtungsart</translation>
     </message>
     <message>
         <source>not signed with the node&apos;s key</source>
-        <translation type="unfinished"></translation>
+        <translation>nicht mit dem Schlüssel des Knotens signiert</translation>
     </message>
     <message>
         <source>not signed</source>
-        <translation type="unfinished"></translation>
+        <translation>nicht signiert</translation>
     </message>
     <message numerus="yes">
         <source>{n} frame unused</source>
         <comment>{n} frames unused</comment>
-        <translation type="unfinished">
-            <numerusform></numerusform>
-            <numerusform></numerusform>
+        <translation>
+            <numerusform>{n} Bild ungenutzt</numerusform>
+            <numerusform>{n} Bilder ungenutzt</numerusform>
         </translation>
     </message>
     <message numerus="yes">
         <source>{n} frame received.</source>
         <comment>{n} frames received.</comment>
-        <translation type="unfinished">
-            <numerusform></numerusform>
-            <numerusform></numerusform>
+        <translation>
+            <numerusform>{n} Bild empfangen.</numerusform>
+            <numerusform>{n} Bilder empfangen.</numerusform>
         </translation>
     </message>
     <message>
         <source>Unused:</source>
-        <translation type="unfinished"></translation>
+        <translation>Ungenutzt:</translation>
     </message>
     <message>
         <source>refused ({reason})</source>
-        <translation type="unfinished"></translation>
+        <translation>abgelehnt ({reason})</translation>
     </message>
     <message>
         <source>Sends the thesis&apos;s text datagrams: untrusted.</source>
-        <translation type="unfinished"></translation>
+        <translation>Sendet die Text-Datagramme der Arbeit: nicht vertrauenswürdig.</translation>
     </message>
     <message>
         <source>Not paired: untrusted; anybody on the network may steer it or speak in its place.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nicht gekoppelt: nicht vertrauenswürdig; jeder im Netz kann ihn steuern oder sich für ihn ausgeben.</translation>
     </message>
     <message>
         <source>no clock (text)</source>
-        <translation type="unfinished"></translation>
+        <translation>keine Uhr (Text)</translation>
     </message>
     <message>
         <source>clock unknown</source>
-        <translation type="unfinished"></translation>
+        <translation>Uhr unbekannt</translation>
     </message>
     <message>
         <source>clock ± {bound:.2f} ms</source>
-        <translation type="unfinished"></translation>
+        <translation>Uhr ± {bound:.2f} ms</translation>
     </message>
     <message>
         <source>± {spread} mm (one sigma)</source>
-        <translation type="unfinished"></translation>
+        <translation>± {spread} mm (ein Sigma)</translation>
     </message>
     <message>
         <source>, {more:.2f} mm of it by the calibration</source>
-        <translation type="unfinished"></translation>
+        <translation>, davon {more:.2f} mm durch die Kalibrierung</translation>
     </message>
     <message>
         <source>At least: {reason}</source>
-        <translation type="unfinished"></translation>
+        <translation>Mindestens: {reason}</translation>
     </message>
     <message>
         <source>epipolar error {error:.2f} px</source>
-        <translation type="unfinished"></translation>
+        <translation>Epipolarfehler {error:.2f} px</translation>
     </message>
     <message>
         <source>IDLE</source>
-        <translation type="unfinished"></translation>
+        <translation>RUHT</translation>
     </message>
     <message>
         <source>Nothing is running. Press Start to begin.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nichts läuft. Start drücken, um zu beginnen.</translation>
     </message>
     <message>
         <source>SEARCHING</source>
-        <translation type="unfinished"></translation>
+        <translation>SUCHT</translation>
     </message>
     <message>
         <source>The nodes stream, but the hand has not been found yet.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Knoten senden, aber die Hand ist noch nicht gefunden.</translation>
     </message>
     <message>
         <source>TRACKING</source>
-        <translation type="unfinished"></translation>
+        <translation>VERFOLGT</translation>
     </message>
     <message>
         <source>The hand is tracked, and its markers, landmarks or contours are seen by enough cameras.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand wird verfolgt, und genügend Kameras sehen ihre Marker, Landmarken oder Konturen.</translation>
     </message>
     <message>
         <source>PARTIAL</source>
-        <translation type="unfinished"></translation>
+        <translation>TEILWEISE</translation>
     </message>
     <message>
         <source>The hand is tracked, but some of its markers, landmarks or contours are not seen by enough cameras.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand wird verfolgt, aber einige ihrer Marker, Landmarken oder Konturen werden von zu wenigen Kameras gesehen.</translation>
     </message>
     <message>
         <source>LOST</source>
-        <translation type="unfinished"></translation>
+        <translation>VERLOREN</translation>
     </message>
     <message>
         <source>The hand was tracked and is out of sight now.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand wurde verfolgt und ist jetzt außer Sicht.</translation>
     </message>
     <message>
         <source>FAULT</source>
-        <translation type="unfinished"></translation>
+        <translation>FEHLER</translation>
     </message>
     <message>
         <source>Something is broken; the sentence below says what.</source>
-        <translation type="unfinished"></translation>
+        <translation>Etwas ist defekt; die Meldung unten sagt, was.</translation>
     </message>
     <message>
         <source>NO RIG</source>
-        <translation type="unfinished"></translation>
+        <translation>KEIN RIG</translation>
     </message>
     <message>
         <source>No rig is open. Choose one to begin.</source>
-        <translation type="unfinished"></translation>
+        <translation>Kein Rig ist geöffnet. Eines auswählen, um zu beginnen.</translation>
     </message>
     <message>
         <source>STARTING</source>
-        <translation type="unfinished"></translation>
+        <translation>STARTET</translation>
     </message>
     <message>
         <source>The engine is starting.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine startet.</translation>
     </message>
     <message>
         <source>NO ENGINE</source>
-        <translation type="unfinished"></translation>
+        <translation>KEINE ENGINE</translation>
     </message>
     <message>
         <source>The engine does not answer. The app is starting it again.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine antwortet nicht. Die App startet sie neu.</translation>
     </message>
     <message>
         <source>This state is not known to this version.</source>
-        <translation type="unfinished"></translation>
+        <translation>Diese Version kennt diesen Zustand nicht.</translation>
     </message>
     <message>
         <source>silent</source>
-        <translation type="unfinished"></translation>
+        <translation>stumm</translation>
     </message>
     <message>
         <source>Nothing has been heard from this node for a second.</source>
-        <translation type="unfinished"></translation>
+        <translation>Seit einer Sekunde war von diesem Knoten nichts zu hören.</translation>
     </message>
     <message>
         <source>starting</source>
-        <translation type="unfinished"></translation>
+        <translation>startet</translation>
     </message>
     <message>
         <source>The node is opening its camera.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Knoten öffnet seine Kamera.</translation>
     </message>
     <message>
         <source>ready</source>
-        <translation type="unfinished"></translation>
+        <translation>bereit</translation>
     </message>
     <message>
         <source>The node waits for the start message.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Knoten wartet auf das Startsignal.</translation>
     </message>
     <message>
         <source>streaming</source>
-        <translation type="unfinished"></translation>
+        <translation>sendet</translation>
     </message>
     <message>
         <source>The node sends what it sees.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Knoten sendet, was er sieht.</translation>
     </message>
     <message>
         <source>fault</source>
-        <translation type="unfinished"></translation>
+        <translation>Fehler</translation>
     </message>
     <message>
         <source>The node reports that something is broken.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Knoten meldet, dass etwas defekt ist.</translation>
     </message>
     <message>
         <source>measured</source>
-        <translation type="unfinished"></translation>
+        <translation>gemessen</translation>
     </message>
     <message>
         <source>Seen by enough cameras at this instant. Drawn solid.</source>
-        <translation type="unfinished"></translation>
+        <translation>In diesem Augenblick von genügend Kameras gesehen. Voll gezeichnet.</translation>
     </message>
     <message>
         <source>inferred</source>
-        <translation type="unfinished"></translation>
+        <translation>abgeleitet</translation>
     </message>
     <message>
         <source>Follows from what is measured through the hand model, or from a half-hidden sight. Drawn translucent.</source>
-        <translation type="unfinished"></translation>
+        <translation>Folgt über das Handmodell aus dem Gemessenen oder aus einem halb verdeckten Anblick. Durchscheinend gezeichnet.</translation>
     </message>
     <message>
         <source>guessed</source>
-        <translation type="unfinished"></translation>
+        <translation>geraten</translation>
     </message>
     <message>
         <source>The images do not determine it: the last or the most natural value. Drawn hatched.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Bilder bestimmen es nicht: der letzte oder der natürlichste Wert. Schraffiert gezeichnet.</translation>
     </message>
     <message>
         <source>unknown</source>
-        <translation type="unfinished"></translation>
+        <translation>unbekannt</translation>
     </message>
     <message>
         <source>Nothing is known. Not drawn.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nichts ist bekannt. Nicht gezeichnet.</translation>
     </message>
     <message>
         <source>detect</source>
-        <translation type="unfinished"></translation>
+        <translation>Erkennen</translation>
     </message>
     <message>
         <source>network</source>
-        <translation type="unfinished"></translation>
+        <translation>Netz</translation>
     </message>
     <message>
         <source>pair</source>
-        <translation type="unfinished"></translation>
+        <translation>Paaren</translation>
     </message>
     <message>
         <source>triangulate</source>
-        <translation type="unfinished"></translation>
+        <translation>Triangulieren</translation>
     </message>
     <message>
         <source>filter</source>
-        <translation type="unfinished"></translation>
+        <translation>Filtern</translation>
     </message>
     <message>
         <source>solve</source>
-        <translation type="unfinished"></translation>
+        <translation>Lösen</translation>
     </message>
     <message>
         <source>publish</source>
-        <translation type="unfinished"></translation>
+        <translation>Ausgeben</translation>
     </message>
     <message>
         <source>receive to state</source>
-        <translation type="unfinished"></translation>
+        <translation>Empfang bis Zustand</translation>
     </message>
     <message>
         <source>ok</source>
-        <translation type="unfinished"></translation>
+        <translation>ok</translation>
     </message>
     <message>
         <source>Seen by every camera.</source>
-        <translation type="unfinished"></translation>
+        <translation>Von jeder Kamera gesehen.</translation>
     </message>
     <message>
         <source>half hidden</source>
-        <translation type="unfinished"></translation>
+        <translation>halb verdeckt</translation>
     </message>
     <message>
         <source>A camera sees only a part of it; its place is less certain.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Kamera sieht nur einen Teil davon; der Ort ist weniger sicher.</translation>
     </message>
     <message>
         <source>ambiguous</source>
-        <translation type="unfinished"></translation>
+        <translation>mehrdeutig</translation>
     </message>
     <message>
         <source>Another spot of the same colour is as plausible.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein anderer Fleck derselben Farbe ist ebenso plausibel.</translation>
     </message>
     <message>
         <source>lost</source>
-        <translation type="unfinished"></translation>
+        <translation>verloren</translation>
     </message>
     <message>
         <source>No camera sees it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Keine Kamera sieht ihn.</translation>
     </message>
     <message>
         <source>{names} only</source>
-        <translation type="unfinished"></translation>
+        <translation>nur {names}</translation>
     </message>
     <message>
         <source>Not every camera sees it, so its depth is not measured.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nicht jede Kamera sieht ihn, daher ist seine Tiefe nicht gemessen.</translation>
     </message>
     <message>
         <source>The state of the whole rig in one word: IDLE, SEARCHING, TRACKING, PARTIAL, LOST or FAULT.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Zustand des ganzen Rigs in einem Wort: RUHT, SUCHT, VERFOLGT, TEILWEISE, VERLOREN oder FEHLER.</translation>
     </message>
     <message>
         <source>How many hand states per second the engine publishes.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie viele Handzustände die Engine pro Sekunde ausgibt.</translation>
     </message>
     <message>
         <source>The rig file: cameras, lenses, marker set, hand and filters.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Rig-Datei: Kameras, Objektive, Markersatz, Hand und Filter.</translation>
     </message>
     <message>
         <source>A small computer with a camera. It finds the markers in its picture and sends their places.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein kleiner Rechner mit einer Kamera. Er findet die Marker in seinem Bild und sendet ihre Orte.</translation>
     </message>
     <message>
         <source>Frames per second that arrive from this node.</source>
-        <translation type="unfinished"></translation>
+        <translation>Bilder pro Sekunde, die von diesem Knoten ankommen.</translation>
     </message>
     <message>
         <source>Frames that were not used since the start, shown when they are more than one in a hundred. The hint of the card says why.</source>
-        <translation type="unfinished"></translation>
+        <translation>Bilder, die seit dem Start nicht genutzt wurden; gezeigt, wenn es mehr als eines von hundert ist. Der Hinweis der Karte sagt, warum.</translation>
     </message>
     <message>
         <source>Datagrams that arrived and were rejected, with the reason.</source>
-        <translation type="unfinished"></translation>
+        <translation>Datagramme, die ankamen und abgelehnt wurden, mit dem Grund.</translation>
     </message>
     <message>
         <source>How well the node&apos;s clock is known: the true offset lies within this bound of the estimate. 1 ms at 1 m/s is 1 mm.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie gut die Uhr des Knotens bekannt ist: Der wahre Versatz liegt innerhalb dieser Grenze um die Schätzung. 1 ms ist bei 1 m/s 1 mm.</translation>
     </message>
     <message>
         <source>A coloured spot on the hand: five painted fingertips and a wrist band.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein farbiger Fleck an der Hand: fünf bemalte Fingerspitzen und ein Armband.</translation>
     </message>
     <message>
         <source>How much a marker trembles: rms over the last second of its raw position, motion removed by third differences. It includes depth, which is the noisiest direction. There is no figure below about ten states per second.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie stark ein Marker zittert: Effektivwert seines rohen Orts über die letzte Sekunde, ohne Bewegung (dritte Differenzen). Enthält die Tiefe, die am stärksten rauscht. Unter etwa zehn Zuständen pro Sekunde gibt es keinen Wert.</translation>
     </message>
     <message>
         <source>How long each stage took for one state: median (p50) and 99th percentile (p99) of the last two seconds. Bands are stacked medians; the lines are the whole way of each state.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie lange jede Stufe für einen Zustand brauchte: Median (p50) und 99. Perzentil (p99) der letzten zwei Sekunden. Bänder sind gestapelte Mediane; die Linien sind der ganze Weg jedes Zustands.</translation>
     </message>
     <message>
         <source>11.1 ms is one frame at 90 fps, the rate the thesis aims at.</source>
-        <translation type="unfinished"></translation>
+        <translation>11.1 ms ist ein Bild bei 90 Bildern pro Sekunde, dem Ziel der Arbeit.</translation>
     </message>
     <message>
         <source>From the frame being available on the node to the datagram being sent.</source>
-        <translation type="unfinished"></translation>
+        <translation>Von der Verfügbarkeit des Bildes auf dem Knoten bis zum Senden des Datagramms.</translation>
     </message>
     <message>
         <source>From the node&apos;s send to the receive time of the master&apos;s kernel, by the estimated clocks.</source>
-        <translation type="unfinished"></translation>
+        <translation>Vom Senden des Knotens bis zum Empfang im Kernel des Masters, nach den geschätzten Uhren.</translation>
     </message>
     <message>
         <source>Waiting until both cameras have seen a time after the state&apos;s instant.</source>
-        <translation type="unfinished"></translation>
+        <translation>Warten, bis beide Kameras eine Zeit nach dem Augenblick des Zustands gesehen haben.</translation>
     </message>
     <message>
         <source>From two pixels to a point in space.</source>
-        <translation type="unfinished"></translation>
+        <translation>Von zwei Bildpunkten zu einem Punkt im Raum.</translation>
     </message>
     <message>
         <source>The 1-euro filter before and after depth.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der 1-Euro-Filter vor und nach der Tiefe.</translation>
     </message>
     <message>
         <source>From points to the hand&apos;s joints.</source>
-        <translation type="unfinished"></translation>
+        <translation>Von Punkten zu den Gelenken der Hand.</translation>
     </message>
     <message>
         <source>From the finished state to the clients.</source>
-        <translation type="unfinished"></translation>
+        <translation>Vom fertigen Zustand zu den Empfängern.</translation>
     </message>
     <message>
         <source>States per second and frames per second of each node; bars show lost datagrams per second.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zustände pro Sekunde und Bilder pro Sekunde jedes Knotens; Balken zeigen verlorene Datagramme pro Sekunde.</translation>
     </message>
     <message>
         <source>How far the fingertips of the two runs are apart at the same instant, in mm. p50 and p95 are over the whole recording.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie weit die Fingerspitzen der beiden Läufe im selben Augenblick auseinanderliegen, in mm. p50 und p95 gelten für die ganze Aufnahme.</translation>
     </message>
     <message>
         <source>Bending towards the palm, in degrees; 0 is a straight finger.</source>
-        <translation type="unfinished"></translation>
+        <translation>Beugung zur Handfläche, in Grad; 0 ist ein gestreckter Finger.</translation>
     </message>
     <message>
         <source>Spreading towards the thumb&apos;s side, in degrees.</source>
-        <translation type="unfinished"></translation>
+        <translation>Spreizung zur Daumenseite, in Grad.</translation>
     </message>
     <message>
         <source>Carpometacarpal joint: the thumb&apos;s base, at the wrist.</source>
-        <translation type="unfinished"></translation>
+        <translation>Karpometakarpalgelenk: das Sattelgelenk des Daumens am Handgelenk.</translation>
     </message>
     <message>
         <source>Metacarpophalangeal joint: the knuckle.</source>
-        <translation type="unfinished"></translation>
+        <translation>Metakarpophalangealgelenk: der Knöchel.</translation>
     </message>
     <message>
         <source>Proximal interphalangeal joint: the middle joint of a finger.</source>
-        <translation type="unfinished"></translation>
+        <translation>Proximales Interphalangealgelenk: das Mittelgelenk eines Fingers.</translation>
     </message>
     <message>
         <source>Distal interphalangeal joint: the last joint of a finger.</source>
-        <translation type="unfinished"></translation>
+        <translation>Distales Interphalangealgelenk: das letzte Gelenk eines Fingers.</translation>
     </message>
     <message>
         <source>Interphalangeal joint: the last joint of the thumb.</source>
-        <translation type="unfinished"></translation>
+        <translation>Interphalangealgelenk: das letzte Gelenk des Daumens.</translation>
     </message>
     <message>
         <source>An ellipsoid of three sigma holds the true place with 97 % probability.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Ellipsoid von drei Sigma enthält den wahren Ort mit 97 % Wahrscheinlichkeit.</translation>
     </message>
     <message>
         <source>Standard deviation (one sigma) of the place along the axis in which it is known worst, in mm.</source>
-        <translation type="unfinished"></translation>
+        <translation>Standardabweichung (ein Sigma) des Orts entlang der Achse, in der er am schlechtesten bekannt ist, in mm.</translation>
     </message>
     <message>
         <source>How well the palm&apos;s place and turn are known: standard deviations along the worst axes.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie gut Ort und Drehung der Handfläche bekannt sind: Standardabweichungen entlang der schlechtesten Achsen.</translation>
     </message>
     <message>
         <source>Estimated size of the hand as a factor on every length of the rig&apos;s hand (Calibrate, Tracker).</source>
-        <translation type="unfinished"></translation>
+        <translation>Geschätzte Größe der Hand als Faktor auf jede Länge der Hand des Rigs (Kalibrieren, Tracker).</translation>
     </message>
     <message>
         <source>How far the two cameras&apos; rays miss each other, in pixels. Above one pixel, check calibration.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie weit die Strahlen der beiden Kameras einander verfehlen, in Pixeln. Bei mehr als einem Pixel die Kalibrierung prüfen.</translation>
     </message>
     <message>
         <source>thumb</source>
-        <translation type="unfinished"></translation>
+        <translation>Daumen</translation>
     </message>
     <message>
         <source>index</source>
-        <translation type="unfinished"></translation>
+        <translation>Zeigefinger</translation>
     </message>
     <message>
         <source>middle</source>
-        <translation type="unfinished"></translation>
+        <translation>Mittelfinger</translation>
     </message>
     <message>
         <source>ring</source>
-        <translation type="unfinished"></translation>
+        <translation>Ringfinger</translation>
     </message>
     <message>
         <source>little</source>
-        <translation type="unfinished"></translation>
+        <translation>Kleinfinger</translation>
     </message>
     <message>
         <source>wrist</source>
-        <translation type="unfinished"></translation>
+        <translation>Handgelenk</translation>
     </message>
     <message>
         <source>thumb tip</source>
-        <translation type="unfinished"></translation>
+        <translation>Daumenspitze</translation>
     </message>
     <message>
         <source>index tip</source>
-        <translation type="unfinished"></translation>
+        <translation>Zeigefingerspitze</translation>
     </message>
     <message>
         <source>middle tip</source>
-        <translation type="unfinished"></translation>
+        <translation>Mittelfingerspitze</translation>
     </message>
     <message>
         <source>ring tip</source>
-        <translation type="unfinished"></translation>
+        <translation>Ringfingerspitze</translation>
     </message>
     <message>
         <source>little tip</source>
-        <translation type="unfinished"></translation>
+        <translation>Kleinfingerspitze</translation>
     </message>
     <message>
         <source>left</source>
-        <translation type="unfinished"></translation>
+        <translation>links</translation>
     </message>
     <message>
         <source>right</source>
-        <translation type="unfinished"></translation>
+        <translation>rechts</translation>
     </message>
     <message>
         <source>red</source>
-        <translation type="unfinished"></translation>
+        <translation>rot</translation>
     </message>
     <message>
         <source>green</source>
-        <translation type="unfinished"></translation>
+        <translation>grün</translation>
     </message>
     <message>
         <source>blue</source>
-        <translation type="unfinished"></translation>
+        <translation>blau</translation>
     </message>
     <message>
         <source>yellow</source>
-        <translation type="unfinished"></translation>
+        <translation>gelb</translation>
     </message>
     <message>
         <source>magenta</source>
-        <translation type="unfinished"></translation>
+        <translation>magenta</translation>
     </message>
     <message>
         <source>cyan</source>
-        <translation type="unfinished"></translation>
+        <translation>cyan</translation>
     </message>
     <message>
         <source>orange</source>
-        <translation type="unfinished"></translation>
+        <translation>orange</translation>
     </message>
     <message>
         <source>white</source>
-        <translation type="unfinished"></translation>
+        <translation>weiß</translation>
     </message>
     <message>
         <source>black</source>
-        <translation type="unfinished"></translation>
+        <translation>schwarz</translation>
     </message>
     <message>
         <source>free</source>
-        <translation type="unfinished"></translation>
+        <translation>frei</translation>
     </message>
     <message>
         <source>disc</source>
-        <translation type="unfinished"></translation>
+        <translation>Scheibe</translation>
     </message>
     <message>
         <source>sphere</source>
-        <translation type="unfinished"></translation>
+        <translation>Kugel</translation>
     </message>
     <message>
         <source>capsule</source>
-        <translation type="unfinished"></translation>
+        <translation>Kapsel</translation>
     </message>
     <message>
         <source>band</source>
-        <translation type="unfinished"></translation>
+        <translation>Band</translation>
     </message>
     <message>
         <source>blob</source>
-        <translation type="unfinished"></translation>
+        <translation>Fleck</translation>
     </message>
     <message>
         <source>landmark</source>
-        <translation type="unfinished"></translation>
+        <translation>Landmarke</translation>
     </message>
     <message>
         <source>left hand</source>
-        <translation type="unfinished"></translation>
+        <translation>linke Hand</translation>
     </message>
     <message>
         <source>right hand</source>
-        <translation type="unfinished"></translation>
+        <translation>rechte Hand</translation>
     </message>
     <message>
         <source>first left hand</source>
-        <translation type="unfinished"></translation>
+        <translation>erste linke Hand</translation>
     </message>
     <message>
         <source>other left hand</source>
-        <translation type="unfinished"></translation>
+        <translation>andere linke Hand</translation>
     </message>
     <message>
         <source>first right hand</source>
-        <translation type="unfinished"></translation>
+        <translation>erste rechte Hand</translation>
     </message>
     <message>
         <source>other right hand</source>
-        <translation type="unfinished"></translation>
+        <translation>andere rechte Hand</translation>
     </message>
     <message>
         <source>Classic</source>
-        <translation type="unfinished"></translation>
+        <translation>Klassisch</translation>
     </message>
     <message>
         <source>The thesis&apos;s way: triangulate each marker, smooth it, then bend the fingers one by one. Works with every rig. A marker needs two cameras, and joints do not say how well they are known.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Weg der Arbeit: jeden Marker triangulieren, glätten, dann die Finger einzeln beugen. Geht mit jedem Rig. Ein Marker braucht zwei Kameras, und die Gelenke sagen nicht, wie gut sie bekannt sind.</translation>
     </message>
     <message>
         <source>Estimator</source>
-        <translation type="unfinished"></translation>
+        <translation>Schätzer</translation>
     </message>
     <message>
         <source>One hand estimated from everything that every camera sees, at the time it was seen. A marker that one camera sees counts, hidden fingers are carried on, and every joint says how well it is known. It predicts, and smooths recordings. Needs calibrated cameras with clocks.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Hand, geschätzt aus allem, was jede Kamera sieht, zu der Zeit, zu der sie es sah. Auch ein Marker, den nur eine Kamera sieht, zählt; verdeckte Finger werden fortgeführt, und jedes Gelenk sagt, wie gut es bekannt ist. Sagt voraus und glättet Aufnahmen. Braucht kalibrierte Kameras mit Uhren.</translation>
     </message>
     <message>
         <source>FABRIK, allowing for noise</source>
-        <translation type="unfinished"></translation>
+        <translation>FABRIK mit Rücksicht auf Rauschen</translation>
     </message>
     <message>
         <source>FABRIK, then a descent to the natural pose. The default.</source>
-        <translation type="unfinished"></translation>
+        <translation>FABRIK, dann ein Abstieg zur natürlichen Pose. Der Standard.</translation>
     </message>
     <message>
         <source>Jacobian transpose</source>
-        <translation type="unfinished"></translation>
+        <translation>transponierte Jacobi-Matrix</translation>
     </message>
     <message>
         <source>Equation 2.13. Slow where a finger is nearly straight.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gleichung 2.13. Langsam, wo ein Finger fast gestreckt ist.</translation>
     </message>
     <message>
         <source>pseudo-inverse</source>
-        <translation type="unfinished"></translation>
+        <translation>Pseudoinverse</translation>
     </message>
     <message>
         <source>Equation 2.16. Jumps near a straight finger.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gleichung 2.16. Springt nahe einem gestreckten Finger.</translation>
     </message>
     <message>
         <source>singular values</source>
-        <translation type="unfinished"></translation>
+        <translation>Singulärwerte</translation>
     </message>
     <message>
         <source>Equation 2.20: the pseudo-inverse without its small singular values.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gleichung 2.20: die Pseudoinverse ohne ihre kleinen Singulärwerte.</translation>
     </message>
     <message>
         <source>damped least squares</source>
-        <translation type="unfinished"></translation>
+        <translation>gedämpfte kleinste Quadrate</translation>
     </message>
     <message>
         <source>Equation 2.23.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gleichung 2.23.</translation>
     </message>
     <message>
         <source>Newton</source>
-        <translation type="unfinished"></translation>
+        <translation>Newton</translation>
     </message>
     <message>
         <source>Equation 2.24, with the exact second derivatives.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gleichung 2.24, mit den genauen zweiten Ableitungen.</translation>
     </message>
     <message>
         <source>Levenberg-Marquardt</source>
-        <translation type="unfinished"></translation>
+        <translation>Levenberg-Marquardt</translation>
     </message>
     <message>
         <source>Damped Gauss-Newton steps within the limits.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gedämpfte Gauß-Newton-Schritte innerhalb der Grenzen.</translation>
     </message>
     <message>
         <source>closed form</source>
-        <translation type="unfinished"></translation>
+        <translation>geschlossene Form</translation>
     </message>
     <message>
         <source>Equation 2.4: the last two joints bend together, DIP = 2/3 PIP.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gleichung 2.4: Die letzten beiden Gelenke beugen sich gemeinsam, DIP = 2/3 PIP.</translation>
     </message>
     <message>
         <source>full: every joint by itself</source>
-        <translation type="unfinished"></translation>
+        <translation>voll: jedes Gelenk für sich</translation>
     </message>
     <message>
         <source>27 degrees of freedom. The default.</source>
-        <translation type="unfinished"></translation>
+        <translation>27 Freiheitsgrade. Der Standard.</translation>
     </message>
     <message>
         <source>coupled: last joints follow</source>
-        <translation type="unfinished"></translation>
+        <translation>gekoppelt: letzte Gelenke folgen</translation>
     </message>
     <message>
         <source>DIP = 2/3 PIP, and the middle finger does not spread. Steadier with markers on the tips only; wrong for a fingertip that is pushed back.</source>
-        <translation type="unfinished"></translation>
+        <translation>DIP = 2/3 PIP, und der Mittelfinger spreizt sich nicht. Ruhiger mit Markern nur an den Spitzen; falsch bei einer Fingerspitze, die zurückgedrückt wird.</translation>
     </message>
     <message>
         <source>anatomical: what hands do</source>
-        <translation type="unfinished"></translation>
+        <translation>anatomisch: was Hände können</translation>
     </message>
     <message>
         <source>How far each joint goes in living hands. The default.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie weit jedes Gelenk bei lebenden Händen geht. Der Standard.</translation>
     </message>
     <message>
         <source>thesis: equation 2.1</source>
-        <translation type="unfinished"></translation>
+        <translation>Arbeit: Gleichung 2.1</translation>
     </message>
     <message>
         <source>The thesis&apos;s ranges, for comparing with it; some are too narrow for living hands.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Bereiche der Arbeit, zum Vergleich mit ihr; einige sind für lebende Hände zu eng.</translation>
     </message>
     <message>
         <source>Paint</source>
-        <translation type="unfinished"></translation>
+        <translation>Farbe</translation>
     </message>
     <message>
         <source>The painted markers of the rig&apos;s marker set.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die bemalten Marker des Markersatzes des Rigs.</translation>
     </message>
     <message>
         <source>Landmarks</source>
-        <translation type="unfinished"></translation>
+        <translation>Landmarken</translation>
     </message>
     <message>
         <source>The joints that a detector finds on a bare hand, in the nodes or in another program. The rig&apos;s marker set is landmarks21 or another one with landmarks.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Gelenke, die ein Detektor an einer bloßen Hand findet, in den Knoten oder in einem anderen Programm. Der Markersatz des Rigs ist landmarks21 oder ein anderer mit Landmarken.</translation>
     </message>
     <message>
         <source>Contours</source>
-        <translation type="unfinished"></translation>
+        <translation>Konturen</translation>
     </message>
     <message>
         <source>No markers: the nodes search their pictures for the bare hand&apos;s edges. Calibrate, Background and skin comes first; then take the pose that the pictures show, and hold it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Keine Marker: Die Knoten suchen in ihren Bildern die Kanten der bloßen Hand. Zuerst kommt Kalibrieren, Hintergrund und Haut; dann die Pose einnehmen, die die Bilder zeigen, und halten.</translation>
     </message>
     <message>
         <source>Paint and contours</source>
-        <translation type="unfinished"></translation>
+        <translation>Farbe und Konturen</translation>
     </message>
     <message>
         <source>The hand&apos;s edges beside its painted markers, such as two fingertips. Calibrate, Background and skin comes first here, too.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Kanten der Hand neben ihren bemalten Markern, etwa zwei Fingerspitzen. Auch hier kommt zuerst Kalibrieren, Hintergrund und Haut.</translation>
     </message>
     <message>
         <source>Landmarks and contours</source>
-        <translation type="unfinished"></translation>
+        <translation>Landmarken und Konturen</translation>
     </message>
     <message>
         <source>The bare hand&apos;s edges beside a detector&apos;s landmarks, which find the hand at once. Calibrate, Background and skin comes first here, too.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Kanten der bloßen Hand neben den Landmarken eines Detektors, die die Hand sofort finden. Auch hier kommt zuerst Kalibrieren, Hintergrund und Haut.</translation>
     </message>
     <message>
         <source>The rig&apos;s marker set has landmarks, no paint: they are tracked. Choose Landmarks to say so.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Markersatz des Rigs hat Landmarken, keine Farbe: Sie werden verfolgt. Landmarken auswählen, um es festzulegen.</translation>
     </message>
     <message>
         <source>The hand lies flat, as the 3-D mouse has it: only forefinger, thumb and little finger move. Where a board on the table has placed the rig, the palm slides on the table, and one camera suffices.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand liegt flach, wie für die 3-D-Maus: Nur Zeigefinger, Daumen und kleiner Finger bewegen sich. Wo ein Brett auf dem Tisch das Rig verortet hat, gleitet die Handfläche auf dem Tisch, und eine Kamera genügt.</translation>
     </message>
     <message>
         <source>The hand&apos;s size is estimated as it moves, so that a hand file that is some percent too large or too small does no harm. Open and close the hand for half a minute.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Größe der Hand wird geschätzt, während sie sich bewegt, sodass eine um einige Prozent zu große oder zu kleine Handdatei nicht schadet. Die Hand eine halbe Minute lang öffnen und schließen.</translation>
     </message>
     <message>
         <source>No size yet: start, and show the hand.</source>
-        <translation type="unfinished"></translation>
+        <translation>Noch keine Größe: starten und die Hand zeigen.</translation>
     </message>
     <message>
         <source>{scale_text} of the rig&apos;s hand: not certain yet. Open and close the hand, and turn it.</source>
-        <translation type="unfinished"></translation>
+        <translation>{scale_text} der Hand des Rigs: noch nicht sicher. Die Hand öffnen, schließen und drehen.</translation>
     </message>
     <message>
         <source>{scale_text} of the rig&apos;s hand: it fits ({before:.0f} mm from wrist to middle fingertip).</source>
-        <translation type="unfinished"></translation>
+        <translation>{scale_text} der Hand des Rigs: passt ({before:.0f} mm vom Handgelenk zur Mittelfingerspitze).</translation>
     </message>
     <message>
         <source>{scale_text} of the rig&apos;s hand: {after:.0f} mm long instead of {before:.0f} mm.</source>
-        <translation type="unfinished"></translation>
+        <translation>{scale_text} der Hand des Rigs: {after:.0f} mm lang statt {before:.0f} mm.</translation>
     </message>
     <message>
         <source>a moment left</source>
-        <translation type="unfinished"></translation>
+        <translation>gleich fertig</translation>
     </message>
     <message>
         <source>about {left:.0f} s left</source>
-        <translation type="unfinished"></translation>
+        <translation>noch etwa {left:.0f} s</translation>
     </message>
     <message>
         <source>about {left:.0f} min left</source>
-        <translation type="unfinished"></translation>
+        <translation>noch etwa {left:.0f} min</translation>
     </message>
     <message>
         <source>good</source>
-        <translation type="unfinished"></translation>
+        <translation>gut</translation>
     </message>
     <message>
         <source>May be used as it is.</source>
-        <translation type="unfinished"></translation>
+        <translation>Kann so benutzt werden.</translation>
     </message>
     <message>
         <source>usable</source>
-        <translation type="unfinished"></translation>
+        <translation>brauchbar</translation>
     </message>
     <message>
         <source>May be used; better is possible.</source>
-        <translation type="unfinished"></translation>
+        <translation>Kann benutzt werden; es geht besser.</translation>
     </message>
     <message>
         <source>not usable</source>
-        <translation type="unfinished"></translation>
+        <translation>unbrauchbar</translation>
     </message>
     <message>
         <source>Must not be used.</source>
-        <translation type="unfinished"></translation>
+        <translation>Darf nicht benutzt werden.</translation>
     </message>
     <message numerus="yes">
         <source>{n} &amp;more</source>
         <comment>{n} &amp;more</comment>
-        <translation type="unfinished">
-            <numerusform></numerusform>
-            <numerusform></numerusform>
+        <translation>
+            <numerusform>{n} &amp;mehr</numerusform>
+            <numerusform>{n} &amp;mehr</numerusform>
         </translation>
     </message>
     <message>
         <source>Advice</source>
-        <translation type="unfinished"></translation>
+        <translation>Meldungen</translation>
     </message>
     <message>
         <source>Take this pose with {hands}, and hold it</source>
-        <translation type="unfinished"></translation>
+        <translation>Diese Pose mit {hands} einnehmen und halten</translation>
     </message>
     <message>
         <source>Take this pose</source>
-        <translation type="unfinished"></translation>
+        <translation>Diese Pose einnehmen</translation>
     </message>
     <message>
         <source>the hand</source>
         <comment>Take this pose with the hand</comment>
-        <translation type="unfinished"></translation>
+        <translation>der Hand</translation>
     </message>
     <message>
         <source>Picture of camera {name}</source>
-        <translation type="unfinished"></translation>
+        <translation>Bild der Kamera {name}</translation>
     </message>
     <message>
         <source>Camera {name}: what it saw a moment ago, and the markers found in that picture.
 A full ring is a marker seen whole, a broken ring one that is half hidden or doubtful.
 Names stand in large pictures, and in small ones while the mouse is over them.
 Of a bare hand: green its outline, blue contours within it, red the edges that are its, yellow others; white a pose that the hand is to take before it is followed.</source>
-        <translation type="unfinished"></translation>
+        <translation>Kamera {name}: was sie eben gesehen hat, und die Marker, die in diesem Bild gefunden wurden.
+Ein voller Ring ist ein ganz gesehener Marker, ein unterbrochener ein halb verdeckter oder zweifelhafter.
+Namen stehen in großen Bildern, und in kleinen, solange die Maus darüber ist.
+Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, die zu ihr gehören, gelb andere; weiß eine Pose, die die Hand einnehmen soll, bevor sie verfolgt wird.</translation>
     </message>
     <message>
         <source>no picture yet</source>
-        <translation type="unfinished"></translation>
+        <translation>noch kein Bild</translation>
     </message>
     <message>
         <source>each hand</source>
         <comment>Take this pose with each hand</comment>
-        <translation type="unfinished"></translation>
+        <translation>jeder Hand</translation>
     </message>
     <message>
         <source>the left hand</source>
         <comment>Take this pose with the left hand</comment>
-        <translation type="unfinished"></translation>
+        <translation>der linken Hand</translation>
     </message>
     <message>
         <source>the right hand</source>
         <comment>Take this pose with the right hand</comment>
-        <translation type="unfinished"></translation>
+        <translation>der rechten Hand</translation>
     </message>
     <message>
         <source>Pictures appear here once a rig is open and its nodes answer.</source>
-        <translation type="unfinished"></translation>
+        <translation>Hier erscheinen Bilder, sobald ein Rig geöffnet ist und seine Knoten antworten.</translation>
     </message>
     <message>
         <source>spread</source>
-        <translation type="unfinished"></translation>
+        <translation>spreizen</translation>
     </message>
     <message>
         <source>turn</source>
-        <translation type="unfinished"></translation>
+        <translation>drehen</translation>
     </message>
     <message>
         <source>palm</source>
-        <translation type="unfinished"></translation>
+        <translation>Handfläche</translation>
     </message>
     <message>
         <source>; size {size}</source>
-        <translation type="unfinished"></translation>
+        <translation>; Größe {size}</translation>
     </message>
     <message>
         <source>Show the {hand}&apos;s angles. It is {word}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Winkel zeigen: {hand}. Zustand: {word}.</translation>
     </message>
     <message>
         <source>not tracking</source>
-        <translation type="unfinished"></translation>
+        <translation>keine Verfolgung</translation>
     </message>
     <message>
         <source>The nodes do not stream. Press Start.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Knoten senden nicht. Start drücken.</translation>
     </message>
     <message>
         <source>not seen</source>
-        <translation type="unfinished"></translation>
+        <translation>nicht gesehen</translation>
     </message>
     <message>
         <source>Nothing has been seen of it for a second.</source>
-        <translation type="unfinished"></translation>
+        <translation>Seit einer Sekunde war nichts davon zu sehen.</translation>
     </message>
     <message>
         <source>No rig is open.</source>
-        <translation type="unfinished"></translation>
+        <translation>Kein Rig ist geöffnet.</translation>
     </message>
     <message>
         <source>Node {name}: {word}, {rate}, {losses}, {clock}</source>
-        <translation type="unfinished"></translation>
+        <translation>Knoten {name}: {word}, {rate}, {losses}, {clock}</translation>
     </message>
     <message>
         <source>No word from the engine about its nodes.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine sagt nichts über ihre Knoten.</translation>
     </message>
     <message>
         <source>AMBIGUOUS</source>
-        <translation type="unfinished"></translation>
+        <translation>MEHRDEUTIG</translation>
     </message>
     <message>
         <source>PREDICTED</source>
-        <translation type="unfinished"></translation>
+        <translation>VORHERGESAGT</translation>
     </message>
     <message>
         <source>No camera has seen it yet. Are its tags in sight, sharp and at least 20 px large?</source>
-        <translation type="unfinished"></translation>
+        <translation>Noch keine Kamera hat es gesehen. Sind seine Tags im Blick, scharf und mindestens 20 px groß?</translation>
     </message>
     <message>
         <source>Seen within the last tenth of a second.</source>
-        <translation type="unfinished"></translation>
+        <translation>In der letzten Zehntelsekunde gesehen.</translation>
     </message>
     <message>
         <source>Two poses explain its tags. Show a second tag, or the tag to a second camera.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zwei Posen erklären seine Tags. Einen zweiten Tag zeigen oder den Tag einer zweiten Kamera.</translation>
     </message>
     <message>
         <source>Not seen for a tenth of a second; it is where it would be if it went on moving.</source>
-        <translation type="unfinished"></translation>
+        <translation>Seit einer Zehntelsekunde nicht gesehen; es ist dort, wo es wäre, wenn es sich weiterbewegte.</translation>
     </message>
     <message>
         <source>Not seen for half a second.</source>
-        <translation type="unfinished"></translation>
+        <translation>Seit einer halben Sekunde nicht gesehen.</translation>
     </message>
     <message>
         <source>{name}: no state yet</source>
-        <translation type="unfinished"></translation>
+        <translation>{name}: noch kein Zustand</translation>
     </message>
     <message>
         <source>{finger} touches</source>
-        <translation type="unfinished"></translation>
+        <translation>{finger} berührt</translation>
     </message>
     <message>
         <source>State: {word} {rate}</source>
-        <translation type="unfinished"></translation>
+        <translation>Zustand: {word} {rate}</translation>
     </message>
     <message>
         <source>Jitter per marker</source>
-        <translation type="unfinished"></translation>
+        <translation>Jitter je Marker</translation>
     </message>
     <message>
         <source>mm rms</source>
-        <translation type="unfinished"></translation>
+        <translation>mm rms</translation>
     </message>
     <message>
         <source>Latency by stage</source>
-        <translation type="unfinished"></translation>
+        <translation>Latenz nach Stufen</translation>
     </message>
     <message>
         <source>budget</source>
-        <translation type="unfinished"></translation>
+        <translation>Budget</translation>
     </message>
     <message>
         <source>all</source>
-        <translation type="unfinished"></translation>
+        <translation>alles</translation>
     </message>
     <message>
         <source>p50 of all</source>
-        <translation type="unfinished"></translation>
+        <translation>p50 von allem</translation>
     </message>
     <message>
         <source>p99 of all</source>
-        <translation type="unfinished"></translation>
+        <translation>p99 von allem</translation>
     </message>
     <message>
         <source>Rate and losses</source>
-        <translation type="unfinished"></translation>
+        <translation>Rate und Verluste</translation>
     </message>
     <message>
         <source>per second</source>
-        <translation type="unfinished"></translation>
+        <translation>pro Sekunde</translation>
     </message>
     <message>
         <source>states</source>
-        <translation type="unfinished"></translation>
+        <translation>Zustände</translation>
     </message>
     <message>
         <source>lost /s</source>
-        <translation type="unfinished"></translation>
+        <translation>Verluste /s</translation>
     </message>
     <message>
         <source>{name}: {value:.3g} {unit}, above the axis</source>
-        <translation type="unfinished"></translation>
+        <translation>{name}: {value:.3g} {unit}, über der Achse</translation>
     </message>
     <message>
         <source>{more} more: scroll</source>
-        <translation type="unfinished"></translation>
+        <translation>{more} weitere: scrollen</translation>
     </message>
     <message>
         <source>More buttons</source>
-        <translation type="unfinished"></translation>
+        <translation>Weitere Knöpfe</translation>
     </message>
     <message>
         <source>Pause</source>
-        <translation type="unfinished"></translation>
+        <translation>Pause</translation>
     </message>
     <message>
         <source>Stop the plot to look at it; the measurement goes on.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Diagramm anhalten, um es anzusehen; die Messung läuft weiter.</translation>
     </message>
     <message>
         <source>Reset</source>
-        <translation type="unfinished"></translation>
+        <translation>Neu</translation>
     </message>
     <message>
         <source>Begin the plot anew and fit the axes.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Diagramm neu beginnen und die Achsen anpassen.</translation>
     </message>
     <message>
         <source>Copy CSV</source>
-        <translation type="unfinished"></translation>
+        <translation>CSV</translation>
     </message>
     <message>
         <source>Copy what the plot shows to the clipboard as comma-separated text.</source>
-        <translation type="unfinished"></translation>
+        <translation>Was das Diagramm zeigt, als kommagetrennten Text in die Zwischenablage kopieren.</translation>
     </message>
     <message>
         <source>time before now [s]</source>
-        <translation type="unfinished"></translation>
+        <translation>Zeit vor jetzt [s]</translation>
     </message>
     <message numerus="yes">
         <source>Copied “{title}” to the clipboard: {n} row of comma-separated text.</source>
         <comment>Copied “{title}” to the clipboard: {n} rows of comma-separated text.</comment>
-        <translation type="unfinished">
-            <numerusform></numerusform>
-            <numerusform></numerusform>
+        <translation>
+            <numerusform>„{title}“ in die Zwischenablage kopiert: {n} Zeile kommagetrennter Text.</numerusform>
+            <numerusform>„{title}“ in die Zwischenablage kopiert: {n} Zeilen kommagetrennter Text.</numerusform>
         </translation>
     </message>
     <message>
         <source>“{title}” shows nothing yet, so only the headings were copied.</source>
-        <translation type="unfinished"></translation>
+        <translation>„{title}“ zeigt noch nichts, daher wurden nur die Überschriften kopiert.</translation>
     </message>
     <message>
         <source>up [mm]</source>
-        <translation type="unfinished"></translation>
+        <translation>oben [mm]</translation>
     </message>
     <message>
         <source>its uncertainty is not estimated</source>
-        <translation type="unfinished"></translation>
+        <translation>seine Unsicherheit ist nicht geschätzt</translation>
     </message>
     <message>
         <source>{spread} along the worst axis (one sigma)</source>
-        <translation type="unfinished"></translation>
+        <translation>{spread} entlang der schlechtesten Achse (ein Sigma)</translation>
     </message>
     <message>
         <source>marker {name}</source>
-        <translation type="unfinished"></translation>
+        <translation>Marker {name}</translation>
     </message>
     <message>
         <source>{finger} joint</source>
-        <translation type="unfinished"></translation>
+        <translation>Gelenk: {finger}</translation>
     </message>
     <message>
         <source>{finger} {name} joint</source>
-        <translation type="unfinished"></translation>
+        <translation>{name}-Gelenk: {finger}</translation>
     </message>
     <message>
         <source>true size</source>
-        <translation type="unfinished"></translation>
+        <translation>wahre Größe</translation>
     </message>
     <message>
         <source>drawn {factor} × larger</source>
-        <translation type="unfinished"></translation>
+        <translation>{factor} × größer gezeichnet</translation>
     </message>
     <message>
         <source>{sigma:.0f} sigma of the pictures alone</source>
-        <translation type="unfinished"></translation>
+        <translation>{sigma:.0f} sigma der Bilder allein</translation>
     </message>
     <message>
         <source>, cut at {most:.0f} mm</source>
-        <translation type="unfinished"></translation>
+        <translation>, bei {most:.0f} mm abgeschnitten</translation>
     </message>
     <message>
         <source>tracker: {tracker}</source>
-        <translation type="unfinished"></translation>
+        <translation>Tracker: {tracker}</translation>
     </message>
     <message>
         <source>Scene</source>
-        <translation type="unfinished"></translation>
+        <translation>Szene</translation>
     </message>
     <message>
         <source>Three-dimensional scene of the hand and the cameras</source>
-        <translation type="unfinished"></translation>
+        <translation>Dreidimensionale Szene mit der Hand und den Kameras</translation>
     </message>
     <message>
         <source>Start tracking</source>
-        <translation type="unfinished"></translation>
+        <translation>Verfolgung starten</translation>
     </message>
     <message>
         <source>Tell the nodes to stream (Space).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Knoten senden lassen (Leertaste).</translation>
     </message>
     <message>
         <source>Show or hide the panel.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Feld ein- oder ausblenden.</translation>
     </message>
     <message>
         <source>Holds still</source>
-        <translation type="unfinished"></translation>
+        <translation>Hält still</translation>
     </message>
     <message>
         <source>Waves</source>
-        <translation type="unfinished"></translation>
+        <translation>Winkt</translation>
     </message>
     <message>
         <source>Waves briskly</source>
-        <translation type="unfinished"></translation>
+        <translation>Winkt flott</translation>
     </message>
     <message>
         <source>Moves every joint</source>
-        <translation type="unfinished"></translation>
+        <translation>Bewegt jedes Gelenk</translation>
     </message>
     <message>
         <source>Moves and turns</source>
-        <translation type="unfinished"></translation>
+        <translation>Bewegt und dreht sich</translation>
     </message>
     <message>
         <source>Holds a tagged cube</source>
-        <translation type="unfinished"></translation>
+        <translation>Hält einen Würfel mit Tags</translation>
     </message>
     <message>
         <source>The hand waves with a cube of 40 mm that has a tag on each face. Rig, Add a tracked object offers its file.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand winkt mit einem Würfel von 40 mm, der auf jeder Seite einen Tag hat. Rig, Verfolgtes Objekt hinzufügen bietet seine Datei an.</translation>
     </message>
     <message>
         <source>Takes its markers off</source>
-        <translation type="unfinished"></translation>
+        <translation>Legt ihre Marker ab</translation>
     </message>
     <message>
         <source>A bare hand that opens and closes.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine bloße Hand, die sich öffnet und schließt.</translation>
     </message>
     <message>
         <source>Holds a bare hand still</source>
-        <translation type="unfinished"></translation>
+        <translation>Hält eine bloße Hand still</translation>
     </message>
     <message>
         <source>A bare hand that does not move. Calibrate, Tracker chooses what follows it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine bloße Hand, die sich nicht bewegt. Kalibrieren, Tracker wählt aus, was sie verfolgt.</translation>
     </message>
     <message>
         <source>Leaves the pictures</source>
-        <translation type="unfinished"></translation>
+        <translation>Verlässt die Bilder</translation>
     </message>
     <message>
         <source>The background alone: Calibrate, Background and skin begins with it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nur der Hintergrund: Damit beginnt Kalibrieren, Hintergrund und Haut.</translation>
     </message>
     <message>
         <source>Shows a board</source>
-        <translation type="unfinished"></translation>
+        <translation>Zeigt ein Brett</translation>
     </message>
     <message>
         <source>A chessboard of 9 x 6 corners, 25 mm squares, moved about with pauses.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Schachbrett mit 9 x 6 Ecken, Felder von 25 mm, mit Pausen umherbewegt.</translation>
     </message>
     <message>
         <source>Lays the board on the table</source>
-        <translation type="unfinished"></translation>
+        <translation>Legt das Brett auf den Tisch</translation>
     </message>
     <message>
         <source>The same board, lying on the table.</source>
-        <translation type="unfinished"></translation>
+        <translation>Dasselbe Brett, auf dem Tisch liegend.</translation>
     </message>
     <message>
         <source>Shows a ruler</source>
-        <translation type="unfinished"></translation>
+        <translation>Zeigt ein Lineal</translation>
     </message>
     <message>
         <source>A paper ruler with two crosses, 200 mm apart.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Papierlineal mit zwei Kreuzen im Abstand von 200 mm.</translation>
     </message>
     <message>
         <source>One painted ball, {distance} cm from the cameras, before the middle between them.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine bemalte Kugel, {distance} cm von den Kameras entfernt, mittig vor ihnen.</translation>
     </message>
     <message>
         <source>Shows one marker at</source>
-        <translation type="unfinished"></translation>
+        <translation>Zeigt einen Marker bei</translation>
     </message>
     <message>
         <source>Another motion</source>
-        <translation type="unfinished"></translation>
+        <translation>Andere Bewegung</translation>
     </message>
     <message>
         <source>A cap on the lens of the camera {name}: it sees nothing until it is taken off.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Kappe auf dem Objektiv der Kamera {name}: Sie sieht nichts, bis sie abgenommen wird.</translation>
     </message>
     <message>
         <source>The simulated cameras have stopped.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die simulierten Kameras sind stehen geblieben.</translation>
     </message>
     <message>
         <source>Start them again</source>
-        <translation type="unfinished"></translation>
+        <translation>Neu starten</translation>
     </message>
     <message>
         <source>This engine was started outside the app; closing the app lets it run on.</source>
-        <translation type="unfinished"></translation>
+        <translation>Diese Engine wurde außerhalb der App gestartet; sie läuft weiter, wenn die App schließt.</translation>
     </message>
     <message>
         <source>Recording to {path} ({size}).</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahme in {path} ({size}).</translation>
     </message>
     <message>
         <source>REC {size}</source>
-        <translation type="unfinished"></translation>
+        <translation>REC {size}</translation>
     </message>
     <message>
         <source>Recording to {path}. A click here, or B, sets a bookmark.</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahme in {path}. Ein Klick hier oder B setzt ein Lesezeichen.</translation>
     </message>
     <message>
         <source>REPLAY {name}</source>
-        <translation type="unfinished"></translation>
+        <translation>WIEDERGABE {name}</translation>
     </message>
     <message>
         <source>An engine replays {path}; Start replays it again.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Engine spielt {path} ab; Start spielt es noch einmal ab.</translation>
     </message>
     <message>
         <source>Calibrate …</source>
-        <translation type="unfinished"></translation>
+        <translation>Kalibrieren …</translation>
     </message>
     <message>
         <source>This computer renders the simulated cameras at {achieved:.0f} of {preset:.0f} Hz; the tracking is real all the same.</source>
-        <translation type="unfinished"></translation>
+        <translation>Dieser Rechner rendert die simulierten Kameras mit {achieved:.0f} von {preset:.0f} Hz; die Verfolgung ist trotzdem echt.</translation>
     </message>
     <message>
         <source>The engine stopped. The app is starting it again; the nodes re-join by themselves.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine ist stehen geblieben. Die App startet sie neu; die Knoten melden sich von selbst wieder an.</translation>
     </message>
     <message>
         <source>The engine stopped and could not be started again.{reason}</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine ist stehen geblieben und ließ sich nicht neu starten.{reason}</translation>
     </message>
     <message>
         <source>Try again</source>
-        <translation type="unfinished"></translation>
+        <translation>Noch einmal</translation>
     </message>
     <message>
         <source>One moment. Cancel ends what was started.</source>
-        <translation type="unfinished"></translation>
+        <translation>Einen Moment. Abbrechen beendet, was gestartet wurde.</translation>
     </message>
     <message>
         <source>Choose how to begin. F1 opens the guide.</source>
-        <translation type="unfinished"></translation>
+        <translation>Auswählen, womit es losgehen soll. F1 öffnet die Anleitung.</translation>
     </message>
     <message>
         <source>Press Start, or the space bar, to begin tracking.</source>
-        <translation type="unfinished"></translation>
+        <translation>Start oder die Leertaste drücken, um mit der Verfolgung zu beginnen.</translation>
     </message>
     <message>
         <source>Everything is in order.</source>
-        <translation type="unfinished"></translation>
+        <translation>Alles ist in Ordnung.</translation>
     </message>
     <message>
         <source>The rig was saved to {path}. What stood there before is kept in {name}.history.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Rig wurde in {path} gespeichert. Was dort stand, bleibt in {name}.history erhalten.</translation>
     </message>
     <message>
         <source>Add a tracked object</source>
-        <translation type="unfinished"></translation>
+        <translation>Verfolgtes Objekt hinzufügen</translation>
     </message>
     <message>
         <source>Object files (*.json);;All files (*)</source>
-        <translation type="unfinished"></translation>
+        <translation>Objektdateien (*.json);;Alle Dateien (*)</translation>
     </message>
     <message>
         <source>Take {name} out of the rig; its file stays.</source>
-        <translation type="unfinished"></translation>
+        <translation>{name} aus dem Rig nehmen; die Datei bleibt.</translation>
     </message>
     <message>
         <source>{name} is tracked from now on, and stands in the rig.</source>
-        <translation type="unfinished"></translation>
+        <translation>{name} wird von jetzt an verfolgt und steht im Rig.</translation>
     </message>
     <message>
         <source>{name} is not tracked any more.</source>
-        <translation type="unfinished"></translation>
+        <translation>{name} wird nicht mehr verfolgt.</translation>
     </message>
     <message>
         <source>{words} Calibrate, Bring back an earlier calibration undoes it.</source>
-        <translation type="unfinished"></translation>
+        <translation>{words} Kalibrieren, Frühere Kalibrierung zurückholen macht es rückgängig.</translation>
     </message>
     <message>
         <source>How do you want to begin?</source>
-        <translation type="unfinished"></translation>
+        <translation>Womit soll es losgehen?</translation>
     </message>
     <message>
         <source>RHOT tracks a hand with cheap cameras: a bare hand with one, a hand that wears six colour markers with two. No camera at hand? The simulated rig shows everything.</source>
-        <translation type="unfinished"></translation>
+        <translation>RHOT verfolgt eine Hand mit günstigen Kameras: eine bloße Hand mit einer, eine Hand mit sechs Farbmarkern mit zwei. Keine Kamera zur Hand? Das simulierte Rig zeigt alles.</translation>
     </message>
     <message>
         <source>What the simulated hand does.</source>
-        <translation type="unfinished"></translation>
+        <translation>Was die simulierte Hand tut.</translation>
     </message>
     <message>
         <source>Motion of the simulated hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Bewegung der simulierten Hand</translation>
     </message>
     <message>
         <source>Start the simulated rig</source>
-        <translation type="unfinished"></translation>
+        <translation>Simuliertes Rig starten</translation>
     </message>
     <message>
         <source>Open a rig file …</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig-Datei öffnen …</translation>
     </message>
     <message>
         <source>Choose cameras …</source>
-        <translation type="unfinished"></translation>
+        <translation>Kameras auswählen …</translation>
     </message>
     <message>
         <source>Two simulated cameras look at a simulated hand, through real node programs and the real network path.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zwei simulierte Kameras sehen eine simulierte Hand, über echte Knotenprogramme und den echten Weg durchs Netz.</translation>
     </message>
     <message>
         <source>Cameras of this computer</source>
-        <translation type="unfinished"></translation>
+        <translation>Kameras dieses Rechners</translation>
     </message>
     <message>
         <source>A webcam or two, films, or a network camera such as a phone. One is enough to begin with a bare hand.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Webcam oder zwei, Filme oder eine Netzwerkkamera wie ein Telefon. Für den Anfang genügt eine, mit bloßer Hand.</translation>
     </message>
     <message>
         <source>Two nodes</source>
-        <translation type="unfinished"></translation>
+        <translation>Zwei Knoten</translation>
     </message>
     <message>
         <source>Enter the addresses of two Raspberry Pis that run rhot-node, see whether they answer, and write a first rig file.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Adressen zweier Raspberry Pis eingeben, auf denen rhot-node läuft, prüfen, ob sie antworten, und eine erste Rig-Datei schreiben.</translation>
     </message>
     <message>
         <source>Rig file</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig-Datei</translation>
     </message>
     <message>
         <source>A rig that was set up before: its cameras, lenses, marker set and hand.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Rig, das schon eingerichtet ist: Kameras, Objektive, Markersatz und Hand.</translation>
     </message>
     <message>
         <source>Cancel</source>
-        <translation type="unfinished"></translation>
+        <translation>Abbrechen</translation>
     </message>
     <message>
         <source>Open {name}</source>
-        <translation type="unfinished"></translation>
+        <translation>{name} öffnen</translation>
     </message>
     <message>
         <source>The rig opened last: {name}</source>
-        <translation type="unfinished"></translation>
+        <translation>Das zuletzt geöffnete Rig: {name}</translation>
     </message>
 </context>
 </TS>

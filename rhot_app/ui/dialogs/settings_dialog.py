@@ -103,7 +103,7 @@ class GeneralPage(QWidget):
         self.language_note = QLabel()
         speaks = QHBoxLayout()
         speaks.addWidget(self.language_box, 1)
-        speaks.addWidget(self.language_note, 1)
+        speaks.addWidget(self.language_note)
         self.start_box.setToolTip(tr("What the app opens when it starts without a rig. An engine that runs already "
                                      "comes first."))
         for name, words in STARTS:

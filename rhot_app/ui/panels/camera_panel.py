@@ -91,7 +91,7 @@ class CameraView(QWidget):
         self._image, self._frame, self.marks, self.contours = image, (preview.width, preview.height), [], []
         if len(preview.pixels) == len(markers.ids):
             doubtful = int(MarkerFlag.PARTIAL | MarkerFlag.AMBIGUOUS)
-            self.marks = [Mark(QPointF(float(x), float(y)), short_name(marker.id),
+            self.marks = [Mark(QPointF(float(x), float(y)), tr(short_name(marker.id)),
                                visible_on(hex_of(marker.display_rgb), "#000000", 3.0), not int(flag) & doubtful)
                           for (x, y), flag, marker in zip(preview.pixels, preview.flags, markers.markers, strict=True)
                           if np.isfinite(x) and np.isfinite(y)]

@@ -164,7 +164,7 @@ class RatePlot(PlotPanel):
             colour = self._scheme.text if k == 0 else STAGE_COLOURS[(k - 1) % len(STAGE_COLOURS)]
             dash = DASHES[k % len(DASHES)]
             self._curves.append(self.plot.plot(pen=pg.mkPen(colour, width=2, style=dash), connect="finite"))
-            entries.append(LegendEntry(tr(name), colour, dash))
+            entries.append(LegendEntry(name if k else tr(name), colour, dash))
         entries.append(LegendEntry(tr("lost /s"), self._scheme.bad, Qt.PenStyle.SolidLine, band=True))
         self._bars.setOpts(brush=self._scheme.bad, pen=pg.mkPen(self._scheme.bad))
         self.legend.set_entries(entries)

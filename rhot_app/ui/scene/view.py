@@ -224,7 +224,7 @@ class SceneView(GLViewWidget):
                  and not (marker.role or "").endswith(("_tip", "_wrist"))}
         named = [k for k, name in enumerate(self._state.marker_ids) if name not in inner]
         return (to_display(self._state.marker_positions[named]),
-                [short_name(self._state.marker_ids[k]) for k in named])
+                [tr(short_name(self._state.marker_ids[k])) for k in named])
 
     def _projection(self) -> QMatrix4x4:
         return self.projectionMatrix(self.getViewport(), self.getViewport()) * self.viewMatrix()
