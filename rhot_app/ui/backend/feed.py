@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker, Listener
+from rhot_app.ui.common.language import tr
 from rhot_node.errors import PictureError
 from rhot_node.pictures import decode_picture
 
@@ -160,7 +161,8 @@ def ask_picture(command: Callable[..., dict[str, Any]], camera: str, node_id: in
     try:
         bgr = decode_picture(jpeg if isinstance(jpeg, bytes) else b"")
     except PictureError as exc:
-        raise EngineError(f"camera {camera} gave a picture that cannot be read; restart its node.") from exc
+        raise EngineError(tr("camera {camera} gave a picture that cannot be read; restart its node.",
+                             camera=camera)) from exc
     bgr.setflags(write=False)
     return Picture(camera, bgr, int(about.get("number", 0)),
                    int(about.get("t_node_ns", 0)), received_ns)

@@ -12,6 +12,7 @@ from rhot_app.progress import Progress
 from rhot_app.project import Rig, RigNode, load_rig
 from rhot_app.sources.discovery import Search, find_nodes
 from rhot_app.sources.pairing import TIMEOUT_S, Introduction, NodeAddress, ask_who, pair
+from rhot_app.ui.common.language import tr
 from rhot_node.files import resource_path
 
 
@@ -39,12 +40,13 @@ class NodeAnswer:
         """The answer in a sentence or two."""
         if self.who is None:
             return self.error
-        begin = f"{self.who.name} (id {self.who.node_id}) answers; it is {self.who.state}."
+        begin = tr("{name} (id {node_id}) answers; it is {state}.", name=self.who.name, node_id=self.who.node_id,
+                   state=tr(self.who.state))
         if self.paired:
-            return f"{begin} Paired with this computer."
+            return tr("{begin} Paired with this computer.", begin=begin)
         if self.who.trust == "open":
-            return f"{begin} Open: anybody on the network may see its pictures and steer it."
-        return f"{begin} Not paired with this computer: press Pair."
+            return tr("{begin} Open: anybody on the network may see its pictures and steer it.", begin=begin)
+        return tr("{begin} Not paired with this computer: press Pair.", begin=begin)
 
 
 def look_for_nodes(progress: Progress) -> Search:
@@ -74,10 +76,11 @@ def first_rig(answers: list[NodeAnswer]) -> Rig:
     """
     usable = [answer for answer in answers if answer.usable]
     if len(usable) != 2:
-        raise SourceError("A rig needs two nodes that answer and are paired with this computer.")
+        raise SourceError(tr("A rig needs two nodes that answer and are paired with this computer."))
     ids = [answer.who.node_id for answer in usable if answer.who is not None]
     if ids[0] == ids[1]:
-        raise SourceError(f"Both nodes have the id {ids[0]}; give one another node_id in its settings file.")
+        raise SourceError(tr("Both nodes have the id {ids}; give one another node_id in its settings file.",
+                             ids=ids[0]))
     template = load_rig(resource_path("rigs", "two_pis.json"))
     nodes = tuple(_with_address(node, answer) for node, answer in zip(template.nodes, usable, strict=True))
     return msgspec.structs.replace(template, nodes=nodes)

@@ -32,6 +32,7 @@ from rhot_app.errors import EngineError, RecordingError, RhotError, SimulatorErr
 from rhot_app.project import load_rig, parse_rig, save_rig, with_tracker
 from rhot_app.sources.cameras.camera_set import camera_set_of
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_node.compiled import WINDOW
 from rhot_node.terminal import before
 
@@ -90,7 +91,7 @@ class Session:
 
     def attach(self, report: Report) -> Opened:
         """Attach to the engine that runs here, whoever started it; raises EngineError when it does not answer."""
-        report("Attaching to the running engine …", 0.5)
+        report(tr("Attaching to the running engine …"), 0.5)
         ours = self._engine_is_ours()
         with EngineClient(self._place.path, states=False) as client:
             hello = client.command("hello")
@@ -105,7 +106,7 @@ class Session:
     def open_rig(self, path: Path, report: Report) -> Opened:
         """End what the app ran before and start an engine on `path`, and before it the cameras of this computer that
         belong to that rig; raises RigError, SourceError or EngineError."""
-        report("Reading the rig file …", 0.1)
+        report(tr("Reading the rig file …"), 0.1)
         rig, cameras = load_rig(path), camera_set_of(path)
         self._clear(report)
         self._compile(part_of(rig), report)
@@ -118,7 +119,7 @@ class Session:
         """Start the simulated nodes, then an engine on the rig that they write; raises SimulatorError, EngineError."""
         self._clear(report)
         self._compile(WINDOW, report)
-        report("Starting two simulated cameras …", 0.15)
+        report(tr("Starting two simulated cameras …"), 0.15)
         rig_path = self._start_twin(choice, report)
         rig = with_tracker(load_rig(rig_path), choice.tracker)
         save_rig(rig_path, rig)
@@ -129,8 +130,8 @@ class Session:
         """Start the engine again after it died or hangs: on the same rig, and it continues what it recorded. `start`
         has it tell the nodes to stream at once."""
         if not path:
-            raise EngineError("The engine had no rig file, so it cannot be started again. Open a rig.")
-        report("Starting the engine again …", 0.3)
+            raise EngineError(tr("The engine had no rig file, so it cannot be started again. Open a rig."))
+        report(tr("Starting the engine again …"), 0.3)
         if self.found() and self._recorded_log() is None:
             self._require_ours()
             end_started(self._place, [ENGINE_ROLE], HUNG_S)
@@ -175,7 +176,7 @@ class Session:
         """End all that apps started here. An engine that somebody started by hand goes on."""
         left = self.found() and not self._engine_is_ours()
         self.give_up()
-        return (f"The engine in {self._place.path} was not started by this app and goes on running."
+        return (tr("The engine in {path} was not started by this app and goes on running.", path=self._place.path)
                 if left else "")
 
     def _twin(self) -> TwinRemote:
@@ -191,7 +192,7 @@ class Session:
         if self.found():
             self._require_ours()
             self._require_not_recording()
-        report("Ending what ran before …", 0.12)
+        report(tr("Ending what ran before …"), 0.12)
         self._twin_started = False
         end_started(self._place)
 
@@ -199,14 +200,14 @@ class Session:
         """Raises RecordingError when the engine that is to be replaced records, or did when it fell silent."""
         log_path = self._recorded_log()
         if log_path:
-            raise RecordingError(f"The engine in {self._place.path} records to {log_path}. Stop that recording "
-                                 "first, or start with another --directory.")
+            raise RecordingError(tr("The engine in {path} records to {log_path}. Stop that recording first, or start "
+                                    "with another --directory.", path=self._place.path, log_path=log_path))
         activity = read_activity(self._place) if log_path is None else None
         if activity is not None and activity.log_path:
             pid = running_engine(self._place.path)
-            raise RecordingError(f"The engine in {self._place.path} records to {activity.log_path} and gives no answer "
-                                 f"in {ANSWER_S:g} s. Try again, or end it with `kill {pid}`; what it has recorded is "
-                                 "kept.")
+            raise RecordingError(tr("The engine in {path} records to {log_path} and gives no answer in {limit:g} s. "
+                                    "Try again, or end it with `kill {pid}`; what it has recorded is kept.",
+                                    path=self._place.path, log_path=activity.log_path, limit=ANSWER_S, pid=pid))
 
     def _recorded_log(self) -> str | None:
         """What the running engine records, "" for nothing; None when it gives no answer."""
@@ -216,16 +217,16 @@ class Session:
 
     def _require_ours(self) -> None:
         if not self._engine_is_ours():
-            raise EngineError(f"An engine that was started by hand runs in {self._place.path}. Stop it first, or start "
-                              "the app with another --directory.")
+            raise EngineError(tr("An engine that was started by hand runs in {path}. Stop it first, or start the app "
+                                 "with another --directory.", path=self._place.path))
 
     def _compile(self, part: str, report: Report) -> None:
         compile_part(part, report, lambda pid: remember_process(self._place, pid, COMPILER_ROLE))
 
     def _start_engine(self, path: Path, report: Report) -> Opened:
-        report("Starting the engine …", 0.5)
+        report(tr("Starting the engine …"), 0.5)
         ensure_engine(path, self._place.path, timeout_s=START_TIMEOUT_S)
-        report("Asking the engine for its rig …", 0.9)
+        report(tr("Asking the engine for its rig …"), 0.9)
         return self.attach(lambda text, fraction: None)
 
     def _start_twin(self, choice: TwinChoice, report: Report) -> Path:
@@ -236,7 +237,8 @@ class Session:
                    "--seed", str(choice.seed), "--preset", choice.preset,
                    "--directory", str(self._place.path), "--rig", str(rig_path),
                    "--while-locked", str(self._place.lock_file)]
-        self._start_nodes(command, TWIN_ROLE, output, errors, _Words("simulated cameras", 2, SimulatorError), report)
+        self._start_nodes(command, TWIN_ROLE, output, errors, _Words(tr_noop("simulated cameras"), 2, SimulatorError),
+                          report)
         self._twin_started = True
         return rig_path
 
@@ -246,7 +248,7 @@ class Session:
         command = [*CAMERAS_COMMAND, "--rig", str(rig_path.absolute()), "--log", str(errors), "--while-locked",
                    str(self._place.lock_file)]
         self._start_nodes(command, CAMERAS_ROLE, self._place.path / CAMERAS_OUTPUT, errors,
-                          _Words("cameras", count, SourceError), report)
+                          _Words(tr_noop("cameras"), count, SourceError), report)
 
     def _start_nodes(self, command: list[str], role: str, output: Path, errors: Path, words: _Words,
                      report: Report) -> None:
@@ -281,12 +283,13 @@ def _await_ready(process: subprocess.Popen[bytes], output: Path, errors: Path, w
             return
         if process.poll() is not None:
             lines = errors.read_text(errors="replace").strip().splitlines()
-            raise words.error(f"The {words.what} did not start: "
-                              f"{lines[-1] if lines else f'they said nothing; see {errors}'}")
-        report(f"Starting {words.count} {words.what if words.count > 1 else words.what.removesuffix('s')} …",
+            said = lines[-1] if lines else tr("they said nothing; see {errors}", errors=errors)
+            raise words.error(tr("The {what} did not start: {said}", what=tr(words.what), said=said))
+        report(tr("Starting {n} camera …", "Starting {n} cameras …", words.count),
                0.15 + 0.3 * min(1.0, (time.monotonic() - begin) / 15.0))
         time.sleep(0.05)
-    raise words.error(f"The {words.what} were not ready within {START_TIMEOUT_S:.0f} s; see {errors}.")
+    raise words.error(tr("The {what} were not ready within {limit:.0f} s; see {errors}.", what=tr(words.what),
+                         limit=START_TIMEOUT_S, errors=errors))
 
 
 def show_named(what: str) -> Show:
@@ -317,7 +320,7 @@ def show_named(what: str) -> Show:
                 return RulerShow()
             case "marker":
                 return MarkerShow(distance_m=float(detail))
-    raise SimulatorError(f"The simulated rig has no {what!r} to show.")
+    raise SimulatorError(tr("The simulated rig has no {what!r} to show.", what=what))
 
 
 def key_of(show: Show) -> str:

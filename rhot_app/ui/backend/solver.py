@@ -18,6 +18,7 @@ from typing import Any
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress
 from rhot_app.ui.backend.solver_process import NICENESS
+from rhot_app.ui.common.language import tr
 
 _COMMAND = (sys.executable, "-m", "rhot_app.ui.backend.solver_process")
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -69,8 +70,9 @@ class Solver:
             self._end(process)
             if stopped:
                 raise StoppedError("Stopped.") from exc
-            raise CalibrationError("The process that computes ended unexpectedly; try again. If it happens again, it "
-                                   "may have run out of memory: use fewer pictures or a shorter recording.") from exc
+            raise CalibrationError(tr("The process that computes ended unexpectedly; try again. If it happens again, "
+                                      "it may have run out of memory: use fewer pictures or a shorter "
+                                      "recording.")) from exc
         except BaseException:  # whoever watches the progress wants no more of it
             self._end(process)
             raise

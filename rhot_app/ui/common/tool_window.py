@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMessageBox, QWi
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.keys import bind_space
+from rhot_app.ui.common.language import tr
 
 AS_MAIN: Final = QSize(1280, 800)
 """The size of a window that stands over no other, which it would else be as large as."""
@@ -114,5 +115,5 @@ class ToolWindow(QDialog):
 
     def _may_lose(self) -> bool:
         buttons = QMessageBox.StandardButton
-        return QMessageBox.question(self, self.windowTitle(), self.losing, buttons.Discard | buttons.Cancel,
+        return QMessageBox.question(self, self.windowTitle(), tr(self.losing), buttons.Discard | buttons.Cancel,
                                     buttons.Cancel) == buttons.Discard

@@ -30,6 +30,7 @@ from rhot_app.sources.cameras.camera_set import NONE_FOUND, CameraSource, Prepar
 from rhot_app.sources.cameras.camera_source import CameraPreview, check_source, source_of
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.picture_view import PictureView
@@ -58,7 +59,8 @@ class Choice:
         """Two lines: what it is, and in which mode or why not."""
         if self.source is None:
             assert self.device is not None
-            return f"{self.device.name} ({Path(self.device.path).name})\ncannot be used now"
+            return tr("{name} ({device})\ncannot be used now", name=self.device.name,
+                      device=Path(self.device.path).name)
         one = self.source
         what = f"{one.width} × {one.height} px, {one.fps:.4g}/s" + ("" if one.seconds is None else
                                                                      f", {one.seconds:.1f} s")
@@ -75,7 +77,7 @@ class CamerasDialog(QDialog):
                  preview: Callable[[CameraSource, CameraPreview | None], CameraPreview] = CameraPreview,
                  write: Prepare = prepare) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Cameras of this computer")
+        self.setWindowTitle(tr("Cameras of this computer"))
         self.setProperty("guide", "start")
         self._devices, self._check, self._make_preview, self._write = devices, check, preview, write
         self.prepared: Prepared | None = None
@@ -85,56 +87,56 @@ class CamerasDialog(QDialog):
         self._shown: tuple[object, str] = (None, "")
         self._number = 0
         self._job: Job | None = None
-        intro = QLabel("Tick one camera or more, and look at each. The first one tracks alone until the others are put "
-                       "together with it.")
+        intro = QLabel(tr("Tick one camera or more, and look at each. The first one tracks alone until the others are "
+                          "put together with it."))
         intro.setWordWrap(True)
         self.list = QListWidget()
         self.list.setFixedWidth(_LIST_PX)
         self.list.setSpacing(4)
         self.list.setWordWrap(True)
-        self.list.setAccessibleName("Cameras")
+        self.list.setAccessibleName(tr("Cameras"))
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.currentRowChanged.connect(self._look)
         self.list.itemChanged.connect(lambda item: self._show_whether_ready())
-        self.film_button = self._button("Films …", "Add films of one camera each, recorded at the same time.",
+        self.film_button = self._button(tr("Films …"), tr("Add films of one camera each, recorded at the same time."),
                                         self.choose_films)
-        self.folder_button = self._button("Folder …", "Add a folder of pictures, or of raw frames.",
+        self.folder_button = self._button(tr("Folder …"), tr("Add a folder of pictures, or of raw frames."),
                                           self.choose_folder)
-        self.address_button = self._button("Network …", "Add a camera or a phone that sends its pictures by HTTP "
-                                           "(motion JPEG) or RTSP.", self.choose_address)
-        self.again_button = self._button("Search again", "Look for webcams that were plugged in meanwhile.",
+        self.address_button = self._button(tr("Network …"), tr("Add a camera or a phone that sends its pictures by "
+                                                               "HTTP (motion JPEG) or RTSP."), self.choose_address)
+        self.again_button = self._button(tr("Search again"), tr("Look for webcams that were plugged in meanwhile."),
                                          self.search)
         self.picture = PictureView("", scheme)
         self.name_field = QLineEdit()
         self.name_field.setMaxLength(_NAME_CHARACTERS)
         self.name_field.setValidator(QRegularExpressionValidator(QRegularExpression(r"\w[\w .-]*")))
-        self.name_field.setAccessibleName("Name of the camera")
-        self.name_field.setToolTip("How the camera is called in the rig, such as left.")
+        self.name_field.setAccessibleName(tr("Name of the camera"))
+        self.name_field.setToolTip(tr("How the camera is called in the rig, such as left."))
         self.name_field.textEdited.connect(self._rename)
         self.mode_box = QComboBox()
         self.mode_box.setMinimumContentsLength(len("1920 × 1080, 30/s"))
-        self.mode_box.setAccessibleName("Picture size and rate")
-        self.mode_box.setToolTip("Larger pictures show a hand farther away, and take longer to search.")
+        self.mode_box.setAccessibleName(tr("Picture size and rate"))
+        self.mode_box.setToolTip(tr("Larger pictures show a hand farther away, and take longer to search."))
         self.mode_box.activated.connect(self._change_mode)
-        self.turned_box, self.mirrored_box = QCheckBox("upside down"), QCheckBox("mirrored")
-        self.turned_box.setToolTip("Turn the picture by 180 degrees: the camera hangs upside down.")
-        self.mirrored_box.setToolTip("Exchange left and right, where a phone's program has mirrored the picture. In a "
-                                     "mirrored picture a right hand looks like a left one.")
+        self.turned_box, self.mirrored_box = QCheckBox(tr("upside down")), QCheckBox(tr("mirrored"))
+        self.turned_box.setToolTip(tr("Turn the picture by 180 degrees: the camera hangs upside down."))
+        self.mirrored_box.setToolTip(tr("Exchange left and right, where a phone's program has mirrored the picture. In "
+                                        "a mirrored picture a right hand looks like a left one."))
         for box in (self.turned_box, self.mirrored_box):
             box.clicked.connect(self._orient)
         self.rate = Sentence(2)
         self.hand_box = QComboBox()
-        self.hand_box.addItem("the right hand", "right")
-        self.hand_box.addItem("the left hand", "left")
-        self.hand_box.setAccessibleName("Hand")
-        self.hand_box.setToolTip("Which hand is tracked.")
+        self.hand_box.addItem(tr("the right hand"), "right")
+        self.hand_box.addItem(tr("the left hand"), "left")
+        self.hand_box.setAccessibleName(tr("Hand"))
+        self.hand_box.setToolTip(tr("Which hand is tracked."))
         self.verdict = Sentence(2)
-        self.cancel_button = QPushButton("Cancel")
+        self.cancel_button = QPushButton(tr("Cancel"))
         self.cancel_button.clicked.connect(self.reject)
-        self.open_button = QPushButton("Open")
+        self.open_button = QPushButton(tr("Open"))
         self.open_button.setProperty("primary", True)
         self.open_button.setDefault(True)
-        self.open_button.setToolTip("Possible once a camera is ticked.")
+        self.open_button.setToolTip(tr("Possible once a camera is ticked."))
         self.open_button.clicked.connect(self.open_cameras)
         self._lay_out(intro)
         self.resize(*_SIZE_PX)
@@ -173,7 +175,7 @@ class CamerasDialog(QDialog):
         middle.setSpacing(16)
         middle.addLayout(left)
         middle.addLayout(right, 1)
-        for question in (QLabel("track"), self.hand_box):
+        for question in (QLabel(tr("track")), self.hand_box):
             bottom.addWidget(question)
         bottom.addWidget(self.verdict, 1)
         for end in (self.cancel_button, self.open_button):
@@ -207,27 +209,28 @@ class CamerasDialog(QDialog):
 
     def choose_films(self) -> None:
         """Ask for films and add them."""
-        names, _ = QFileDialog.getOpenFileNames(self, "Films of one camera each", str(Path.home()),
-                                                "Films and pictures (*.mp4 *.avi *.mov *.mkv *.webm *.png *.jpg "
-                                                "*.jpeg);;All files (*)")
+        names, _ = QFileDialog.getOpenFileNames(self, tr("Films of one camera each"), str(Path.home()),
+                                                tr("Films and pictures (*.mp4 *.avi *.mov *.mkv *.webm *.png *.jpg "
+                                                   "*.jpeg);;All files (*)"))
         self.add(names)
 
     def choose_folder(self) -> None:
         """Ask for a folder and add it."""
-        name = QFileDialog.getExistingDirectory(self, "A folder of pictures", str(Path.home()))
+        name = QFileDialog.getExistingDirectory(self, tr("A folder of pictures"), str(Path.home()))
         self.add([name] if name else [])
 
     def choose_address(self) -> None:
         """Ask for an address and add it."""
-        text, entered = QInputDialog.getText(self, "Network camera", "Address of the pictures, such as\n"
-                                             "http://192.168.1.20:8080/video or rtsp://192.168.1.21/live")
+        text, entered = QInputDialog.getText(self, tr("Network camera"),
+                                             tr("Address of the pictures, such as\nhttp://192.168.1.20:8080/video or "
+                                                "rtsp://192.168.1.21/live"))
         self.add([text.strip()] if entered and text.strip() else [])
 
     def add(self, texts: list[str]) -> None:
         """Check in a worker what was named, and add and tick it; what cannot be opened is told."""
         if not texts:
             return
-        self.verdict.setText("looking …")
+        self.verdict.setText(tr("looking …"))
 
         def check() -> tuple[list[CameraSource], str]:
             found: list[CameraSource] = []
@@ -244,7 +247,7 @@ class CamerasDialog(QDialog):
         specs = [one.source.spec for one in self.choices if one.source is not None]
         for source in sources:
             if source.spec in specs:
-                refused = refused or f"{source.title} is in the list already."
+                refused = refused or tr("{title} is in the list already.", title=source.title)
             else:
                 self._add(Choice(source), ticked=True)
         self.verdict.setText(refused)
@@ -276,7 +279,7 @@ class CamerasDialog(QDialog):
 
     def _show_whether_ready(self) -> None:
         count = len(self.ticked())
-        self.open_button.setText(f"Open {count} camera{'s' if count > 1 else ''}" if count else "Open")
+        self.open_button.setText(tr("Open {n} camera", "Open {n} cameras", count) if count else tr("Open"))
         self.open_button.setEnabled(count > 0 and self._job is None)
 
     # -- the one that is looked at -------------------------------------------------------------------------------------
@@ -320,7 +323,8 @@ class CamerasDialog(QDialog):
             shown = None if picture is None else Picture("", picture, self._number, 0, 0)
             self.picture.show_picture(shown, problem)
         rate_hz = preview.rate_hz
-        self.rate.setText(preview.remark or ("" if rate_hz is None or problem else f"{rate_hz:.0f} frames/s come."))
+        rate = "" if rate_hz is None or problem else tr("{rate:.0f} frames/s come.", rate=rate_hz)
+        self.rate.setText(preview.remark or rate)
 
     def _rename(self, text: str) -> None:
         row = self.list.currentRow()
@@ -360,7 +364,7 @@ class CamerasDialog(QDialog):
         names = [one.name or usual for one, usual in zip(chosen, names_of(sources), strict=True)]
         doubled = next((name for name in names if names.count(name) > 1), "")
         if doubled:
-            self.verdict.setText(f"Two cameras are called {doubled}. Give each a name of its own.")
+            self.verdict.setText(tr("Two cameras are called {doubled}. Give each a name of its own.", doubled=doubled))
             return
         side: Side = "left" if self.hand_box.currentData() == "left" else "right"
         self._end_preview()
@@ -416,7 +420,7 @@ def _in_mode(source: CameraSource, device: Device, mode: Mode) -> CameraSource:
 
 def _words_without_picture(choice: Choice | None) -> str:
     if choice is None:
-        return "Choose a camera, or add a film."
+        return tr("Choose a camera, or add a film.")
     if choice.source is None:
         return choice.device.problem if choice.device is not None else ""
     return ""

@@ -32,6 +32,7 @@ from rhot_app.export.states import HandStates, columns
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import newest_recording
@@ -40,9 +41,9 @@ ROWS = 8
 LOOK_MS = 300  # a choice is looked at when it has stood for a while
 
 _SIZE, _BUTTON_PX = (860, 600), 120
-_OWN_RATE, _NO_FILL = "as recorded", "leave gaps"
-_TRACKERS = (("as recorded", None), ("classic", "classic"), ("estimator", "estimator"))
-_FRAMES = (("rig", "rig"), ("wrist, along the palm's axes", "wrist"))
+_OWN_RATE, _NO_FILL = tr_noop("as recorded"), tr_noop("leave gaps")
+_TRACKERS = ((tr_noop("as recorded"), None), (tr_noop("classic"), "classic"), (tr_noop("estimator"), "estimator"))
+_FRAMES = ((tr_noop("rig"), "rig"), (tr_noop("wrist, along the palm's axes"), "wrist"))
 _UNITS: tuple[tuple[str, Units], ...] = (("mm", "mm"), ("m", "m"))
 
 
@@ -54,7 +55,7 @@ class ExportDialog(QDialog):
         """`rig`: what `log` is tracked with; None: as it was recorded. `smooth`: begin with that. `out_folder`: where
         the file is offered to be written, None: beside the recording."""
         super().__init__(parent)
-        self.setWindowTitle("Export recording")
+        self.setWindowTitle(tr("Export recording"))
         self.setProperty("guide", "recording")
         self.resize(*_SIZE)
         self.log = log
@@ -64,46 +65,47 @@ class ExportDialog(QDialog):
         self._job: Job | None = None
         self._look: Job | None = None
         self.log_label = QLabel()
-        self.log_button = QPushButton("Choose …")
-        self.log_button.setToolTip("Another recording (.rhotlog).")
+        self.log_button = QPushButton(tr("Choose …"))
+        self.log_button.setToolTip(tr("Another recording (.rhotlog)."))
         self.format_box = _box(((one.title, name) for name, one in all_formats().items()),
-                               "Which programs shall read it.")
+                               tr("Which programs shall read it."))
         self.format_box.setCurrentIndex(self.format_box.findData("csv"))
-        self.tracker_box = _box(_TRACKERS, "Which tracker makes a hand of the recorded datagrams.")
-        self.frame_box = _box(_FRAMES, "Where positions are told: in the rig frame, or relative to the wrist joint.")
-        self.units_box = _box(_UNITS, "Unit of length, where the format leaves a choice.")
-        self.smooth_box = QCheckBox("Smooth")
+        self.tracker_box = _box(_TRACKERS, tr("Which tracker makes a hand of the recorded datagrams."))
+        self.frame_box = _box(_FRAMES,
+                              tr("Where positions are told: in the rig frame, or relative to the wrist joint."))
+        self.units_box = _box(_UNITS, tr("Unit of length, where the format leaves a choice."))
+        self.smooth_box = QCheckBox(tr("Smooth"))
         self.smooth_box.setChecked(smooth)
-        self.smooth_box.setToolTip("Every state uses what came after it as well. Only the estimator can.")
+        self.smooth_box.setToolTip(tr("Every state uses what came after it as well. Only the estimator can."))
         self.rate_box = QDoubleSpinBox()
         self.rate_box.setRange(0.0, MOST_HZ)
         self.rate_box.setDecimals(1)
         self.rate_box.setSuffix(" Hz")
-        self.rate_box.setSpecialValueText(_OWN_RATE)
+        self.rate_box.setSpecialValueText(tr(_OWN_RATE))
         self.rate_box.setMinimumHeight(30)
-        self.rate_box.setToolTip("States at equal intervals. As recorded each keeps its own time, and formats that "
-                                 "have a rate get the cameras'.")
+        self.rate_box.setToolTip(tr("States at equal intervals. As recorded each keeps its own time, and formats that "
+                                    "have a rate get the cameras'."))
         self.fill_box = QDoubleSpinBox()
         self.fill_box.setRange(0.0, LONGEST_S)
         self.fill_box.setDecimals(2)
         self.fill_box.setSingleStep(0.1)
         self.fill_box.setSuffix(" s")
-        self.fill_box.setSpecialValueText(_NO_FILL)
+        self.fill_box.setSpecialValueText(tr(_NO_FILL))
         self.fill_box.setMinimumHeight(30)
-        self.fill_box.setToolTip("Gaps up to this length are interpolated. What is filled in is marked: by its "
-                                 "knowledge, or in a table beside the file where the format has none.")
+        self.fill_box.setToolTip(tr("Gaps up to this length are interpolated. What is filled in is marked: by its "
+                                    "knowledge, or in a table beside the file where the format has none."))
         self.table: RecordTable[tuple[object, ...]] = RecordTable(())
         self.table.verticalHeader().show()
-        self.table.setToolTip("The first fingertips as they would be written; the file holds much more.")
+        self.table.setToolTip(tr("The first fingertips as they would be written; the file holds much more."))
         self.sentence = Sentence(3)
         self.bar = QProgressBar()
         self.bar.setRange(0, 1000)
         self.bar.hide()
-        self.export_button = QPushButton("Export …")
+        self.export_button = QPushButton(tr("Export …"))
         self.export_button.setFixedWidth(_BUTTON_PX)  # it says Cancel meanwhile
-        self.export_button.setToolTip("Choose a file; it appears when it is whole.")
+        self.export_button.setToolTip(tr("Choose a file; it appears when it is whole."))
         self.export_button.setDefault(True)
-        self.close_button = QPushButton("Close")
+        self.close_button = QPushButton(tr("Close"))
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.setInterval(LOOK_MS)
@@ -118,10 +120,11 @@ class ExportDialog(QDialog):
         source.addWidget(self.log_button)
         form = QFormLayout()
         form.setSpacing(8)
-        for words, part in (("Recording", source), ("Format", self.format_box), ("Tracker", self.tracker_box),
-                            ("", self.smooth_box), ("Rate", self.rate_box), ("Fill gaps up to", self.fill_box),
-                            ("Positions in", self.frame_box),
-                            ("Lengths in", self.units_box)):
+        for words, part in ((tr("Recording"), source), (tr("Format"), self.format_box),
+                            (tr("Tracker"), self.tracker_box),
+                            ("", self.smooth_box), (tr("Rate"), self.rate_box), (tr("Fill gaps up to"), self.fill_box),
+                            (tr("Positions in"), self.frame_box),
+                            (tr("Lengths in"), self.units_box)):
             form.addRow(words, part)
         buttons = QHBoxLayout()
         buttons.addWidget(self.bar, 1)
@@ -165,17 +168,17 @@ class ExportDialog(QDialog):
     def show_log(self, log: Path | None) -> None:
         """Export another recording."""
         self.log = log
-        tracked = "" if self._rig is None else ", tracked as shown"
-        self.log_label.setText("Choose a recording." if log is None else f"{log}{tracked}")
+        tracked = "" if self._rig is None else tr(", tracked as shown")
+        self.log_label.setText(tr("Choose a recording.") if log is None else f"{log}{tracked}")
         self.export_button.setEnabled(log is not None)
-        self.rate_box.setSpecialValueText(_OWN_RATE)
+        self.rate_box.setSpecialValueText(tr(_OWN_RATE))
         if log is not None:
             self._preview()
 
     def _choose_log(self) -> None:
         start = self._folder if self.log is None else self.log
-        name, _ = QFileDialog.getOpenFileName(self, "Choose a recording", str(start),
-                                              "Recordings (*.rhotlog *.log);;All files (*)")
+        name, _ = QFileDialog.getOpenFileName(self, tr("Choose a recording"), str(start),
+                                              tr("Recordings (*.rhotlog *.log);;All files (*)"))
         if name:
             self._rig = None
             self.show_log(Path(name))
@@ -208,7 +211,7 @@ class ExportDialog(QDialog):
         table = dict(columns(states, 1000.0 if units == "mm" else 1.0, None))
         steps_s = np.diff(np.asarray(table["time_s"], dtype=np.float64))
         if self.rate_box.value() == 0.0 and len(steps_s) and np.median(steps_s) > 0.0:
-            self.rate_box.setSpecialValueText(f"{_OWN_RATE}, {1.0 / np.median(steps_s):.0f} Hz")
+            self.rate_box.setSpecialValueText(f"{tr(_OWN_RATE)}, {1.0 / np.median(steps_s):.0f} Hz")
         self.table.show_records(list(zip(*(table[name].tolist() for name in wanted), strict=True)),
                                 [_column(number, name) for number, name in enumerate(wanted)])
         self.table.resizeColumnsToContents()
@@ -219,14 +222,14 @@ class ExportDialog(QDialog):
     def _export_or_cancel(self) -> None:
         if self._job is not None:
             self._job.cancel()
-            self._end("Cancelled; nothing was written.")
+            self._end(tr("Cancelled; nothing was written."))
             return
         if self.log is None:
             return
         ending = all_formats()[self.format].endings[0]
         beside = self.log.with_suffix(ending)
         start = beside if self._out_folder is None else self._out_folder / beside.name
-        name, _ = QFileDialog.getSaveFileName(self, "Export to", str(start),
+        name, _ = QFileDialog.getSaveFileName(self, tr("Export to"), str(start),
                                               f"{self.format} (*{ending});;All files (*)")
         if name:
             out = Path(name)
@@ -241,23 +244,25 @@ class ExportDialog(QDialog):
         self._job = Job(lambda progress: export_apart(log, out, name, options, progress.report,
                                                            rig), self._show_done,
                         self._end, self._show_progress, self).start()
-        self.export_button.setText("Cancel")
+        self.export_button.setText(tr("Cancel"))
         self.bar.setValue(0)
         self.bar.show()
-        self._say(f"Exporting to {out} …")
+        self._say(tr("Exporting to {out} …", out=out))
 
     def _show_progress(self, text: str, fraction: float) -> None:
         self.bar.setValue(round(1000 * fraction))
 
     def _show_done(self, done: Exported) -> None:
-        said = [f"Exported {done.states} states to {done.path}.", *(f"{note}." for note in done.notes)]
-        said += [f"Not all of the recording could be read: {loss.removesuffix('.')}." for loss in done.losses]
+        said = [tr("Exported {states} states to {path}.", states=done.states, path=done.path),
+                *(f"{note}." for note in done.notes)]
+        said += [tr("Not all of the recording could be read: {loss}.", loss=loss.removesuffix("."))
+                 for loss in done.losses]
         self._end("\n".join(said))
 
     def _end(self, sentence: str) -> None:
         self._job = None
         self.bar.hide()
-        self.export_button.setText("Export …")
+        self.export_button.setText(tr("Export …"))
         self._say(sentence)
 
     def _say(self, sentence: str) -> None:
@@ -274,7 +279,7 @@ class ExportDialog(QDialog):
 def _box(entries: Any, meaning: str) -> QComboBox:
     box = QComboBox()
     for words, value in entries:
-        box.addItem(words, value)
+        box.addItem(tr(words), value)
     box.setToolTip(meaning)
     return box
 

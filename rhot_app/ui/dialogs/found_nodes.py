@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 from rhot_app.progress import Progress
 from rhot_app.sources.discovery import FoundNode, Search
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_node.wire.messages import TrustState
@@ -23,14 +24,15 @@ from rhot_node.wire.messages import TrustState
 Find = Callable[[Progress], Search]
 """Searches and reports its progress; called in a worker."""
 
-NOBODY = ("No node was found. Is rhot-node running there, and on the same network? Some networks let no search "
-          "through: then type the address in below.")
-_TRUST = {TrustState.OPEN: "open to everybody", TrustState.UNPAIRED: "not paired yet", TrustState.PAIRED: "paired"}
+NOBODY = tr_noop("No node was found. Is rhot-node running there, and on the same network? Some networks let no search "
+                 "through: then type the address in below.")
+_TRUST = {TrustState.OPEN: tr_noop("open to everybody"), TrustState.UNPAIRED: tr_noop("not paired yet"),
+          TrustState.PAIRED: tr_noop("paired")}
 COLUMNS: tuple[Column[FoundNode], ...] = (
-    Column("name", lambda node: node.presence.name), Column("id", lambda node: str(node.presence.node_id)),
-    Column("address", lambda node: ", ".join(node.addresses)),
-    Column("trust", lambda node: _TRUST[node.presence.trust]),
-    Column("state", lambda node: "announces itself" if node.state is None else node.state.name.lower()))
+    Column("name", lambda node: node.presence.name), Column(tr_noop("id"), lambda node: str(node.presence.node_id)),
+    Column(tr_noop("address"), lambda node: ", ".join(node.addresses)),
+    Column(tr_noop("trust"), lambda node: tr(_TRUST[node.presence.trust])),
+    Column(tr_noop("state"), lambda node: tr("announces itself") if node.state is None else node.state.name.lower()))
 
 
 class FoundNodes(QWidget):
@@ -48,11 +50,11 @@ class FoundNodes(QWidget):
         self.table.fit_columns()
         self.table.setTabKeyNavigation(False)
         self.table.setShowGrid(False)
-        self.table.setAccessibleName("Nodes on the network")
+        self.table.setAccessibleName(tr("Nodes on the network"))
         self.table.setMinimumHeight(140)
         self.table.chosen_changed.connect(self._show_whether_chosen)
         self.side_buttons = [self._side_button(number, side) for number, side in enumerate(sides)]
-        self.again = QPushButton("Search again")
+        self.again = QPushButton(tr("Search again"))
         self.again.setAutoDefault(False)
         self.again.clicked.connect(self.search)
         self.progress_bar = QProgressBar()
@@ -79,7 +81,7 @@ class FoundNodes(QWidget):
         if self._job is None:
             self.again.setEnabled(False)
             self.progress_bar.show()
-            self.message.setText("Looking for nodes …")
+            self.message.setText(tr("Looking for nodes …"))
             self._job = Job(lambda progress: self._find(progress.report), self._show, self._show_error,
                             self._show_progress, self).start()
 
@@ -90,10 +92,10 @@ class FoundNodes(QWidget):
             self._job = None
 
     def _side_button(self, number: int, side: str) -> QPushButton:
-        button = QPushButton(f"Use as {side} camera")
+        button = QPushButton(tr("Use as {side} camera", side=tr(side)))
         button.setAutoDefault(False)
         button.setEnabled(False)
-        button.setToolTip("Possible once a node is selected in the list.")
+        button.setToolTip(tr("Possible once a node is selected in the list."))
         button.clicked.connect(lambda: self.chosen.emit(number, self.table.chosen))
         return button
 
@@ -101,7 +103,7 @@ class FoundNodes(QWidget):
         self._rest()
         self.table.clearSelection()
         self.table.show_records(found.nodes)
-        sentences = [*([] if found.nodes else [NOBODY]), *found.conflicts, *found.notes]
+        sentences = [*([] if found.nodes else [tr(NOBODY)]), *found.conflicts, *found.notes]
         self.message.setText("\n".join(sentences))
         self._show_whether_chosen()
         self.searched.emit()

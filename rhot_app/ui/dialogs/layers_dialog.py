@@ -23,6 +23,7 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.models.layers import LayerPicture, LayerPictures
@@ -34,17 +35,17 @@ NEAR_NS: Final = 50_000_000
 """No state is nearer to a picture's time: the hand was not tracked in it."""
 
 _SIZE, _LIST_PX, _SWATCH_PX = QSize(1000, 640), 220, 14
-NO_HAND = "No hand is tracked, so there are no layers. Press Start, and show the hand to the cameras."
-FIRST = "The first picture takes a moment, the very first one of all half a minute."
-_LEGEND = ("1 is the link that nothing hides. A line is white beside the background, and black before another link. A "
-           "number in brackets: the links hide each other in a circle, which is cut there.")
+NO_HAND = tr_noop("No hand is tracked, so there are no layers. Press Start, and show the hand to the cameras.")
+FIRST = tr_noop("The first picture takes a moment, the very first one of all half a minute.")
+_LEGEND = tr_noop("1 is the link that nothing hides. A line is white beside the background, and black before another "
+                  "link. A number in brackets: the links hide each other in a circle, which is cut there.")
 
 
 class LayersDialog(ToolWindow):
     """`shown` is the drawing, `shown_of` its camera and state; None for none."""
 
     def __init__(self, controller: Controller, scheme: Scheme, parent: QWidget | None = None) -> None:
-        super().__init__("Layers of the hand", "scene", parent, _SIZE)
+        super().__init__(tr("Layers of the hand"), "scene", parent, _SIZE)
         self._controller = controller
         self._drawer: LayerPictures | None = None
         self._job: Job | None = None
@@ -52,22 +53,22 @@ class LayersDialog(ToolWindow):
         self.shown: LayerPicture | None = None
         self.shown_of: tuple[str, HandState] | None = None
         self.camera_box = QComboBox()
-        self.camera_box.setToolTip("Whose picture is shown. Each camera has an order of its own.")
-        self.camera_box.setAccessibleName("Camera")
-        self.over_check = QCheckBox("Over the picture")
+        self.camera_box.setToolTip(tr("Whose picture is shown. Each camera has an order of its own."))
+        self.camera_box.setAccessibleName(tr("Camera"))
+        self.over_check = QCheckBox(tr("Over the picture"))
         self.over_check.setChecked(True)
-        self.over_check.setToolTip("Off: the layers on plain grey, as fast as states come.")
-        self.pause_button = QPushButton("Pause")
+        self.over_check.setToolTip(tr("Off: the layers on plain grey, as fast as states come."))
+        self.pause_button = QPushButton(tr("Pause"))
         self.pause_button.setCheckable(True)
         self.pause_button.setAutoDefault(False)
-        self.pause_button.setToolTip("Hold what is shown (Space).")
+        self.pause_button.setToolTip(tr("Hold what is shown (Space)."))
         self.picture = _Picture(scheme)
         self.list = QListWidget()
         self.list.setFixedWidth(_LIST_PX)
         self.list.setIconSize(QSize(_SWATCH_PX, _SWATCH_PX))
         self.list.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.list.setSelectionMode(QListWidget.SelectionMode.NoSelection)
-        self.list.setAccessibleName("Visibility order")
+        self.list.setAccessibleName(tr("Visibility order"))
         self.sentence = Sentence(2)
         self._lay_out()
         self.start(TICK_MS, {}, self.pause_button.toggle)
@@ -105,7 +106,7 @@ class LayersDialog(ToolWindow):
             self._drawn = (camera, *wanted)
             drawer, (state, preview) = self._drawer, wanted
             if self.shown is None:
-                self.sentence.setText(FIRST)
+                self.sentence.setText(tr(FIRST))
             self._job = Job(lambda progress: drawer.draw(camera, state, preview),
                             lambda drawn: self._show(drawn, (camera, state)), self._failed, None, self).start()
 
@@ -141,7 +142,7 @@ class LayersDialog(ToolWindow):
         self._job = None
         self.shown, self.shown_of = drawn, of
         self.picture.show_image(drawn)
-        self.sentence.setText(NO_HAND if drawn is None else _LEGEND)
+        self.sentence.setText(tr(NO_HAND if drawn is None else _LEGEND))
         lines = () if drawn is None else drawn.lines
         while self.list.count() > len(lines):
             self.list.takeItem(self.list.count() - 1)
@@ -169,7 +170,7 @@ class _Picture(QWidget):
         self._drawn: LayerPicture | None = None  # keeps the image's memory
         self.setMinimumSize(320, 240)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("Layers over the camera's picture")
+        self.setAccessibleName(tr("Layers over the camera's picture"))
 
     def set_scheme(self, scheme: Scheme) -> None:
         self._scheme = scheme

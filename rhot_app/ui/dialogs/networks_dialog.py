@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app.ui.common.job import Job, Progress
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_node.errors import KeypointError
 from rhot_node.landmarks.install import FILES, LICENCE, PACKAGE, install_networks, read_network, user_folder
@@ -16,10 +17,10 @@ _WIDTH_PX = 520
 _WAIT_S = 0.05  # usually long enough to close the files that it reads
 _LINES = 8  # of the longest sentence: that pip found no network
 
-_MEANING = (f"Two networks find 21 landmarks of a bare hand in a picture. They are MediaPipe's, under the {LICENCE}, "
-            f"which is placed beside them. Install downloads the package {PACKAGE} (36 MB), takes them out of it and "
-            "checks them. Nothing else of it is kept. Nodes on other computers install theirs by "
-            "`rhot-node landmarks install`.")
+_MEANING = tr_noop("Two networks find 21 landmarks of a bare hand in a picture. They are MediaPipe's, under the "
+                   "{licence}, which is placed beside them. Install downloads the package {package} (36 MB), takes "
+                   "them out of it and checks them. Nothing else of it is kept. Nodes on other computers install "
+                   "theirs by `rhot-node landmarks install`.")
 
 
 class NetworksDialog(QDialog):
@@ -28,23 +29,24 @@ class NetworksDialog(QDialog):
     def __init__(self, parent: QWidget | None = None, *,
                  install: Callable[[Path, Path | None, Callable[[str, float], None]], None] = install_networks) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Hand networks")
+        self.setWindowTitle(tr("Hand networks"))
         self.setProperty("guide", "tracker")
         self.setFixedWidth(_WIDTH_PX)
         self._install = install
         self._job: Job | None = None
-        meaning = QLabel(_MEANING)
+        meaning = QLabel(tr(_MEANING, licence=LICENCE, package=PACKAGE))
         meaning.setWordWrap(True)
         meaning.setProperty("muted", True)
         self.sentence = Sentence(_LINES)
         self.bar = QProgressBar()
         self.bar.setRange(0, 100)
         self.bar.setTextVisible(False)
-        self.install_button, self.file_button = QPushButton("Install"), QPushButton("From a file …")
-        self.install_button.setToolTip("Download and place them. What is there is replaced when all is complete.")
-        self.file_button.setToolTip(f"Take them out of the wheel of {PACKAGE} that you have, without network.")
-        self.cancel_button, self.close_button = QPushButton("Cancel"), QPushButton("Close")
-        self.cancel_button.setToolTip("End the installation; what was there stays.")
+        self.install_button, self.file_button = QPushButton(tr("Install")), QPushButton(tr("From a file …"))
+        self.install_button.setToolTip(tr("Download and place them. What is there is replaced when all is complete."))
+        self.file_button.setToolTip(tr("Take them out of the wheel of {package} that you have, without network.",
+                                       package=PACKAGE))
+        self.cancel_button, self.close_button = QPushButton(tr("Cancel")), QPushButton(tr("Close"))
+        self.cancel_button.setToolTip(tr("End the installation; what was there stays."))
         self.install_button.clicked.connect(lambda: self.install())
         self.file_button.clicked.connect(self._choose)
         self.cancel_button.clicked.connect(self.cancel)
@@ -75,7 +77,7 @@ class NetworksDialog(QDialog):
         """End the installation."""
         if self._job is not None:
             self._job.cancel()
-            self._show("Cancelled. What was there before is there still.")
+            self._show(tr("Cancelled. What was there before is there still."))
 
     def reject(self) -> None:
         """Close; what goes on is cancelled."""
@@ -86,8 +88,8 @@ class NetworksDialog(QDialog):
         super().reject()
 
     def _choose(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, f"The wheel of {PACKAGE}", str(Path.home()),
-                                              "Wheels (*.whl);;All files (*)")
+        name, _ = QFileDialog.getOpenFileName(self, tr("The wheel of {package}", package=PACKAGE), str(Path.home()),
+                                              tr("Wheels (*.whl);;All files (*)"))
         if name:
             self.install(Path(name))
 
@@ -116,10 +118,10 @@ class NetworksDialog(QDialog):
 def state_sentence(folder: Path) -> str:
     """Whether the networks of a folder are installed and whole."""
     if not any((folder / name).exists() for name in FILES):
-        return "They are not installed on this computer."
+        return tr("They are not installed on this computer.")
     try:
         for name in FILES:
             read_network(folder, name)
     except KeypointError as exc:
         return f"{exc}"
-    return f"They are installed and whole, in {folder}."
+    return tr("They are installed and whole, in {folder}.", folder=folder)

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import ShapeMark
@@ -36,8 +37,8 @@ _COLUMNS = 3
 _MOST_STEPS = 8
 _PRINTED = "board printed"
 _WEARS: tuple[tuple[Wear, str], ...] = (
-    ("paint", "Paint or tape in six colours"), ("bare", "A bare hand"),
-    ("landmarks", "Landmarks or nodes of my own"))
+    ("paint", tr_noop("Paint or tape in six colours")), ("bare", tr_noop("A bare hand")),
+    ("landmarks", tr_noop("Landmarks or nodes of my own")))
 
 
 class NextSteps(QWidget):
@@ -59,18 +60,18 @@ class NextSteps(QWidget):
                                                                                   networks)
         self._shown: list[Step] = []
         self._job: Job | None = None
-        self.wears = {wear: QRadioButton(text) for wear, text in _WEARS}
-        self.counts = {1: QRadioButton("one camera"), 2: QRadioButton("two cameras")}
+        self.wears = {wear: QRadioButton(tr(text)) for wear, text in _WEARS}
+        self.counts = {1: QRadioButton(tr("one camera")), 2: QRadioButton(tr("two cameras"))}
         self._groups = [self._group(list(self.wears.values())), self._group(list(self.counts.values()))]
         self.marks = [ShapeMark(16) for _ in range(_MOST_STEPS)]
         self.buttons = [QPushButton() for _ in range(_MOST_STEPS)]
         self.verdict = Sentence(2)
-        self.never = QCheckBox("Do not open by itself")
-        self.never.setToolTip("Do not show these steps by themselves. Calibrate, What to do next shows them.")
+        self.never = QCheckBox(tr("Do not open by itself"))
+        self.never.setToolTip(tr("Do not show these steps by themselves. Calibrate, What to do next shows them."))
         self.never.setChecked(not settings.flag(NEXT_STEPS))
         self.never.toggled.connect(lambda never: settings.set_flag(NEXT_STEPS, not never))
         settings.flag_changed.connect(self._follow_settings)
-        self.close_button = QPushButton("Close")
+        self.close_button = QPushButton(tr("Close"))
         self.close_button.clicked.connect(self.closed)
         self._lay_out()
         self._timer = QTimer(self, interval=LOOK_MS)
@@ -159,7 +160,7 @@ class NextSteps(QWidget):
                 continue
             self.marks[row].set_shape("tick" if step.done else "ring",
                                       self._scheme.good if step.done else self._scheme.neutral)
-            self.marks[row].setAccessibleName("done" if step.done else "not done yet")
+            self.marks[row].setAccessibleName(tr("done") if step.done else tr("not done yet"))
             self.buttons[row].setText(f"{step.title} …")
             self.buttons[row].setAccessibleName(step.title)
             self.buttons[row].setToolTip(step.meaning)
@@ -168,8 +169,8 @@ class NextSteps(QWidget):
             style.unpolish(self.buttons[row])
             style.polish(self.buttons[row])
         if self._shown:
-            self.verdict.setText("All is done: hold the hand before the cameras." if first is None else
-                                 f"{self._shown[first].title}: {self._shown[first].meaning}")
+            self.verdict.setText(tr("All is done: hold the hand before the cameras.") if first is None
+                                 else f"{self._shown[first].title}: {self._shown[first].meaning}")
 
     def _press(self, row: int) -> None:
         action = self._shown[row].action
@@ -179,7 +180,8 @@ class NextSteps(QWidget):
             self.asked.emit(action)
 
     def _choose_board(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, "Write the board", str(Path.home() / "board.pdf"), "PDF (*.pdf)")
+        name, _ = QFileDialog.getSaveFileName(self, tr("Write the board"), str(Path.home() / "board.pdf"),
+                                              tr("PDF (*.pdf)"))
         if name and self._job is None:
             self._job = Job(lambda progress: _write_board(Path(name)), self._printed, self._refused, None, self).start()
 
@@ -187,7 +189,7 @@ class NextSteps(QWidget):
         self._job = None
         self._settings.remember(_PRINTED, str(path))
         self.look()
-        self.verdict.setText(f"Written: {path}. Print it at 100 % and measure the ruler on it.")
+        self.verdict.setText(tr("Written: {path}. Print it at 100 % and measure the ruler on it.", path=path))
 
     def _refused(self, sentence: str) -> None:
         self._job = None
@@ -202,5 +204,5 @@ def _write_board(path: Path) -> Path:
     try:
         write_target(path, STANDARD_BOARD, "A4")
     except OSError as exc:
-        raise RhotError(f"{path}: cannot be written ({exc.strerror}).") from exc
+        raise RhotError(tr("{path}: cannot be written ({strerror}).", path=path, strerror=exc.strerror)) from exc
     return path

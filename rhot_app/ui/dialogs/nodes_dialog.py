@@ -26,6 +26,7 @@ from rhot_app.sources.discovery import FoundNode
 from rhot_app.sources.pairing import NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig, look_for_nodes, pair_node
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.dialogs.found_nodes import Find, FoundNodes
@@ -45,7 +46,7 @@ class NodesDialog(QDialog):
     def __init__(self, scheme: Scheme, parent: QWidget | None = None, find: Find = look_for_nodes,
                  ask: Ask = ask_nodes) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Connect nodes")
+        self.setWindowTitle(tr("Connect nodes"))
         self.setProperty("guide", "nodes")
         self._scheme = scheme
         self._answers: list[NodeAnswer] = []
@@ -53,9 +54,9 @@ class NodesDialog(QDialog):
         self._job: Job | None = None
         self._ask_again = False
         self.rig_path: Path | None = None
-        intro = QLabel("Select a node in the list and say which camera it is. Left and right are as seen from behind "
-                       "the cameras. The address of a node that is not found can be typed in: it stands on the node's "
-                       "console, and <b>hostname&nbsp;-I</b> prints it there.")
+        intro = QLabel(tr("Select a node in the list and say which camera it is. Left and right are as seen from "
+                          "behind the cameras. The address of a node that is not found can be typed in: it stands on "
+                          "the node's console, and <b>hostname&nbsp;-I</b> prints it there."))
         intro.setWordWrap(True)
         intro.setTextFormat(Qt.TextFormat.RichText)
         self.found = FoundNodes(find, SIDES)
@@ -70,26 +71,27 @@ class NodesDialog(QDialog):
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
         grid.setVerticalSpacing(8)
-        for column, head in enumerate(("camera", "address or host name", "port", "", "answer", "")):
+        for column, head in enumerate((tr("camera"), tr("address or host name"), tr("port"), "", tr("answer"), "")):
             label = QLabel(head)
             label.setProperty("muted", True)
             grid.addWidget(label, 0, column)
         for row, side in enumerate(SIDES, start=1):
             self._add_row(grid, row, side)
         grid.setColumnStretch(4, 1)
-        default = QLabel(f"The port is {PAIRING_PORT} unless the node's settings file says otherwise (pairing_port).")
+        default = QLabel(tr("The port is {port} unless the node's settings file says otherwise (pairing_port).",
+                            port=PAIRING_PORT))
         default.setWordWrap(True)
         default.setProperty("muted", True)
-        self.ask_button = QPushButton("Ask the nodes")
+        self.ask_button = QPushButton(tr("Ask the nodes"))
         self.ask_button.setDefault(True)
         self.ask_button.setEnabled(False)
-        self.ask_button.setToolTip("Possible once both addresses are entered. Nothing is changed on the nodes.")
+        self.ask_button.setToolTip(tr("Possible once both addresses are entered. Nothing is changed on the nodes."))
         self.ask_button.clicked.connect(self.ask)
-        self.save_button = QPushButton("Write a rig file and open it …")
+        self.save_button = QPushButton(tr("Write a rig file and open it …"))
         self.save_button.setEnabled(False)
-        self.save_button.setToolTip("Possible once both nodes have answered and are paired with this computer.")
+        self.save_button.setToolTip(tr("Possible once both nodes have answered and are paired with this computer."))
         self.save_button.clicked.connect(self._choose_file)
-        cancel = QPushButton("Cancel")
+        cancel = QPushButton(tr("Cancel"))
         cancel.clicked.connect(self.reject)
         buttons = QHBoxLayout()
         buttons.addWidget(self.ask_button)
@@ -130,22 +132,23 @@ class NodesDialog(QDialog):
 
     def _add_row(self, grid: QGridLayout, row: int, side: str) -> None:
         host, port, mark, reply = QLineEdit(), QSpinBox(), ShapeMark(14), Sentence(2, muted=True)
-        reply.setText("not asked yet")
-        host.setPlaceholderText(f"e.g. 192.168.1.{10 + row}")
-        host.setAccessibleName(f"Address of the {side} node")
+        reply.setText(tr("not asked yet"))
+        host.setPlaceholderText(tr("e.g. {address}", address=f"192.168.1.{10 + row}"))
+        host.setAccessibleName(tr("Address of the {side} node", side=tr(side)))
         host.setMinimumWidth(180)
         host.textChanged.connect(self._forget_answers)
         port.setRange(1, 65535)
         port.setMinimumHeight(30)
         port.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
         port.setValue(PAIRING_PORT)
-        port.setToolTip("Where the node says who it is. The default is right unless its settings file says otherwise.")
-        port.setAccessibleName(f"Pairing port of the {side} node")
+        port.setToolTip(tr("Where the node says who it is. The default is right unless its settings file says "
+                           "otherwise."))
+        port.setAccessibleName(tr("Pairing port of the {side} node", side=tr(side)))
         port.valueChanged.connect(self._forget_answers)
         mark.set_shape("square", self._scheme.neutral)
-        pair = QPushButton("Pair …")
+        pair = QPushButton(tr("Pair …"))
         pair.setEnabled(False)
-        pair.setToolTip("Possible once the node has answered and is not paired with this computer.")
+        pair.setToolTip(tr("Possible once the node has answered and is not paired with this computer."))
         pair.clicked.connect(lambda: self.pair(row - 1))
         self.pair_buttons.append(pair)
         for column, widget in enumerate((QLabel(side), host, port, mark, reply, pair)):
@@ -158,7 +161,7 @@ class NodesDialog(QDialog):
     def _show_not_asked(self) -> None:
         for mark, reply in zip(self._marks, self.replies, strict=True):
             mark.set_shape("square", self._scheme.neutral)
-            reply.setText("not asked yet")
+            reply.setText(tr("not asked yet"))
         self._forget_answers()
 
     def _forget_answers(self) -> None:
@@ -182,7 +185,7 @@ class NodesDialog(QDialog):
         self.ask_button.setEnabled(False)
         for mark, reply in zip(self._marks, self.replies, strict=True):
             mark.set_shape("ring", self._scheme.accent)
-            reply.setText("asking …")
+            reply.setText(tr("asking …"))
         self._job = Job(lambda progress: self._ask(addresses), self._show_answers, self._show_error, None, self).start()
 
     def _show_answers(self, answers: list[NodeAnswer]) -> None:
@@ -202,8 +205,8 @@ class NodesDialog(QDialog):
             button.setEnabled(answer.found and not answer.usable)
         both = all(answer.usable for answer in answers)
         self.save_button.setEnabled(both)
-        self.verdict.setText("Both nodes answer. The new rig starts with textbook lenses and a 75 mm baseline: "
-                             "calibrate before you trust millimetres." if both else "")
+        self.verdict.setText(tr("Both nodes answer. The new rig starts with textbook lenses and a 75 mm baseline: "
+                                "calibrate before you trust millimetres.") if both else "")
 
     def pair(self, row: int) -> None:
         """Pair with the node of a row, then ask both again."""
@@ -218,8 +221,8 @@ class NodesDialog(QDialog):
         self.verdict.setText(sentence)
 
     def _choose_file(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, "Write the rig file", str(Path.home() / "rig.json"),
-                                              "Rig files (*.json)")
+        name, _ = QFileDialog.getSaveFileName(self, tr("Write the rig file"), str(Path.home() / "rig.json"),
+                                              tr("Rig files (*.json)"))
         if name:
             self.write(Path(name))
 
@@ -236,11 +239,11 @@ class NodesDialog(QDialog):
 
 # -- pair with one node ------------------------------------------------------------------------------------------------
 
-INTRO = (
-    "Pairing makes sure that this computer and the node know each other, so that nobody else on the network can see "
-    "its pictures, steer it, or pretend to be it.\n\n"
-    "1. On the node {name}, at its console or over SSH, run:  rhot-node pair\n"
-    "2. It shows a code of three groups, such as 7K2QD-9M4XT-BNWH3. Type it here within five minutes.")
+INTRO = tr_noop(
+    "Pairing makes sure that this computer and the node know each other, so that nobody else on the network "
+    "can see its pictures, steer it, or pretend to be it.\n\n1. On the node {name}, at its console or over "
+    "SSH, run:  rhot-node pair\n2. It shows a code of three groups, such as 7K2QD-9M4XT-BNWH3. Type it here "
+    "within five minutes.")
 
 Pair = Callable[[NodeAddress, str], str]
 """Pairs by a code and returns the node's name; raises a sentence."""
@@ -251,25 +254,26 @@ class PairDialog(QDialog):
 
     def __init__(self, name: str, address: NodeAddress, pair: Pair, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle(f"Pair with {name}")
+        self.setWindowTitle(tr("Pair with {name}", name=name))
         self._address = address
         self._pair = pair
         self._job: Job | None = None
-        intro = QLabel(INTRO.format(name=name))
+        intro = QLabel(tr(INTRO, name=name))
         intro.setTextFormat(Qt.TextFormat.PlainText)  # the name is the node's own word
         intro.setWordWrap(True)
         self.code = QLineEdit()
-        self.code.setPlaceholderText("code shown by the node")
-        self.code.setAccessibleName("Pairing code")
+        self.code.setPlaceholderText(tr("code shown by the node"))
+        self.code.setAccessibleName(tr("Pairing code"))
         self.code.setMaxLength(40)
         self.code.textChanged.connect(self._show_whether_complete)
         self.verdict = Sentence(3)
-        self.pair_button = QPushButton("Pair")
+        self.pair_button = QPushButton(tr("Pair"))
         self.pair_button.setDefault(True)
         self.pair_button.setEnabled(False)
-        self.pair_button.setToolTip(f"Possible once {CODE_LENGTH} letters and digits are entered; dashes are free.")
+        self.pair_button.setToolTip(tr("Possible once {code_length} letters and digits are entered; dashes are free.",
+                                       code_length=CODE_LENGTH))
         self.pair_button.clicked.connect(self.pair)
-        cancel = QPushButton("Cancel")
+        cancel = QPushButton(tr("Cancel"))
         cancel.clicked.connect(self.reject)
         buttons = QHBoxLayout()
         buttons.addStretch(1)
@@ -294,7 +298,7 @@ class PairDialog(QDialog):
             return
         code = self.code.text()
         self.pair_button.setEnabled(False)
-        self.verdict.setText("pairing …")
+        self.verdict.setText(tr("pairing …"))
         self._job = Job(lambda progress: self._pair(self._address, code), self._accept, self._show_error, None,
                         self).start()
 

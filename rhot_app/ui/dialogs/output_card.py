@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.project import OutputSettings
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.models.outputs import OutputRow
@@ -39,29 +40,29 @@ class OutputCard(QFrame):
         self.settings = settings
         self.setProperty("card", True)
         self.switch = QCheckBox()
-        self.switch.setAccessibleName(f"{row.title} is on")
-        self.switch.setToolTip("On or off, at once; one that is off stays in the rig.")
+        self.switch.setAccessibleName(tr("{title} is on", title=row.title))
+        self.switch.setToolTip(tr("On or off, at once; one that is off stays in the rig."))
         self.mark, self.status_label = ShapeMark(), QLabel()
         self.title_label, self.detail_label = QLabel(row.title), QLabel(row.detail)
         self.title_label.setProperty("title", True)
         self.detail_label.setProperty("muted", True)
         for label in (self.title_label, self.status_label):
             label.setTextFormat(Qt.TextFormat.PlainText)
-        self.change_button, self.remove_button = QPushButton("Change …"), QPushButton("Remove")
-        self.change_button.setToolTip("Another target, other joints, another rate: in the form below.")
-        self.remove_button.setToolTip("Close it and take it out of the rig; Undo brings it back.")
+        self.change_button, self.remove_button = QPushButton(tr("Change …")), QPushButton(tr("Remove"))
+        self.change_button.setToolTip(tr("Another target, other joints, another rate: in the form below."))
+        self.remove_button.setToolTip(tr("Close it and take it out of the rig; Undo brings it back."))
         self.message_label = Sentence(2, muted=True)
         self.said = QStackedWidget()  # what has to be said stands where else the details do, so that no card grows
         self.said.addWidget(self.detail_label)
         self.said.addWidget(self.message_label)
-        self.url_edit, self.copy_button = QLineEdit(), QPushButton("Copy")
+        self.url_edit, self.copy_button = QLineEdit(), QPushButton(tr("Copy"))
         self.url_edit.setReadOnly(True)
-        self.url_edit.setToolTip("Where to connect. The web view's address has a secret in it: whoever knows it sees "
-                                 "the hand.")
-        self.copy_button.setToolTip("Put the address on the clipboard.")
+        self.url_edit.setToolTip(tr("Where to connect. The web view's address has a secret in it: whoever knows it "
+                                    "sees the hand."))
+        self.copy_button.setToolTip(tr("Put the address on the clipboard."))
         self.copy_button.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.url_edit.text()))
         self.code_label = QLabel()
-        self.code_label.setToolTip("The address as a QR code, for a telephone's or headset's camera.")
+        self.code_label.setToolTip(tr("The address as a QR code, for a telephone's or headset's camera."))
         for part in (self.switch, self.change_button, self.remove_button):
             part.setEnabled(settings is not None)
         self._lay_out()

@@ -29,6 +29,7 @@ from rhot_app.outputs.spec import OPENXR_ONLY
 from rhot_app.project import OutputSettings, Rig
 from rhot_app.ui.backend.contract import Asker, Opened
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.output_card import OutputCard
 from rhot_app.ui.models.outputs import (
@@ -64,7 +65,7 @@ class OutputsDialog(QDialog):
     def __init__(self, opened: Opened, connect: Callable[[], Asker], status: Callable[[], EngineStatus | None],
                  scheme: Callable[[], Scheme], parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Outputs")
+        self.setWindowTitle(tr("Outputs"))
         self.setProperty("guide", "outputs")
         self.resize(_SIZE)
         self._opened, self._outputs = opened, opened.rig.outputs
@@ -74,16 +75,16 @@ class OutputsDialog(QDialog):
         self._job: Job | None = None
         self._changing: OutputSettings | None = None  # the one that the form changes
         self.cards: list[OutputCard] = []
-        self.empty_label = QLabel(EMPTY)
+        self.empty_label = QLabel(tr(EMPTY))
         self.empty_label.setWordWrap(True)
         self.empty_label.setProperty("muted", True)
         self.form_title = QLabel()
         self.form_title.setProperty("title", True)
         self.kind_box, self.joints_box = QComboBox(), QComboBox()
         self.kind_label, self.target_edit, self.rate_box = Sentence(3, muted=True), QLineEdit(), QDoubleSpinBox()
-        self.add_button, self.cancel_button = QPushButton("Add"), QPushButton("Cancel")
+        self.add_button, self.cancel_button = QPushButton(tr("Add")), QPushButton(tr("Cancel"))
         self.sentence = Sentence(3)
-        self.undo_button, self.close_button = QPushButton("Undo"), QPushButton("Close")
+        self.undo_button, self.close_button = QPushButton(tr("Undo")), QPushButton(tr("Close"))
         self._fill_form()
         self._lay_out()
         self._connect_parts()
@@ -98,20 +99,20 @@ class OutputsDialog(QDialog):
 
     def _fill_form(self) -> None:
         for name in (*KINDS, *output_plugins()):
-            self.kind_box.addItem(kind_of(name).title, name)
-            self.kind_box.setItemData(self.kind_box.count() - 1, kind_of(name).meaning, Qt.ItemDataRole.ToolTipRole)
+            self.kind_box.addItem(tr(kind_of(name).title), name)
+            self.kind_box.setItemData(self.kind_box.count() - 1, tr(kind_of(name).meaning), Qt.ItemDataRole.ToolTipRole)
         for name, (title, meaning) in JOINT_SETS.items():
             self.joints_box.addItem(title, name)
             self.joints_box.setItemData(self.joints_box.count() - 1, meaning, Qt.ItemDataRole.ToolTipRole)
-        self.kind_box.setToolTip("Which protocol the other program understands.")
-        self.joints_box.setToolTip("The joint set: which joints, in whose order and axes.")
+        self.kind_box.setToolTip(tr("Which protocol the other program understands."))
+        self.joints_box.setToolTip(tr("The joint set: which joints, in whose order and axes."))
         self.rate_box.setRange(0.0, 1000.0)
         self.rate_box.setDecimals(1)
-        self.rate_box.setSuffix(" states/s")
-        self.rate_box.setSpecialValueText("every state")
+        self.rate_box.setSuffix(tr(" states/s"))
+        self.rate_box.setSpecialValueText(tr("every state"))
         self.rate_box.setMinimumHeight(30)
-        self.rate_box.setToolTip("At most so many states per second; at the lowest value every state is sent.")
-        self.undo_button.setToolTip("Take the last change back (Ctrl+Z).")
+        self.rate_box.setToolTip(tr("At most so many states per second; at the lowest value every state is sent."))
+        self.undo_button.setToolTip(tr("Take the last change back (Ctrl+Z)."))
 
     def _lay_out(self) -> None:
         layout = QVBoxLayout(self)
@@ -174,25 +175,26 @@ class OutputsDialog(QDialog):
             self.target_edit.setFocus()
             return
         if old is None:
-            self._change(replacing(None, new), f"Added {title_of(new)}.")
+            self._change(replacing(None, new), tr("Added {output}.", output=title_of(new)))
         else:
-            self._change(replacing(old, msgspec.structs.replace(new, enabled=old.enabled)), f"Changed to "
-                         f"{title_of(new)}.")
+            self._change(replacing(old, msgspec.structs.replace(new, enabled=old.enabled)),
+                         tr("Changed to {output}.", output=title_of(new)))
 
     def switch(self, settings: OutputSettings, on: bool) -> None:
         """Open or close one; it stays in the list."""
         self._change(replacing(settings, msgspec.structs.replace(settings, enabled=on)),
-                     f"{title_of(settings)} is {'on' if on else 'off'}.")
+                     tr("{output} is on.", output=title_of(settings)) if on
+                     else tr("{output} is off.", output=title_of(settings)))
 
     def remove(self, settings: OutputSettings) -> None:
         """Close one and take it out of the list."""
-        self._change(replacing(settings, None), f"Removed {title_of(settings)}.")
+        self._change(replacing(settings, None), tr("Removed {output}.", output=title_of(settings)))
 
     def undo(self) -> None:
         """Take the last change back."""
         if self._job is None and self._made:
             before, after = self._made[-1]
-            self._change(restoring(before, after), "Taken back.", undoing=True)
+            self._change(restoring(before, after), tr("Taken back."), undoing=True)
 
     def _change(self, edit: Edit, said: str, *, undoing: bool = False) -> None:
         if self._job is not None:
@@ -214,7 +216,7 @@ class OutputsDialog(QDialog):
             self._show_outputs()
             self.rig_used.emit(rig)
 
-        self.sentence.setText("The engine changes over …")
+        self.sentence.setText(tr("The engine changes over …"))
         self._job = Job(lambda progress: work(), done, self._failed, None, self).start()
         self.undo_button.setEnabled(False)
 
@@ -228,23 +230,23 @@ class OutputsDialog(QDialog):
     def begin_changing(self, settings: OutputSettings) -> None:
         """Put an output into the form."""
         self._changing = settings
-        self.form_title.setText(f"Change {title_of(settings)}")
+        self.form_title.setText(tr("Change {output}", output=title_of(settings)))
         if self.kind_box.findData(settings.kind) < 0:  # a plug-in that is not installed here
-            self.kind_box.addItem(kind_of(settings.kind).title, settings.kind)
+            self.kind_box.addItem(tr(kind_of(settings.kind).title), settings.kind)
         self.kind_box.setCurrentIndex(self.kind_box.findData(settings.kind))
         self.target_edit.setText(settings.target)
         self.joints_box.setCurrentIndex(self.joints_box.findData(settings.joints))
         self.rate_box.setValue(settings.rate_hz or 0.0)
-        self.add_button.setText("Change")
+        self.add_button.setText(tr("Change"))
         self.cancel_button.show()
         self.target_edit.setFocus()
         self.target_edit.selectAll()
 
     def _end_changing(self) -> None:
         self._changing = None
-        self.form_title.setText("Add a stream")
-        self.add_button.setText("Add")
-        self.add_button.setToolTip("It opens at once; tracking goes on.")
+        self.form_title.setText(tr("Add a stream"))
+        self.add_button.setText(tr("Add"))
+        self.add_button.setToolTip(tr("It opens at once; tracking goes on."))
         self.cancel_button.hide()
         self._show_kind()
 
@@ -253,9 +255,9 @@ class OutputsDialog(QDialog):
         kind = kind_of(self.kind_box.currentData())
         if self.target_edit.text() in ("", *(one.suggestion for one in KINDS.values())):
             self.target_edit.setText(kind.suggestion)
-        self.target_edit.setPlaceholderText(kind.target)
-        self.target_edit.setToolTip(kind.target)
-        self.kind_label.setText(f"{kind.meaning} Target: {kind.target}")
+        self.target_edit.setPlaceholderText(tr(kind.target))
+        self.target_edit.setToolTip(tr(kind.target))
+        self.kind_label.setText(tr("{meaning} Target: {target}", meaning=tr(kind.meaning), target=tr(kind.target)))
         fixed = self.kind_box.currentData() in OPENXR_ONLY
         if fixed:
             self.joints_box.setCurrentIndex(self.joints_box.findData("openxr"))

@@ -31,6 +31,7 @@ from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, e
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.models.proposal import RigChange, progress_text
 from rhot_app.ui.models.words import (
@@ -61,33 +62,33 @@ class TrackerDialog(QDialog):
     def __init__(self, rig: Rig, path: Path | None, connect: Callable[[], Asker], hand: Callable[[], HandState | None],
                  parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Tracker")
+        self.setWindowTitle(tr("Tracker"))
         self.setProperty("guide", "tracker")
         self.setFixedWidth(_WIDTH_PX)
         self._rig, self._path = rig, path
         self._connect, self._hand = connect, hand
         self._made: list[RigChange] = []
         self._job: Job | None = None
-        self.kinds = {kind: QRadioButton(title) for kind, (title, _) in KINDS.items()}
+        self.kinds = {kind: QRadioButton(tr(title)) for kind, (title, _) in KINDS.items()}
         self.ik_box, self.ik_words = _choices(IK_METHODS), Sentence(2, muted=True)
         self.observe_box, self.observe_words = _choices(OBSERVED), Sentence(2, muted=True)
         self.variant_box, self.variant_words = _choices(VARIANTS), Sentence(2, muted=True)
         self.limits_box, self.limits_words = _choices(LIMITS), Sentence(2, muted=True)
-        self.size_check = QCheckBox("Estimate the hand's size")
-        self.size_check.setToolTip(SIZE_MEANING)
-        self.flat_check = QCheckBox("Flat, for the 3-D mouse")
-        self.flat_check.setToolTip(FLAT_MEANING)
+        self.size_check = QCheckBox(tr("Estimate the hand's size"))
+        self.size_check.setToolTip(tr(SIZE_MEANING))
+        self.flat_check = QCheckBox(tr("Flat, for the 3-D mouse"))
+        self.flat_check.setToolTip(tr(FLAT_MEANING))
         self.size_label = Sentence(2, muted=True)
-        self.size_button = QPushButton("Use this size for the rig's hand")
-        self.size_button.setToolTip("Makes every length of the rig's hand so much larger or smaller. What was there is "
-                                    "kept.")
+        self.size_button = QPushButton(tr("Use this size for the rig's hand"))
+        self.size_button.setToolTip(tr("Makes every length of the rig's hand so much larger or smaller. What was there "
+                                       "is kept."))
         policy = self.size_button.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
         self.size_button.setSizePolicy(policy)
         self.obstacle_label, self.sentence = QLabel(), Sentence(3)
         self.obstacle_label.setWordWrap(True)
-        self.undo_button, self.close_button = QPushButton("Undo"), QPushButton("Close")
-        self.undo_button.setToolTip("Take the last change back (Ctrl+Z).")
+        self.undo_button, self.close_button = QPushButton(tr("Undo")), QPushButton(tr("Close"))
+        self.undo_button.setToolTip(tr("Take the last change back (Ctrl+Z)."))
         self._lay_out()
         self._connect_parts()
         self._show_rig()
@@ -103,7 +104,7 @@ class TrackerDialog(QDialog):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(8)
         for kind, (_, meaning) in KINDS.items():
-            words = QLabel(meaning)
+            words = QLabel(tr(meaning))
             words.setWordWrap(True)
             words.setProperty("muted", True)
             words.setContentsMargins(24, 0, 0, 0)
@@ -111,12 +112,12 @@ class TrackerDialog(QDialog):
             column.addWidget(words)
         self.obstacle_label.setContentsMargins(24, 0, 0, 0)
         column.addWidget(self.obstacle_label)
-        self.solver = _form((("Fingers bent by", self.ik_box), ("", self.ik_words)))
+        self.solver = _form(((tr("Fingers bent by"), self.ik_box), ("", self.ik_words)))
         self.details = _form((
-            ("Tracked by", self.observe_box), ("", self.observe_words),
-            ("Fingers", self.variant_box), ("", self.variant_words), ("Limits", self.limits_box),
-            ("", self.limits_words), ("Hand", self.flat_check),
-            ("Size", self.size_check), ("", self.size_label), ("", self.size_button)))
+            (tr("Tracked by"), self.observe_box), ("", self.observe_words),
+            (tr("Fingers"), self.variant_box), ("", self.variant_words), (tr("Limits"), self.limits_box),
+            ("", self.limits_words), (tr("Hand"), self.flat_check),
+            (tr("Size"), self.size_check), ("", self.size_label), ("", self.size_button)))
         self._forms = QStackedWidget()
         for form in (self.solver, self.details):
             self._forms.addWidget(form)
@@ -230,12 +231,12 @@ class TrackerDialog(QDialog):
 
     def _done(self, change: RigChange) -> None:
         self._made.append(change)
-        self._take(change.after, "In force." if self._path is not None else
-                   "In force until the engine ends: this rig came from no file. Rig, Save rig keeps it.")
+        self._take(change.after, tr("In force.") if self._path is not None
+                   else tr("In force until the engine ends: this rig came from no file. Rig, Save rig keeps it."))
 
     def _undone(self, change: RigChange) -> None:
         self._made.remove(change)
-        self._take(change.before, "Taken back.")
+        self._take(change.before, tr("Taken back."))
 
     def _take(self, rig: Rig, sentence: str) -> None:
         self._job, self._rig = None, rig
@@ -263,17 +264,17 @@ class TrackerDialog(QDialog):
         settings = self._rig.tracker
         self.kinds[settings.kind].setChecked(True)
         self.ik_box.setCurrentIndex(self.ik_box.findData(settings.ik))
-        self.ik_words.setText(IK_METHODS[settings.ik][1])
+        self.ik_words.setText(tr(IK_METHODS[settings.ik][1]))
         self.variant_box.setCurrentIndex(self.variant_box.findData(settings.variant))
         self.limits_box.setCurrentIndex(self.limits_box.findData(settings.limits))
         self.size_check.setChecked(settings.float_scale)
         self.flat_check.setChecked(settings.locked_deg == LOCKED_DEG)
         self.observe_box.setCurrentIndex(self.observe_box.findData(settings.observe))
         unsaid = not settings.landmarks and all(marker.shape == "landmark" for marker in self._rig.markers.markers)
-        self.observe_words.setText(LANDMARKS_ONLY if unsaid and settings.observe != "contours"
-                                   else OBSERVED[settings.observe][1])
-        self.variant_words.setText(VARIANTS[settings.variant][1])
-        self.limits_words.setText(LIMITS[settings.limits][1])
+        self.observe_words.setText(tr(LANDMARKS_ONLY if unsaid and settings.observe != "contours"
+                                      else OBSERVED[settings.observe][1]))
+        self.variant_words.setText(tr(VARIANTS[settings.variant][1]))
+        self.limits_words.setText(tr(LIMITS[settings.limits][1]))
         obstacle = estimator_obstacle(self._rig)
         self.obstacle_label.setText("" if obstacle is None else f"{obstacle.why} {obstacle.remedy}")
         self.obstacle_label.setVisible(bool(self.obstacle_label.text()))
@@ -327,6 +328,6 @@ def _form(rows: Sequence[tuple[str, QWidget]]) -> QWidget:
 def _choices(words: dict[str, tuple[str, str]]) -> QComboBox:
     box = QComboBox()
     for name, (title, meaning) in words.items():
-        box.addItem(title, name)
-        box.setItemData(box.count() - 1, meaning, Qt.ItemDataRole.ToolTipRole)
+        box.addItem(tr(title), name)
+        box.setItemData(box.count() - 1, tr(meaning), Qt.ItemDataRole.ToolTipRole)
     return box

@@ -13,6 +13,7 @@ from rhot_app.hand.anatomy import HandAnatomy, save_hand
 from rhot_app.handfit.session import HandFit
 from rhot_app.handfit.state import FitState
 from rhot_app.ui.common.job import Job, Progress
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.handfit.frame import Kept
 from rhot_app.ui.wizards.framework.definition import SettingsStore
 
@@ -73,15 +74,15 @@ class Changes(QObject):
     def reset(self) -> None:
         """As in the beginning."""
         if self.edit(self.fit.reset):
-            self.tell("As in the beginning. Undo brings the fit back.")
+            self.tell(tr("As in the beginning. Undo brings the fit back."))
 
     def undo(self) -> None:
         """One step back."""
-        self._go(self.fit.undo, self.fit.undoable, "Undone")
+        self._go(self.fit.undo, self.fit.undoable, tr("Undone"))
 
     def redo(self) -> None:
         """One step forward."""
-        self._go(self.fit.redo, self.fit.redoable, "Done again")
+        self._go(self.fit.redo, self.fit.redoable, tr("Done again"))
 
     def _go(self, go: Callable[[], None], what: str, word: str) -> None:
         if what and self._job is None:
@@ -93,25 +94,27 @@ class Changes(QObject):
 
     def fit_to_anchors(self) -> None:
         """The most probable hand by all anchors, in a worker."""
-        self._work("Fitting to the anchors", lambda progress: self.fit.fitted_to_anchors(), "fitting to anchors",
-                   lambda: "Fitted to the anchors of this instant." if self.fit.freedom == "pose" else
-                   "Fitted to the anchors of all instants.")
+        self._work(tr("Fitting to the anchors"), lambda progress: self.fit.fitted_to_anchors(),
+                   tr("fitting to anchors"),
+                   lambda: tr("Fitted to the anchors of this instant.") if self.fit.freedom == "pose"
+                   else tr("Fitted to the anchors of all instants."))
 
     def fit_to_contours(self) -> None:
         """The hand by the edges in the pictures, in a worker."""
         def say() -> str:
             one = self.fit.instant
             found = one.contour.found if one is not None and one.contour is not None else 0.0
-            return (f"{found:.0%} of the hand's contour was found in the pictures."
-                    + ("" if found > LEAST_FOUND else " Drag what is wrong to its place, then fit again."))
+            return (tr("{found:.0%} of the hand's contour was found in the pictures.", found=found)
+                    + ("" if found > LEAST_FOUND else tr(" Drag what is wrong to its place, then fit again.")))
 
-        self._work("Fitting to the contours", lambda progress: self.fit.fitted_to_contours(), "fitting to contours",
-                   say)
+        self._work(tr("Fitting to the contours"), lambda progress: self.fit.fitted_to_contours(),
+                   tr("fitting to contours"), say)
 
     def find_hand(self) -> None:
         """Look for the hand, in a worker."""
-        self._work("Looking for the hand", lambda progress: self.fit.with_found_hand(progress.report),
-                   "finding the hand", lambda: "Look whether it is the hand; if not, undo and drag the joints instead.")
+        self._work(tr("Looking for the hand"), lambda progress: self.fit.with_found_hand(progress.report),
+                   tr("finding the hand"),
+                   lambda: tr("Look whether it is the hand; if not, undo and drag the joints instead."))
 
     def _work(self, text: str, op: Callable[[Progress], FitState], done: str, say: Callable[[], str]) -> None:
         """Compute another state in a worker, and take it."""
@@ -134,7 +137,7 @@ class Changes(QObject):
         if self._job is not None and not self.storing:
             self._job.cancel()
             self._job = None
-            self.tell("Cancelled; nothing was changed.")
+            self.tell(tr("Cancelled; nothing was changed."))
             self.changed.emit()
 
     def end(self) -> None:
@@ -165,17 +168,18 @@ class Changes(QObject):
         out = self._kept.out
         if out is None:
             start = str(Path(self._memory.remembered(FOLDER_KEY) or str(Path.home())) / "hand.json")
-            name, _ = QFileDialog.getSaveFileName(self._window, "Save the hand", start, "Hand files (*.json)")
+            name, _ = QFileDialog.getSaveFileName(self._window, tr("Save the hand"), start, tr("Hand files (*.json)"))
             if not name:
                 return
             out = Path(name)
         try:
             save_hand(out, self.named_hand)
         except OSError as exc:
-            self.tell(f"{out}: cannot be written ({exc.strerror}); nothing was saved.", bad=True)
+            self.tell(tr("{out}: cannot be written ({strerror}); nothing was saved.", out=out, strerror=exc.strerror),
+                      bad=True)
             return
         self.fit.note_saved()
-        self.tell(f"Saved: {out}")
+        self.tell(tr("Saved: {out}", out=out))
         self.changed.emit()
 
     def use(self) -> None:
@@ -185,13 +189,14 @@ class Changes(QObject):
             return
 
         if hand == self.fit.rig.hand:
-            self.tell("The rig has this hand already: only the pose was fitted.")
+            self.tell(tr("The rig has this hand already: only the pose was fitted."))
             return
 
         def done(_: None) -> None:
             self._job, self.storing = None, False
             self.fit.note_saved()
-            self.tell("The rig has this hand now. Calibrate, Bring back an earlier calibration restores the old one.")
+            self.tell(tr("The rig has this hand now. Calibrate, Bring back an earlier calibration restores the old "
+                         "one."))
             self.changed.emit()
             self.used.emit()
 

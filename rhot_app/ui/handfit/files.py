@@ -12,6 +12,7 @@ from rhot_app.errors import CalibrationError
 from rhot_app.handfit.pictures import files_by_camera, read_picture
 from rhot_app.project import Rig
 from rhot_app.sources.frame_sets import on_one_clock, open_video, overlap
+from rhot_app.ui.common.language import tr
 from rhot_node.pictures import VIDEO_SUFFIXES
 
 Image = NDArray[np.uint8]
@@ -33,15 +34,19 @@ def read_instant(rig: Rig, given: Sequence[str], at_s: float = 0.0) -> dict[int,
     first, last = overlap(timed)
     wanted = first + round(1e9 * at_s)
     if not first <= wanted <= last:
-        beyond, choose = ("before", "a later") if wanted < first else ("beyond", "an earlier")
-        raise CalibrationError(f"The videos show {1e-9 * (last - first):.2f} s together, and second {at_s:g} is "
-                               f"{beyond} that. Choose {choose} one.")
+        together_s = 1e-9 * (last - first)
+        raise CalibrationError(
+            tr("The videos show {length:.2f} s together, and second {at:g} is before that. Choose a later one.",
+               length=together_s, at=at_s) if wanted < first else
+            tr("The videos show {length:.2f} s together, and second {at:g} is beyond that. Choose an earlier one.",
+               length=together_s, at=at_s))
     for camera, video in zip(videos, timed, strict=True):
         nearest = np.zeros(len(video.times_ns), np.bool_)
         nearest[int(np.argmin(np.abs(video.times_ns - wanted)))] = True
         picture = next(video.frames(nearest), None)
         if picture is None:
-            raise CalibrationError(f"{video.path}: its frame at second {at_s:g} cannot be read; is the file complete?")
+            raise CalibrationError(tr("{path}: its frame at second {at_s:g} cannot be read; is the file complete?",
+                                      path=video.path, at_s=at_s))
         found[camera] = picture[1]
     return found
 

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.handfit.session import HandFit
 from rhot_app.handfit.solve import Freedom
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.handfit.number_form import NumberForm
 from rhot_app.ui.handfit.picture import FitPicture
@@ -29,7 +30,8 @@ from rhot_app.ui.models.palette import Scheme
 _RIGHT_PX, _OTHERS_PX = 368, 150  # of the numbers at the right; of the rows above and below the pictures
 _UPRIGHT = 0.85  # chosen: a hand is higher than wide, and a view beside another one is higher, which zooming uses
 _FREEDOMS: Final[tuple[tuple[Freedom, str], ...]] = (
-    ("pose", "the pose alone"), ("lengths", "pose and lengths"), ("roots", "pose, lengths and finger roots"))
+    ("pose", tr_noop("the pose alone")), ("lengths", tr_noop("pose and lengths")),
+    ("roots", tr_noop("pose, lengths and finger roots")))
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,49 +50,54 @@ class FitFrame:
         self.views = [FitPicture(name, (camera.width, camera.height), scheme)
                       for name, camera in zip(fit.names, fit.cameras, strict=True)]
         self.form = NumberForm(fit.numbers)
-        self.take_button = _button("Take pictures", "The pictures of all cameras now, as one more instant (Space). "
-                                   "Hold the hand still.")
-        self.open_button = _button("Open pictures …", "Picture or video files of one instant, one for each camera. "
-                                   "They are told apart by the cameras' names in theirs, or sorted (Ctrl+O).")
-        self.find_button = _button("Find the hand", "Look for the hand by the landmark networks (rhot landmarks "
-                                   "install), and put all its joints there.")
+        self.take_button = _button(tr("Take pictures"), tr("The pictures of all cameras now, as one more instant "
+                                                           "(Space). Hold the hand still."))
+        self.open_button = _button(tr("Open pictures …"), tr("Picture or video files of one instant, one for each "
+                                                             "camera. They are told apart by the cameras' names in "
+                                                             "theirs, or sorted (Ctrl+O)."))
+        self.find_button = _button(tr("Find the hand"), tr("Look for the hand by the landmark networks (rhot landmarks "
+                                                           "install), and put all its joints there."))
         self.instant_box = QComboBox()
-        self.instant_box.setToolTip("Which pictures are shown. All instants share the lengths; each has its own pose.")
-        self.instant_box.setAccessibleName("Instant")
-        self.remove_button = _button("Remove", "Remove the instant shown; undo brings it back.")
-        self.undo_button, self.redo_button = _button("Undo", ""), _button("Redo", "")
+        self.instant_box.setToolTip(tr("Which pictures are shown. All instants share the lengths; each has its own "
+                                       "pose."))
+        self.instant_box.setAccessibleName(tr("Instant"))
+        self.remove_button = _button(tr("Remove"), tr("Remove the instant shown; undo brings it back."))
+        self.undo_button, self.redo_button = _button(tr("Undo"), ""), _button(tr("Redo"), "")
         self.freedom_box = QComboBox()
-        self.freedom_box.setAccessibleName("What a drag or a fit may change")
-        self.freedom_box.setToolTip("What a drag or a fit may change. Begin with the pose; free lengths when the "
-                                    "anchors or contours of two cameras or two instants show them.")
+        self.freedom_box.setAccessibleName(tr("What a drag or a fit may change"))
+        self.freedom_box.setToolTip(tr("What a drag or a fit may change. Begin with the pose; free lengths when the "
+                                       "anchors or contours of two cameras or two instants show them."))
         for freedom, words in _FREEDOMS:
-            self.freedom_box.addItem(words, freedom)
+            self.freedom_box.addItem(tr(words), freedom)
         self.sd_box = QDoubleSpinBox()
         self.sd_box.setRange(0.1, 50.0)
         self.sd_box.setDecimals(1)
         self.sd_box.setSingleStep(0.5)
         self.sd_box.setSuffix(" px")
         self.sd_box.setKeyboardTracking(False)
-        self.sd_box.setAccessibleName("Standard deviation of an anchor")
-        self.sd_box.setToolTip("How exactly you can point at a joint in these pictures. The standard deviations and "
-                               "Fit to anchors go by it; a drag meets the pointer whatever it is.")
-        self.anchors_button = _button("Fit to anchors", "The most probable hand by all anchors at once (Ctrl+Return).")
-        self.contours_button = _button("Fit to contours", "Search the edges of the hand in the pictures, from where it "
-                                       "is now, and fit it to them (Ctrl+Shift+Return).")
-        self.free_button = _button("Free all joints", "Remove all anchors of this instant.")
-        self.reset_button = _button("Reset", "Back to the hand and the poses of the beginning; undo brings everything "
-                                    "back.")
-        self.save_button = _button("Save hand file …", "Write the hand as a hand file (Ctrl+S).")
-        self.use_button = _button("Use this hand", "Put the hand into the rig. The rig file keeps what it had; "
-                                  "Calibrate, Bring back an earlier calibration restores it.")
-        self.close_button, self.cancel_button = _button("Close", "Escape."), _button("Cancel", "Give the search up.")
+        self.sd_box.setAccessibleName(tr("Standard deviation of an anchor"))
+        self.sd_box.setToolTip(tr("How exactly you can point at a joint in these pictures. The standard deviations and "
+                                  "Fit to anchors go by it; a drag meets the pointer whatever it is."))
+        self.anchors_button = _button(tr("Fit to anchors"),
+                                      tr("The most probable hand by all anchors at once (Ctrl+Return)."))
+        self.contours_button = _button(tr("Fit to contours"), tr("Search the edges of the hand in the pictures, from "
+                                                                 "where it is now, and fit it to them "
+                                                                 "(Ctrl+Shift+Return)."))
+        self.free_button = _button(tr("Free all joints"), tr("Remove all anchors of this instant."))
+        self.reset_button = _button(tr("Reset"),
+                                    tr("Back to the hand and the poses of the beginning; undo brings everything back."))
+        self.save_button = _button(tr("Save hand file …"), tr("Write the hand as a hand file (Ctrl+S)."))
+        self.use_button = _button(tr("Use this hand"), tr("Put the hand into the rig. The rig file keeps what it had; "
+                                                          "Calibrate, Bring back an earlier calibration restores it."))
+        self.close_button, self.cancel_button = _button(tr("Close"), tr("Escape.")), _button(tr("Cancel"),
+                                                                                             tr("Give the search up."))
         self.errors = QLabel()
         self.sentence = Sentence(2)
         self.take_button.setVisible(live)
         self.use_button.setVisible(kept.use is not None)
         if kept.out is not None:
-            self.save_button.setText("Save hand file")
-            self.save_button.setToolTip(f"Write the hand to {kept.out} (Ctrl+S).")
+            self.save_button.setText(tr("Save hand file"))
+            self.save_button.setToolTip(tr("Write the hand to {out} (Ctrl+S).", out=kept.out))
         self._lay_out(parent)
 
     def _lay_out(self, parent: QWidget) -> None:
@@ -107,9 +114,9 @@ class FitFrame:
         side.setSpacing(8)
         side.addWidget(self.form, 1)
         freedom, spread, fits, frees = QHBoxLayout(), QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
-        freedom.addWidget(QLabel("Change"))
+        freedom.addWidget(QLabel(tr("Change")))
         freedom.addWidget(self.freedom_box, 1)
-        spread.addWidget(QLabel("Anchors ±"))
+        spread.addWidget(QLabel(tr("Anchors ±")))
         spread.addWidget(self.sd_box, 1)
         for part in (self.anchors_button, self.contours_button):
             fits.addWidget(part, 1)
@@ -159,8 +166,10 @@ class FitFrame:
         self.form.setEnabled(fitted and idle)
         self.cancel_button.setVisible(not idle)
         back, forward = fit.undoable, fit.redoable
-        self.undo_button.setToolTip(f"Ctrl+Z. {f'Takes back: {back}.' if back else 'Nothing to undo.'}")
-        self.redo_button.setToolTip(f"Ctrl+Shift+Z. {f'Brings back: {forward}.' if forward else 'Nothing to redo.'}")
+        back = tr("Takes back: {change}.", change=tr(back)) if back else tr("Nothing to undo.")
+        forward = tr("Brings back: {change}.", change=tr(forward)) if forward else tr("Nothing to redo.")
+        self.undo_button.setToolTip(f"Ctrl+Z. {back}")
+        self.redo_button.setToolTip(f"Ctrl+Shift+Z. {forward}")
 
 
 def _button(title: str, meaning: str) -> QPushButton:

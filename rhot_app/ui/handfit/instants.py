@@ -14,13 +14,14 @@ from rhot_app.errors import RhotError
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.handfit.state import Image
 from rhot_app.ui.backend.feed import LiveFeed
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.handfit.changes import FOLDER_KEY, Changes
 from rhot_app.ui.handfit.files import in_order, is_video, read_instant
 from rhot_app.ui.handfit.frame import FitFrame
 from rhot_app.ui.wizards.framework.definition import SettingsStore
 from rhot_node.pictures import VIDEO_SUFFIXES
 
-TITLE: Final = "Fit the hand to pictures"
+TITLE: Final = tr_noop("Fit the hand to pictures")
 _PICTURES = ("Pictures and videos (*.png *.jpg *.jpeg *.tif *.tiff *.webp "
              f"{' '.join(f'*{end}' for end in sorted(VIDEO_SUFFIXES))});;"
              "All files (*)")
@@ -66,7 +67,7 @@ class Instants(QObject):
         """Ask for the picture files of one instant."""
         if not self._changes.idle:
             return
-        names, _ = QFileDialog.getOpenFileNames(self._window, "Pictures of one instant, one for each camera",
+        names, _ = QFileDialog.getOpenFileNames(self._window, tr("Pictures of one instant, one for each camera"),
                                                 self._memory.remembered(FOLDER_KEY) or str(Path.home()), _PICTURES)
         if names:
             self._memory.remember(FOLDER_KEY, str(Path(names[0]).parent))
@@ -76,8 +77,8 @@ class Instants(QObject):
         """Files of pictures or videos, as `files.read_instant` takes them, become an instant."""
         at_s, wanted = 0.0, True
         if any(is_video(Path(name)) for name in given):
-            at_s, wanted = QInputDialog.getDouble(self._window, TITLE, "Which second of the videos?", self._at_s, 0.0,
-                                                  _LONGEST_S, 2)
+            at_s, wanted = QInputDialog.getDouble(self._window, tr(TITLE), tr("Which second of the videos?"),
+                                                  self._at_s, 0.0, _LONGEST_S, 2)
         if wanted:
             self._at_s = at_s
             try:
@@ -102,7 +103,7 @@ class Instants(QObject):
         box = self._frame.instant_box
         box.clear()
         if self._cameras is not None:
-            box.addItem("Live pictures", None)
+            box.addItem(tr("Live pictures"), None)
         for number, one in enumerate(self._fit.state.instants):
             box.addItem(one.name, number)
         if self._fit.instant is not None:
@@ -117,7 +118,7 @@ class Instants(QObject):
                 if name in self._cameras.feed.cameras:
                     picture = self._cameras.feed.newest(name)
                     view.show_image(None if picture is None else picture.bgr,
-                                    self._cameras.feed.problem(name) or "waiting for the first picture", bgr=True)
+                                    self._cameras.feed.problem(name) or tr("waiting for the first picture"), bgr=True)
 
     def frame_hand(self) -> None:
         """Zoom every picture to the hand."""
@@ -130,5 +131,6 @@ class Instants(QObject):
             if pose is not None:
                 self.frame_hand()
             self._changes.tell(
-                "Drag the wrist, the knuckles and the fingertips to their places, or press Find the hand."
-                if pose is None else "The hand begins where it is tracked. Drag joints, or fit to the contours.")
+                tr("Drag the wrist, the knuckles and the fingertips to their places, or press Find the hand.")
+                    if pose is None
+                    else tr("The hand begins where it is tracked. Drag joints, or fit to the contours."))

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.handfit.quantities import GROUPS, Number
+from rhot_app.ui.common.language import tr
 
 STEPS: Final = 2000
 """Of a slider: finer than a pixel of the screen."""
@@ -50,12 +51,12 @@ class NumberRow(QWidget):
         self.slider.setRange(0, STEPS)
         self.spread = QLabel()
         self.spread.setProperty("muted", True)
-        self.spread.setToolTip("Standard deviation in the unit beside, by the anchors and what is known of people's "
-                               "hands; after Fit to contours by the contours, too.")
+        self.spread.setToolTip(tr("Standard deviation in the unit beside, by the anchors and what is known of people's "
+                                  "hands; after Fit to contours by the contours, too."))
         for part in (name, self.box, self.slider):
             part.setToolTip(number.meaning)
         self.box.setAccessibleName(f"{number.group}, {number.name}")
-        self.slider.setAccessibleName(f"{number.group}, {number.name}, slider")
+        self.slider.setAccessibleName(tr("{group}, {name}, slider", group=number.group, name=number.name))
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setVerticalSpacing(0)
@@ -103,8 +104,8 @@ class NumberForm(QWidget):
         super().__init__(parent)
         self.rows: dict[tuple[str, int], NumberRow] = {}
         self.group_box = QComboBox()
-        self.group_box.setToolTip("Which numbers the sliders below move.")
-        self.group_box.setAccessibleName("Numbers")
+        self.group_box.setToolTip(tr("Which numbers the sliders below move."))
+        self.group_box.setAccessibleName(tr("Numbers"))
         self.group_box.addItems(list(GROUPS))
         self.pages = QStackedWidget()
         for group in GROUPS:

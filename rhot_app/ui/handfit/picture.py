@@ -25,6 +25,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from rhot_app.export.overlay import INNER_RGB, SILHOUETTE_RGB
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.handfit.session import Outline
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.picture_painter import FramePlacement, fit
@@ -79,10 +80,10 @@ class FitPicture(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName(f"Picture of camera {name}")
-        self.setToolTip("Drag a joint to its place; the right button frees it. The wheel zooms, the middle button "
-                        "moves the picture, a double click shows all of it, F frames the hand. Without a mouse: comma "
-                        "and point choose a joint, arrows move it, Delete frees it.")
+        self.setAccessibleName(tr("Picture of camera {name}", name=name))
+        self.setToolTip(tr("Drag a joint to its place; the right button frees it. The wheel zooms, the middle button "
+                           "moves the picture, a double click shows all of it, F frames the hand. Without a mouse: "
+                           "comma and point choose a joint, arrows move it, Delete frees it."))
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Four by three."""
@@ -278,9 +279,8 @@ class FitPicture(QWidget):
             painter.drawImage(place.target, self._image)
         else:
             painter.setPen(QColor(self._scheme.text))
-            painter.drawText(shown.adjusted(24, 24, -24, -24),
-                             Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap,
-                             self._problem or "no picture of this camera")
+            painter.drawText(shown.adjusted(24, 24, -24, -24), Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap,
+                             self._problem or tr("no picture of this camera"))
         if self.usable:
             self._paint_outline(painter, place)
             self._paint_skeleton(painter, place)
@@ -288,7 +288,8 @@ class FitPicture(QWidget):
         paint_tag(painter, shown.topLeft() + QPointF(6, 6), self.name, bold=True)
         if self.usable and self.joint >= 0 and np.isfinite(self.joints[self.joint]).all():
             error = self._errors.get(self.joint)
-            words = JOINTS[self.joint].replace("_", " ") + ("" if error is None else f", {error:.1f} px away")
+            words = JOINTS[self.joint].replace("_", " ") + ("" if error is None
+                                                            else tr(", {error:.1f} px away", error=error))
             at = place.to_widget(self.joints[self.joint][None])[0]
             wide = painter.fontMetrics().horizontalAdvance(words) + _TAG_PX
             left = min(max(at.x() + _TAG_PX, shown.left()), shown.right() - wide)

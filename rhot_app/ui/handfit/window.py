@@ -13,6 +13,7 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.handfit.quantities import Number
 from rhot_app.handfit.session import HandFit
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.handfit.changes import Changes
 from rhot_app.ui.handfit.frame import FitFrame, Kept
@@ -30,12 +31,12 @@ _FREEDOM_KEY, _SD_KEY = "fit/freedom", "fit/anchor sd px"
 class HandFitWindow(ToolWindow):
     """Shows one `HandFit`. `used` when the rig has the hand. `cameras`: None while none run."""
 
-    losing = "The hand was changed and not saved. Close without it?"
+    losing = tr_noop("The hand was changed and not saved. Close without it?")
     used = Signal()
 
     def __init__(self, fit: HandFit, scheme: Scheme, memory: SettingsStore, kept: Kept, live: LiveCameras | None = None,
                  parent: QWidget | None = None) -> None:
-        super().__init__(TITLE, "fitting", parent)
+        super().__init__(tr(TITLE), "fitting", parent)
         self.fit, self.cameras, self._memory = fit, live, memory
         self.frame = FitFrame(fit, scheme, kept, self, live=live is not None)
         self._changes = Changes(fit, kept, memory, self)
@@ -121,7 +122,7 @@ class HandFitWindow(ToolWindow):
         for view in self.frame.views:
             view.choose(joint)
         if self.frame.form.group_box.currentIndex() <= len(JOINTS) // 4:
-            self.frame.form.show_group(JOINTS[joint].split("_")[0].capitalize() if joint else "Palm")
+            self.frame.form.show_group(JOINTS[joint].split("_")[0].capitalize() if joint else tr("Palm"))
 
     def _choose_freedom(self) -> None:
         self.fit.freedom = self.frame.freedom_box.currentData()
@@ -157,11 +158,11 @@ class HandFitWindow(ToolWindow):
     def _show_sentence(self) -> None:
         sentence = self._changes.message
         if not sentence and self.live:
-            sentence = "Hold the hand still in all pictures, fingers spread, and press Take pictures."
+            sentence = tr("Hold the hand still in all pictures, fingers spread, and press Take pictures.")
         elif not sentence and self.fit.instant is None:
-            sentence = "Open a picture of each camera, taken at the same moment."
+            sentence = tr("Open a picture of each camera, taken at the same moment.")
         elif not sentence:
-            sentence = "Drag joints in the pictures or move the numbers until the outline lies on the hand."
+            sentence = tr("Drag joints in the pictures or move the numbers until the outline lies on the hand.")
         self.frame.sentence.setText(sentence)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
@@ -193,6 +194,7 @@ class HandFitWindow(ToolWindow):
 def _error_words(errors: list[float]) -> str:
     """The anchors' reprojection errors."""
     if not errors:
-        return "no anchors"
+        return tr("no anchors")
     rms = (sum(error**2 for error in errors) / len(errors)) ** 0.5
-    return f"{len(errors)} anchor{'' if len(errors) == 1 else 's'}, {rms:.1f} px rms, {max(errors):.1f} px most"
+    return tr("{n} anchor, {rms:.1f} px rms, {most:.1f} px most", "{n} anchors, {rms:.1f} px rms, {most:.1f} px most",
+              len(errors), rms=rms, most=max(errors))

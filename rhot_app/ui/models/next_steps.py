@@ -10,6 +10,7 @@ from rhot_app.calibration.check.camera_calibration import calibration_finding, t
 from rhot_app.calibration.registry import ADAPTED, BONES, COLOURS, LENS, MEASURED, STEREO, TIME
 from rhot_app.hand.anatomy import is_shipped
 from rhot_app.project import Rig
+from rhot_app.ui.common.language import tr
 
 Wear = Literal["paint", "bare", "landmarks"]
 """What shows the hand: painted or taped markers; a bare hand, by the networks; landmarks or nodes of one's own."""
@@ -50,26 +51,27 @@ def next_steps(answers: Answers, rig: Rig, *, networks: bool, printed: bool, rea
     exact = rig.calibration is not None and rig.calibration.method == "exact"
     steps = []
     if two and len(rig.nodes) < 2:
-        steps.append(Step("Choose two cameras", "Both see the hand; 10 to 50 cm apart.", False, CAMERAS))
+        steps.append(Step(tr("Choose two cameras"), tr("Both see the hand; 10 to 50 cm apart."), False, CAMERAS))
     if answers.wear == "bare":
-        steps.append(Step("Install the hand networks", "They find the joints of a bare hand (36 MB).", networks,
+        steps.append(Step(tr("Install the hand networks"), tr("They find the joints of a bare hand (36 MB)."), networks,
                           NETWORKS))
     steps.append(_observed(answers.wear, rig))
-    steps.append(Step("Print the board", "A chessboard on A4 at 100 %, glued to something flat.",
+    steps.append(Step(tr("Print the board"), tr("A chessboard on A4 at 100 %, glued to something flat."),
                       printed or exact or bool(measured), BOARD))
-    steps.append(Step("Calibrate each lens", "Until then distances are a guess." if len(missing) == len(rig.nodes) else
-                      f"Missing: {', '.join(missing)}." if missing else "All lenses are known.",
-                      exact or not missing, LENS.name))
+    steps.append(Step(tr("Calibrate each lens"), tr("Until then distances are a guess.")
+                      if len(missing) == len(rig.nodes) else tr("Missing: {names}.", names=", ".join(missing))
+                      if missing else tr("All lenses are known."), exact or not missing, LENS.name))
     if two:
-        steps.append(Step("Put the cameras together", "Where they stand to each other, from the board before both.",
-                          _together(rig), STEREO.name))
-        steps.append(Step("Compare the cameras' times", times_text(rig), _together(rig) and not times_unknown(rig),
+        steps.append(Step(tr("Put the cameras together"),
+                          tr("Where they stand to each other, from the board before both."), _together(rig),
+                          STEREO.name))
+        steps.append(Step(tr("Compare the cameras' times"), times_text(rig), _together(rig) and not times_unknown(rig),
                           TIME.name))
     if answers.wear == "paint":
-        steps.append(Step("Teach the colours", "Which colour each marker has in this light.",
+        steps.append(Step(tr("Teach the colours"), tr("Which colour each marker has in this light."),
                           exact or _noted(reasons, COLOURS.reason), COLOURS.name))
     if answers.wear == "paint" or two:
-        steps.append(Step("Measure your hand", "How long its bones are, from a minute of movement.",
+        steps.append(Step(tr("Measure your hand"), tr("How long its bones are, from a minute of movement."),
                           not is_shipped(rig.hand) or _noted(reasons, BONES.reason, MEASURED.reason, ADAPTED.reason),
                           (BONES if answers.wear == "paint" else MEASURED).name))
     return steps
@@ -77,8 +79,9 @@ def next_steps(answers: Answers, rig: Rig, *, networks: bool, printed: bool, rea
 
 def _observed(wear: Wear, rig: Rig) -> Step:
     if wear == "paint":
-        return Step("Track painted markers", "Six colours: five fingertips and the wrist.", rig.painted, TRACKER)
-    return Step("Track landmarks", "The joints of a bare hand, as networks find them.",
+        return Step(tr("Track painted markers"), tr("Six colours: five fingertips and the wrist."), rig.painted,
+                    TRACKER)
+    return Step(tr("Track landmarks"), tr("The joints of a bare hand, as networks find them."),
                 not rig.painted or rig.tracker.landmarks, TRACKER)
 
 

@@ -14,6 +14,7 @@ from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import OutputError
 from rhot_app.outputs.spec import OPENXR_ONLY, WEB_PORT, OutputStatus, as_run, host_and_port, parse_output, web_settings
 from rhot_app.project import OutputSettings, Rig, parse_rig
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.models.proposal import Command, set_rig
 from rhot_app.ui.models.words import Look
 
@@ -23,13 +24,15 @@ WINDOW_NS: Final = 3_000_000_000
 SILENT_NS: Final = 1_000_000_000
 """An output that has sent nothing for a second sends nothing."""
 
-EMPTY: Final = ("No program listens yet. Add OSC for Unity, Blender or TouchDesigner, VMC for avatars, or the web view "
-                "to see the hand in a browser or a headset.")
+EMPTY: Final = tr_noop("No program listens yet. Add OSC for Unity, Blender or TouchDesigner, VMC for avatars, or the "
+                       "web view to see the hand in a browser or a headset.")
 
 JOINT_SETS: Final = {
-    "own": ("own: 21 joints", "Wrist, then four joints of each finger; positions in the rig frame."),
-    "openxr": ("openxr: 26 joints", "XR_EXT_hand_tracking: positions, orientations and radii in OpenXR's axes."),
-    "mediapipe": ("mediapipe: 21 joints", "In the order and by the names of MediaPipe; positions in the rig frame."),
+    "own": (tr_noop("own: 21 joints"), tr_noop("Wrist, then four joints of each finger; positions in the rig frame.")),
+    "openxr": (tr_noop("openxr: 26 joints"),
+               tr_noop("XR_EXT_hand_tracking: positions, orientations and radii in OpenXR's axes.")),
+    "mediapipe": (tr_noop("mediapipe: 21 joints"),
+                  tr_noop("In the order and by the names of MediaPipe; positions in the rig frame.")),
 }
 
 
@@ -39,37 +42,42 @@ class OutputKind:
 
     title: str
     meaning: str
-    target: str = "What the plug-in understands; see its own documentation."
+    target: str = tr_noop("What the plug-in understands; see its own documentation.")
     suggestion: str = ""
-    joined: str = "to"  # between title and target
+    joined: str = tr_noop("to")  # between title and target
 
 
-_LISTEN: Final = "[HOST:]PORT to listen on. 127.0.0.1 is this computer only; 0.0.0.0 lets others in"
 KINDS: Final = {
-    "osc": OutputKind("OSC", "Messages by UDP, for Unity, Blender, Unreal, TouchDesigner, Max, Pure Data.",
-                      "HOST:PORT of the program that listens.", "127.0.0.1:9000"),
-    "vmc": OutputKind("VMC", "Finger bones for avatars: EVMC4U in Unity, VMC4B in Blender, Warudo, VSeeFace.",
-                      "HOST:PORT of the program that listens; most take 39539.", "127.0.0.1:39539"),
-    "ws": OutputKind("JSON over WebSocket", "Programs connect to this port and get every state as JSON.",
-                     f"{_LISTEN}, unencrypted.", "127.0.0.1:9001", "on"),
-    "web": OutputKind("Web view", "A page that shows the hand in browsers and headsets.", f"{_LISTEN}, by HTTPS.",
-                      f"127.0.0.1:{WEB_PORT}", "on"),
-    "lsl": OutputKind("Lab Streaming Layer", "LabRecorder and others find the streams by name.",
-                      "Name of the streams; RHOT when empty.", "", "as"),
-    "zenoh": OutputKind("Zenoh", "JSON under the key rhot/state, for robots and ROS 2.",
-                        "HOST:PORT of a router; when empty, whoever is found on the network.", "", "by"),
+    "osc": OutputKind("OSC", tr_noop("Messages by UDP, for Unity, Blender, Unreal, TouchDesigner, Max, Pure Data."),
+                      tr_noop("HOST:PORT of the program that listens."), "127.0.0.1:9000"),
+    "vmc": OutputKind("VMC", tr_noop("Finger bones for avatars: EVMC4U in Unity, VMC4B in Blender, Warudo, VSeeFace."),
+                      tr_noop("HOST:PORT of the program that listens; most take 39539."), "127.0.0.1:39539"),
+    "ws": OutputKind("JSON over WebSocket", tr_noop("Programs connect to this port and get every state as JSON."),
+                     tr_noop("[HOST:]PORT to listen on, unencrypted. 127.0.0.1 is this computer only; 0.0.0.0 lets "
+                             "others in."), "127.0.0.1:9001", tr_noop("on")),
+    "web": OutputKind(tr_noop("Web view"), tr_noop("A page that shows the hand in browsers and headsets."),
+                      tr_noop("[HOST:]PORT to listen on. 127.0.0.1 is this computer only; 0.0.0.0 lets others in, by "
+                              "HTTPS."), f"127.0.0.1:{WEB_PORT}", tr_noop("on")),
+    "lsl": OutputKind("Lab Streaming Layer", tr_noop("LabRecorder and others find the streams by name."),
+                      tr_noop("Name of the streams; RHOT when empty."), "", tr_noop("as")),
+    "zenoh": OutputKind("Zenoh", tr_noop("JSON under the key rhot/state, for robots and ROS 2."),
+                        tr_noop("HOST:PORT of a router; when empty, whoever is found on the network."), "",
+                        tr_noop("by")),
 }
 _HOSTS: Final = {"osc": None, "vmc": None, "ws": "127.0.0.1", "zenoh": None}
 """Kinds whose target is HOST:PORT; the host that a port alone means."""
 
-OFF = Look("off", "square", "neutral", "Switched off: kept in the rig, and not opened.")
-_STARTING = Look("opens", "ring", "accent", "The output is being opened.")
-_WAITING = Look("waits", "ring", "accent", "The output is open; nobody listens, or there is nothing to send yet.")
-_SENDING = Look("sending", "disc", "good", "States leave for the other program.")
-_SLOW = Look("slow", "half", "caution", "The receiver takes states too slowly; some are dropped. Tracking goes on.")
-_FAILED = Look("failed", "cross", "bad", "The output does not work. It is tried again every 3 s; tracking goes on.")
-_LEFT_OUT = Look("left out", "square", "neutral", "A replay opens none of the rig's outputs: nothing old is sent "
-                 "anywhere unasked.")
+OFF = Look(tr_noop("off"), "square", "neutral", tr_noop("Switched off: kept in the rig, and not opened."))
+_STARTING = Look(tr_noop("opens"), "ring", "accent", tr_noop("The output is being opened."))
+_WAITING = Look(tr_noop("waits"), "ring", "accent",
+                tr_noop("The output is open; nobody listens, or there is nothing to send yet."))
+_SENDING = Look(tr_noop("sending"), "disc", "good", tr_noop("States leave for the other program."))
+_SLOW = Look(tr_noop("slow"), "half", "caution",
+             tr_noop("The receiver takes states too slowly; some are dropped. Tracking goes on."))
+_FAILED = Look(tr_noop("failed"), "cross", "bad",
+               tr_noop("The output does not work. It is tried again every 3 s; tracking goes on."))
+_LEFT_OUT = Look(tr_noop("left out"), "square", "neutral",
+                 tr_noop("A replay opens none of the rig's outputs: nothing old is sent anywhere unasked."))
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,13 +125,13 @@ class SendRates:
 
 def kind_of(name: str) -> OutputKind:
     """The words for a kind; a plug-in has its own name."""
-    return KINDS.get(name) or OutputKind(name, f"The installed plug-in {name}.")
+    return KINDS.get(name) or OutputKind(name, tr("The installed plug-in {name}.", name=name))
 
 
 def title_of(settings: OutputSettings) -> str:
     """E.g. "OSC to 127.0.0.1:9000"."""
     kind = kind_of(settings.kind)
-    return f"{kind.title} {kind.joined} {settings.target}" if settings.target else kind.title
+    return f"{tr(kind.title)} {tr(kind.joined)} {settings.target}" if settings.target else tr(kind.title)
 
 
 def draft(kind: str, target: str, joints: str, rate_hz: float, others: tuple[OutputSettings, ...]) -> OutputSettings:
@@ -136,7 +144,7 @@ def draft(kind: str, target: str, joints: str, rate_hz: float, others: tuple[Out
     if kind in _HOSTS and (target or kind != "zenoh"):
         host_and_port(settings, _HOSTS[kind])
     if as_run(settings) in (msgspec.structs.replace(as_run(other), enabled=True) for other in others):
-        raise OutputError(f"output {settings.spec!r}: it is in the list already.")
+        raise OutputError(tr("output {spec!r}: it is in the list already.", spec=settings.spec))
     return settings
 
 
@@ -151,55 +159,57 @@ def rows(outputs: tuple[OutputSettings, ...], status: EngineStatus | None, rates
 def _row(settings: OutputSettings, reported: OutputStatus | None, status: EngineStatus | None,
          rates: SendRates) -> OutputRow:
     run = as_run(settings)
-    detail = f"{run.joints} joints, {'every state' if run.rate_hz is None else f'at most {run.rate_hz:g} states/s'}"
+    rate = tr("every state") if run.rate_hz is None else tr("at most {rate:g} states/s", rate=run.rate_hz)
+    detail = tr("{joints} joints, {rate}", joints=run.joints, rate=rate)
     fixed = reported is not None and reported.fixed
     if fixed:
-        detail += "; asked for when the engine was started"
+        detail += tr("; asked for when the engine was started")
     if reported is None:
         replay = settings.enabled and status is not None and bool(status.replaying)
         look = OFF if not settings.enabled else _LEFT_OUT if replay else _STARTING
-        return OutputRow(title_of(settings), detail, look, look.word, look.meaning if replay else "", look.meaning, "",
+        return OutputRow(title_of(settings), detail, look, tr(look.word), tr(look.meaning) if replay else "",
+                         tr(look.meaning), "",
                          fixed)
     look, words = _going(reported, status is not None and status.running, rates.of(reported.spec))
-    counts = f"{reported.sent} states sent, {reported.dropped} dropped."
+    counts = tr("{sent} states sent, {dropped} dropped.", sent=reported.sent, dropped=reported.dropped)
     return OutputRow(title_of(settings), detail, look, words, reported.message or web_hint(reported.url),
-                     f"{look.meaning}\n{counts}", reported.url if reported.state == "running" else "", fixed)
+                     f"{tr(look.meaning)}\n{counts}", reported.url if reported.state == "running" else "", fixed)
 
 
 def _going(reported: OutputStatus, running: bool, rate_hz: float) -> tuple[Look, str]:
     """Look and words of an output that the engine tells of."""
     if reported.state == "failed":
-        return _FAILED, _FAILED.word
+        return _FAILED, tr(_FAILED.word)
     if reported.state != "running":
-        return _STARTING, _STARTING.word
+        return _STARTING, tr(_STARTING.word)
     if reported.message:
-        return _SLOW, _SLOW.word
+        return _SLOW, tr(_SLOW.word)
     if reported.clients == 0:
-        return _WAITING, "waits for a browser" if reported.kind == "web" else "waits for a client"
-    clients = "" if reported.clients is None else f", {reported.clients} client{'s' if reported.clients > 1 else ''}"
+        return _WAITING, tr("waits for a browser") if reported.kind == "web" else tr("waits for a client")
+    clients = "" if reported.clients is None else tr(", {n} client", ", {n} clients", reported.clients)
     if rate_hz > 0.0:
-        return _SENDING, f"sending {rate_hz:.0f} states/s{clients}"
-    return _WAITING, ("waits for a hand" if running else "waits for Start") + clients
+        return _SENDING, tr("sending {rate:.0f} states/s{clients}", rate=rate_hz, clients=clients)
+    return _WAITING, (tr("waits for a hand") if running else tr("waits for Start")) + clients
 
 
 def web_hint(url: str) -> str:
     """Who can open the address of a web view, and how; "" for what is no web view."""
     if url.startswith("https:"):
-        return ("Whoever has this address sees the hand. The connection is encrypted, by a certificate that this "
-                "computer made: the browser warns once; choose Advanced, then Proceed.")
+        return tr("Whoever has this address sees the hand. The connection is encrypted, by a certificate that this "
+                  "computer made: the browser warns once; choose Advanced, then Proceed.")
     if url.startswith("http:"):
-        return (f"Open it in a browser on this computer. For a headset or telephone change the target to "
-                f"0.0.0.0:{WEB_PORT}: other computers are let in, by HTTPS only.")
+        return tr("Open it in a browser on this computer. For a headset or telephone change the target to "
+                  "0.0.0.0:{port}: other computers are let in, by HTTPS only.", port=WEB_PORT)
     return ""
 
 
 def keeping(path: str, *, simulated: bool) -> str:
     """How long a change lasts."""
     if simulated:
-        return "It lasts for this run: the simulated rig is made anew each time."
+        return tr("It lasts for this run: the simulated rig is made anew each time.")
     if not path:
-        return "It lasts until the engine ends: this rig came from no file."
-    return f"Save rig (Ctrl+S) keeps it in {Path(path).name}."
+        return tr("It lasts until the engine ends: this rig came from no file.")
+    return tr("Save rig (Ctrl+S) keeps it in {name}.", name=Path(path).name)
 
 
 # -- changed settings --------------------------------------------------------------------------------------------------
@@ -214,8 +224,8 @@ def replacing(old: OutputSettings | None, new: OutputSettings | None) -> Edit:
         if old is None:
             return (*outputs, *(() if new is None else (new,)))
         if old not in outputs:
-            raise OutputError(f"output {old.spec!r}: it is not in the engine's rig any more; another program has "
-                              "changed it.")
+            raise OutputError(tr("output {spec!r}: it is not in the engine's rig any more; another program has changed "
+                                 "it.", spec=old.spec))
         place = outputs.index(old)
         return (*outputs[:place], *(() if new is None else (new,)), *outputs[place + 1:])
     return edit
@@ -225,7 +235,7 @@ def restoring(before: tuple[OutputSettings, ...], after: tuple[OutputSettings, .
     """Back to what was there before a change, unless somebody has changed it since."""
     def edit(outputs: tuple[OutputSettings, ...]) -> tuple[OutputSettings, ...]:
         if outputs != after:
-            raise OutputError("Another program has changed the outputs since; nothing was taken back.")
+            raise OutputError(tr("Another program has changed the outputs since; nothing was taken back."))
         return before
     return edit
 

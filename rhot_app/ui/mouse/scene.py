@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QWidget
 from rhot_app.mouse.pick_scene import PickScene
 from rhot_app.mouse.pointer import GROUND_M, MouseState
 from rhot_app.mouse.target_test import WIDTH_M, TargetTest
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.models.palette import Scheme, rgb_of
 from rhot_app.ui.scene.mesh_item import MeshItem
 from rhot_app.ui.scene.meshes import capsule_template, pose_capsules, repeat_faces
@@ -41,7 +42,7 @@ class MouseView(GLViewWidget):
         self.setObjectName("mouse scene")
         self.setMinimumSize(320, 240)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName("Three-dimensional scene of the mouse: ground, cursor and balls")
+        self.setAccessibleName(tr("Three-dimensional scene of the mouse: ground, cursor and balls"))
         self.setCameraParams(fov=_FIELD_OF_VIEW_DEG, center=QVector3D(0.0, 0.0, 0.07), distance=_DISTANCE_M,
                              azimuth=-90.0, elevation=_ELEVATION_DEG)
         self._scheme = scheme

@@ -19,6 +19,7 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Listener
 from rhot_app.ui.backend.live import SILENCE_S
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.common.theme import app_font
@@ -36,10 +37,10 @@ TOLD_S: Final = 6.0
 _SIZE: Final = QSize(960, 720)
 _SHAPE_PX: Final = 18
 _READOUT_PT: Final = 14.0
-_NAMES: Final = {"thumb": "Thumb", "little": "Little finger"}
+_NAMES: Final = {"thumb": tr_noop("Thumb"), "little": tr_noop("Little finger")}
 
-NO_ENGINE: Final = ("No engine is heard, so no hand moves the mouse. Open a rig, or the simulated rig, in the main "
-                    "window and press Start.")
+NO_ENGINE: Final = tr_noop("No engine is heard, so no hand moves the mouse. Open a rig, or the simulated rig, in the "
+                           "main window and press Start.")
 
 
 class MouseWindow(ToolWindow):
@@ -48,7 +49,7 @@ class MouseWindow(ToolWindow):
     def __init__(self, listener: Listener, rig: Callable[[], Rig | None], scheme: Scheme, parent: QWidget | None = None,
                  clock: Callable[[], float] = time.monotonic) -> None:
         """`clock` gives seconds."""
-        super().__init__("3-D mouse", "mouse", parent, _SIZE)
+        super().__init__(tr("3-D mouse"), "mouse", parent, _SIZE)
         self._clock = clock
         self._listener, self._rig, self._scheme = listener, rig, scheme
         self._followed: Rig | None = None
@@ -67,26 +68,27 @@ class MouseWindow(ToolWindow):
         self.tick()
 
     def _make_parts(self, scheme: Scheme) -> None:
-        self.rest_button = _button("Rest here", "The hand as it lies for the next half second becomes the cursor's "
-                                   "origin (H).", self.take_rest)
-        self.undo_button = _button("Undo", "Take the last move of a ball back (Ctrl+Z).", self.undo)
-        self.test_button = _button("Target test", "Click nine targets with the thumb: how many bits per second the "
-                                   "hand conveys (T).", self.begin_or_end_test)
+        self.rest_button = _button(tr("Rest here"),
+                                   tr("The hand as it lies for the next half second becomes the cursor's origin (H)."),
+                                   self.take_rest)
+        self.undo_button = _button(tr("Undo"), tr("Take the last move of a ball back (Ctrl+Z)."), self.undo)
+        self.test_button = _button(tr("Target test"), tr("Click nine targets with the thumb: how many bits per second "
+                                                         "the hand conveys (T)."), self.begin_or_end_test)
         self.height_box = QComboBox()
-        self.height_box.setToolTip("What sets the pole's length: the index fingertip above the palm, or the palm.")
-        self.height_box.setAccessibleName("Height from")
-        for title, source in (("Height from the index finger", "index"), ("Height from the palm", "palm")):
+        self.height_box.setToolTip(tr("What sets the pole's length: the index fingertip above the palm, or the palm."))
+        self.height_box.setAccessibleName(tr("Height from"))
+        for title, source in ((tr("Height from the index finger"), "index"), (tr("Height from the palm"), "palm")):
             self.height_box.addItem(title, source)
         self.height_box.currentIndexChanged.connect(self._choose_height)
         self.badge = StateBadge(scheme)
         self.place = QLabel()
         self.place.setFont(app_font(_READOUT_PT))
-        self.place.setToolTip("Cursor: right and forward of the ground's middle, and above it.")
+        self.place.setToolTip(tr("Cursor: right and forward of the ground's middle, and above it."))
         self.shapes = {button: QLabel() for button in BUTTONS}
         self.words = {button: QLabel() for button in BUTTONS}
         for button, label in self.words.items():
             label.setFont(app_font(_READOUT_PT))
-            label.setToolTip(f"Pressed while the {button} is spread away from the hand.")
+            label.setToolTip(tr("Pressed while the {finger} is spread away from the hand.", finger=tr(button)))
         self.sentence = Sentence(2)
 
     def _lay_out(self) -> None:
@@ -114,22 +116,23 @@ class MouseWindow(ToolWindow):
     def take_rest(self) -> None:
         """The next half second is the hand's rest."""
         self.mouse.rest()
-        self._tell("Hold the hand still.")
+        self._tell(tr("Hold the hand still."))
 
     def undo(self) -> None:
         """Take the last move of a ball back, or say that there is none."""
-        self._tell(self.pick.undo() if self.test is None else "The target test moves no ball. End it to undo moves.")
+        self._tell(self.pick.undo() if self.test is None
+                   else tr("The target test moves no ball. End it to undo moves."))
 
     def begin_or_end_test(self) -> None:
         """Nine targets in place of the balls, or the balls again, which lie where they were."""
         self.test = TargetTest() if self.test is None else None
         self.pick.interrupt()
-        self.test_button.setText("Target test" if self.test is None else "End the test")
+        self.test_button.setText(tr("Target test") if self.test is None else tr("End the test"))
         self._told = ""
 
     def _choose_height(self) -> None:
         self.mouse = self._new_mouse()
-        self._tell("Hold the hand still for half a second: that becomes the cursor's origin.")
+        self._tell(tr("Hold the hand still for half a second: that becomes the cursor's origin."))
 
     def _new_mouse(self) -> Mouse:
         up = None if self._followed is None else up_of(self._followed)
@@ -176,11 +179,15 @@ class MouseWindow(ToolWindow):
         state = self.state
         self.badge.show_look(NO_RIG if state is None else condition_look(state.condition.value), None)
         cursor = None if state is None else state.cursor
-        self.place.setText("right – mm   forward – mm   height – mm" if cursor is None else
-                           "right {:+4.0f} mm   forward {:+4.0f} mm   height {:3.0f} mm".format(*(1e3 * cursor)))
+        if cursor is None:
+            self.place.setText(tr("right – mm   forward – mm   height – mm"))
+        else:
+            right, forward, height = 1e3 * cursor
+            self.place.setText(tr("right {right:+4.0f} mm   forward {forward:+4.0f} mm   height {height:3.0f} mm",
+                                  right=right, forward=forward, height=height))
         for button in BUTTONS:
             down = state is not None and state.is_pressed(button)
-            self.words[button].setText(f"{_NAMES[button]} {'DOWN' if down else 'up'}")
+            self.words[button].setText(f"{tr(_NAMES[button])} {tr('DOWN') if down else tr('up')}")
             self.shapes[button].setPixmap(shape_pixmap(
                 "disc" if down else "ring", self._scheme.accent if down else self._scheme.neutral, _SHAPE_PX,
                 self.devicePixelRatioF()))
@@ -191,19 +198,20 @@ class MouseWindow(ToolWindow):
         if now - self._told_s < TOLD_S and self._told:
             return self._told
         if self.state is None:
-            return NO_ENGINE
+            return tr(NO_ENGINE)
         if self.state.needs:
             return self.state.needs[0]
         if self.test is not None:
             found = self.test.result()
-            done = "Move the cursor's foot into the blue target and spread the thumb."
-            return done if found is None else f"Done: {found.sentence}"
+            done = tr("Move the cursor's foot into the blue target and spread the thumb.")
+            return done if found is None else tr("Done: {sentence}", sentence=found.sentence)
         if self.pick.held is not None:
-            return f"The {self.pick.balls[self.pick.held].name} moves with the cursor until the thumb returns."
+            return tr("The {name} moves with the cursor until the thumb returns.",
+                      name=self.pick.balls[self.pick.held].name)
         if self.pick.selected is not None:
-            return (f"Spread the thumb to pick the {self.pick.balls[self.pick.selected].name}, the little finger to "
-                    "put it on the ground.")
-        return "Bring the cursor to a ball."
+            return (tr("Spread the thumb to pick the {name}, the little finger to put it on the ground.",
+                       name=self.pick.balls[self.pick.selected].name))
+        return tr("Bring the cursor to a ball.")
 
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours."""

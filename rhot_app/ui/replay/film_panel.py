@@ -11,6 +11,7 @@ from rhot_app.project import Rig
 from rhot_app.sources.frame_sets import RecordedFilm
 from rhot_app.sources.recorded_pictures import FilmReader
 from rhot_app.state import HandState
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.camera_panel import CameraPanel, Skeleton
 from rhot_app.ui.replay.run import CODES
@@ -46,8 +47,8 @@ class FilmPanel(CameraPanel):
         self._numbers = {}
         for name, view in self.views.items():
             view.setVisible(name in self._cameras)
-            view.setToolTip(f"Camera {name}: the picture nearest to this moment, and the tracked hand. Dotted bones "
-                            "are guessed.")
+            view.setToolTip(tr("Camera {name}: the picture nearest to this moment, and the tracked hand. Dotted bones "
+                               "are guessed.", name=name))
 
     def show_moment(self, t_master_ns: int, state: HandState | None) -> None:
         """The pictures of a moment, the master's clock, and the hand of its state."""

@@ -31,7 +31,7 @@ from rhot_app.project import Rig, load_rig
 from rhot_app.sources.film_offset import FilmOffset, offsets_of
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import LOG_FILTER
 from rhot_app.ui.replay.run_dialog import FileChoice
@@ -41,9 +41,9 @@ ENDINGS = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpg", ".mts", ".webm")
 
 _SIZE, _LINES, _TABLE_PX = (820, 560), 5, 170
 _LATEST_S = 3600.0
-_MEANING = ("Films of a bare hand by one camera, or by several at the same time. The hand networks find its landmarks; "
-            "the tracked hand is then shown beside the pictures. Several films need the rig file that says where their "
-            "cameras stand; one film is tracked without, at a distance that is a guess.")
+_MEANING = tr_noop("Films of a bare hand by one camera, or by several at the same time. The hand networks find its "
+                   "landmarks; the tracked hand is then shown beside the pictures. Several films need the rig file "
+                   "that says where their cameras stand; one film is tracked without, at a distance that is a guess.")
 
 
 class FilmsDialog(QDialog):
@@ -53,7 +53,7 @@ class FilmsDialog(QDialog):
 
     def __init__(self, make_solver: Callable[[], Solver] = Solver, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Track films")
+        self.setWindowTitle(tr("Track films"))
         self.setProperty("guide", "recording")
         self.resize(*_SIZE)
         self._solver = make_solver()
@@ -62,31 +62,33 @@ class FilmsDialog(QDialog):
         self._job: Job | None = None
         self.problem = ""  # of the rig file
         self._state = ""
-        meaning = QLabel(_MEANING)
+        meaning = QLabel(tr(_MEANING))
         meaning.setWordWrap(True)
         meaning.setProperty("muted", True)
-        self.rig_choice = FileChoice("The rig of the films' cameras", "none: one film, its lens assumed", "No rig")
+        self.rig_choice = FileChoice(tr("The rig of the films' cameras"), tr("none: one film, its lens assumed"),
+                                     tr("No rig"))
         self.table = QTableWidget(0, 4)
-        self.table.setHorizontalHeaderLabels(["Camera", "Film", "", "Begins later by"])
+        self.table.setHorizontalHeaderLabels([tr("Camera"), tr("Film"), "", tr("Begins later by")])
         self.table.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         self.table.setSelectionBehavior(QTableWidget.SelectionBehavior.SelectRows)
         self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
         self.table.verticalHeader().hide()
         self.table.setMinimumHeight(_TABLE_PX)
-        self.add_button, self.folder_button = QPushButton("Add films …"), QPushButton("Add a folder …")
-        self.folder_button.setToolTip("All films in a folder, in the order of their names.")
-        self.remove_button = QPushButton("Remove")
-        self.remove_button.setToolTip("Take the chosen film off the list (Delete); the file stays.")
-        self.sound_button, self.flash_button = QPushButton("Align by sound"), QPushButton("Align by a flash")
-        self.sound_button.setToolTip("Find by how much later each film began: what all of them heard, such as a clap.")
-        self.flash_button.setToolTip("Find by how much later each film began: a lamp that goes on in all of them.")
+        self.add_button, self.folder_button = QPushButton(tr("Add films …")), QPushButton(tr("Add a folder …"))
+        self.folder_button.setToolTip(tr("All films in a folder, in the order of their names."))
+        self.remove_button = QPushButton(tr("Remove"))
+        self.remove_button.setToolTip(tr("Take the chosen film off the list (Delete); the file stays."))
+        self.sound_button, self.flash_button = QPushButton(tr("Align by sound")), QPushButton(tr("Align by a flash"))
+        self.sound_button.setToolTip(tr("Find by how much later each film began: what all of them heard, such as a "
+                                        "clap."))
+        self.flash_button.setToolTip(tr("Find by how much later each film began: a lamp that goes on in all of them."))
         self.sentence = Sentence(_LINES)
         self.bar = QProgressBar()
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
-        self.track_button, self.close_button = QPushButton("Track …"), QPushButton("Close")
+        self.track_button, self.close_button = QPushButton(tr("Track …")), QPushButton(tr("Close"))
         self.track_button.setDefault(True)
-        self.track_button.setToolTip("Choose where the recording is written; it opens when it is whole.")
+        self.track_button.setToolTip(tr("Choose where the recording is written; it opens when it is whole."))
         self._lay_out(meaning)
         self.add_button.clicked.connect(self._choose_films)
         self.folder_button.clicked.connect(self._choose_folder)
@@ -101,7 +103,7 @@ class FilmsDialog(QDialog):
 
     def _lay_out(self, meaning: QLabel) -> None:
         rig, films, buttons = QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
-        rig.addWidget(QLabel("Rig"))
+        rig.addWidget(QLabel(tr("Rig")))
         rig.addWidget(self.rig_choice, 1)
         for button in (self.add_button, self.folder_button, self.remove_button):
             button.setAutoDefault(False)
@@ -156,7 +158,7 @@ class FilmsDialog(QDialog):
                 later.setRange(-_LATEST_S, _LATEST_S)
                 later.setDecimals(4)
                 later.setSuffix(" s")
-                later.setToolTip("By how much this film began after the others.")
+                later.setToolTip(tr("By how much this film began after the others."))
                 self.table.setCellWidget(row, 0, QComboBox())
                 self.table.setItem(row, 1, name)
                 self.table.setItem(row, 2, what)
@@ -176,16 +178,17 @@ class FilmsDialog(QDialog):
 
     def _choose_films(self) -> None:
         names, _ = QFileDialog.getOpenFileNames(
-            self, "Films", str(self._folder()), f"Films ({' '.join(f'*{one}' for one in ENDINGS)});;All files (*)")
+            self, tr("Films"), str(self._folder()),
+            tr("Films ({names});;All files (*)", names=" ".join(f"*{one}" for one in ENDINGS)))
         self.add([Path(name) for name in names])
 
     def _choose_folder(self) -> None:
-        name = QFileDialog.getExistingDirectory(self, "A folder of films", str(self._folder()))
+        name = QFileDialog.getExistingDirectory(self, tr("A folder of films"), str(self._folder()))
         if name:
             found = sorted(path for path in Path(name).iterdir() if path.suffix.lower() in ENDINGS)
             self.add(found)
             if not found:
-                self.sentence.setText(f"{name} holds no films ({', '.join(ENDINGS)}).")
+                self.sentence.setText(tr("{name} holds no films ({names}).", name=name, names=", ".join(ENDINGS)))
 
     def _folder(self) -> Path:
         return self.films[-1].path.parent if self.table.rowCount() else Path.home()
@@ -217,7 +220,7 @@ class FilmsDialog(QDialog):
         for row in range(self.table.rowCount()):
             item = self.table.item(row, 2)
             if item is not None and self._path(row) == path:
-                item.setText("no film" if wrong else text)
+                item.setText(tr("no film") if wrong else text)
                 item.setToolTip(text)
                 item.setData(Qt.ItemDataRole.UserRole, wrong)
         self.table.resizeColumnToContents(2)
@@ -229,16 +232,16 @@ class FilmsDialog(QDialog):
         if self.problem:
             return self.problem
         if not films:
-            return "Add the film of a hand, or those of several cameras."
+            return tr("Add the film of a hand, or those of several cameras.")
         for row in range(len(films)):
             item = self.table.item(row, 2)
             if item is not None and item.data(Qt.ItemDataRole.UserRole):
                 return item.toolTip()
         if self._rig is None and len(films) > 1:
-            return "Several films need the rig of their cameras: choose its file, or remove all films but one."
+            return tr("Several films need the rig of their cameras: choose its file, or remove all films but one.")
         cameras = [film.camera for film in films]
         twice = next((name for name in cameras if cameras.count(name) > 1), None)
-        return f"Camera {twice} has two films: choose another camera for one of them." if twice else ""
+        return tr("Camera {twice} has two films: choose another camera for one of them.", twice=twice) if twice else ""
 
     def _show_state(self) -> None:
         busy, wanting = self._job is not None, self._wanting()
@@ -247,9 +250,9 @@ class FilmsDialog(QDialog):
         self.remove_button.setEnabled(not busy and bool(self.table.selectedIndexes()))
         for button in (self.sound_button, self.flash_button):
             button.setEnabled(not busy and len(self.films) > 1)
-        self.track_button.setText("Cancel" if busy else "Track …")
+        self.track_button.setText(tr("Cancel") if busy else tr("Track …"))
         self.track_button.setEnabled(busy or not wanting)
-        state = wanting or "Ready. Looking for hands takes about as long as the films."
+        state = wanting or tr("Ready. Looking for hands takes about as long as the films.")
         if not busy and state != self._state:  # what came of the last work stays until something else is missing
             self._state = state
             self.sentence.setText(state)
@@ -261,7 +264,7 @@ class FilmsDialog(QDialog):
             self.cancel()
             return
         first = self.films[0].path
-        name, _ = QFileDialog.getSaveFileName(self, "Write the recording to",
+        name, _ = QFileDialog.getSaveFileName(self, tr("Write the recording to"),
                                               str(first.with_name(f"{first.stem}-hand.rhotlog")), tr(LOG_FILTER))
         if name:
             self.track(Path(name))
@@ -280,7 +283,7 @@ class FilmsDialog(QDialog):
             try:
                 return self._solver.run(function, arguments, progress.report)
             except StoppedError as exc:
-                raise CancelledError("Cancelled.") from exc
+                raise CancelledError(tr("Cancelled.")) from exc
 
         self._job = Job(work, done, self._fail, self._report, self).start()
         self._show_state()
@@ -294,7 +297,7 @@ class FilmsDialog(QDialog):
             self._solver.stop()
             self.bar.setValue(0)
             self._show_state()
-            self.sentence.setText("Cancelled; nothing was written.")
+            self.sentence.setText(tr("Cancelled; nothing was written."))
 
     def _report(self, text: str, fraction: float) -> None:
         self.sentence.setText(f"{text} …")
@@ -308,8 +311,8 @@ class FilmsDialog(QDialog):
             assert isinstance(later, QDoubleSpinBox)
             later.setValue(offsets[str(self._path(row))].seconds)
         self._show_state()
-        self.sentence.setText("Aligned: " + ", ".join(f"{Path(path).name} {one.seconds:+.3f} ± {one.std_s:.3f} s"
-                                                      for path, one in offsets.items()) + ".")
+        found = ", ".join(f"{Path(path).name} {one.seconds:+.3f} ± {one.std_s:.3f} s" for path, one in offsets.items())
+        self.sentence.setText(tr("Aligned: {offsets}.", offsets=found))
 
     def _finish(self, log: Path, said: list[str]) -> None:
         self._job = None

@@ -22,6 +22,7 @@ from rhot_app.recording.raw_log import CONTINUES, LogReader
 from rhot_app.recording.video import videos_of
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.scene import make_tracker
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.dialogs.recordings import LOG_SUFFIX
 from rhot_app.ui.replay.run import CODES, LOST, ReadableLog, being_recorded, condition_bins
 from rhot_node.errors import NodeError, printable
@@ -74,7 +75,7 @@ def summarise_log(log: Path, *, progress: Progress = silent) -> Summary:
             codes.append(CODES.get(condition_of(state), LOST))
         since_first_s = 1e-9 * (np.array(times, np.int64) - (records.first_ns or 0))
         bins = condition_bins(np.maximum(since_first_s, 0.0), np.array(codes, np.int8), records.duration_s, BAR_PARTS)
-        note = records.note if records.datagrams else "It holds no datagrams: nothing was streaming."
+        note = records.note if records.datagrams else tr("It holds no datagrams: nothing was streaming.")
         return Summary(records.duration_s, len(times), bins.tolist(), len(bookmarks_of(records.marked)), note)
     finally:
         reader.close()
@@ -120,14 +121,14 @@ class Library:
         """Call a recording `name`; returns its new path. Raises RecordingError."""
         name = name.strip().removesuffix(LOG_SUFFIX)
         if not name or name.startswith(".") or "/" in name or not name.isprintable():
-            raise RecordingError(f"“{name}” is no name for a recording: use letters, figures, blanks, dots and dashes, "
-                                 "no slash, and no dot at the beginning.")
+            raise RecordingError(tr("“{name}” is no name for a recording: use letters, figures, blanks, dots and "
+                                    "dashes, no slash, and no dot at the beginning.", name=name))
         target = path.with_name(f"{name}{LOG_SUFFIX}")
         if target == path:
             return path
         _refuse_while_recorded(path)
         if target.exists():
-            raise RecordingError(f"there is a recording called {name} already; choose another name.")
+            raise RecordingError(tr("there is a recording called {name} already; choose another name.", name=name))
         return _move_all(path, target)
 
     def delete(self, path: Path) -> None:
@@ -137,7 +138,8 @@ class Library:
         try:
             trash.mkdir(exist_ok=True)
         except OSError as exc:
-            raise RecordingError(f"{trash}: cannot be made ({exc.strerror}), so nothing was deleted.") from exc
+            raise RecordingError(tr("{trash}: cannot be made ({strerror}), so nothing was deleted.", trash=trash,
+                                    strerror=exc.strerror)) from exc
         target = trash / path.name
         number = 1
         while target.exists() or videos_of(target):
@@ -156,7 +158,7 @@ class Library:
             return None
         before, lies_at = self._deleted[-1]
         if before.exists():
-            raise RecordingError(f"there is another recording called {before.stem} now; rename it first.")
+            raise RecordingError(tr("there is another recording called {stem} now; rename it first.", stem=before.stem))
         _move_all(lies_at, before)
         self._deleted.pop()
         return before
@@ -190,16 +192,17 @@ def _entry(path: Path) -> Entry:
 def _refuse_while_recorded(path: Path) -> None:
     try:
         if being_recorded(path):
-            raise RecordingError(f"{path.stem} is being recorded; stop the recording first.")
+            raise RecordingError(tr("{stem} is being recorded; stop the recording first.", stem=path.stem))
     except OSError as exc:
-        raise RecordingError(f"{path}: cannot be read ({exc.strerror}).") from exc
+        raise RecordingError(tr("{path}: cannot be read ({strerror}).", path=path, strerror=exc.strerror)) from exc
 
 
 def _move_all(path: Path, target: Path) -> Path:
     """Move a log and the videos that were collected beside it; returns the log's new path. Raises RecordingError."""
     videos = videos_of(path)
     if videos and videos_of(target):
-        raise RecordingError(f"there are videos of another recording called {target.stem} already; move them first.")
+        raise RecordingError(tr("there are videos of another recording called {stem} already; move them first.",
+                                stem=target.stem))
     moved = _move(path, target)
     for video in videos:
         _move(video, target.with_name(target.stem + video.name.removeprefix(path.stem)))
@@ -210,4 +213,5 @@ def _move(path: Path, target: Path) -> Path:
     try:
         return path.rename(target)
     except OSError as exc:
-        raise RecordingError(f"{path}: cannot be moved to {target} ({exc.strerror}).") from exc
+        raise RecordingError(tr("{path}: cannot be moved to {target} ({strerror}).", path=path, target=target,
+                                strerror=exc.strerror)) from exc

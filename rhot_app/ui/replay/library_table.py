@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import DASH, bytes_text
@@ -64,7 +65,7 @@ class Line:
     def condition(self) -> str:
         """What stands in the bar's place."""
         if self.entry.problem:
-            return "cannot be read"
+            return tr("cannot be read")
         return self.words if self.summary is None else ""
 
     def roles(self) -> dict[int, Any]:
@@ -76,8 +77,8 @@ class Line:
         if self.summary is None or self.entry.problem:
             return self.roles()
         found = self.summary
-        said = found.note or (f"{found.states} states, {found.bookmarks} bookmarks. Green and full: tracking; yellow: "
-                              "partial; red and low: lost; empty: no state.")
+        said = found.note or (tr("{states} states, {bookmarks} bookmarks. Green and full: tracking; yellow: partial; "
+                                 "red and low: lost; empty: no state.", states=found.states, bookmarks=found.bookmarks))
         return {_CODES: found.conditions, Qt.ItemDataRole.ToolTipRole: said}
 
 
@@ -88,13 +89,13 @@ class RecordingTable(RecordTable[Line]):
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
         super().__init__((
-            Column("Name", lambda line: line.entry.path.stem, roles=Line.roles,
+            Column(tr("Name"), lambda line: line.entry.path.stem, roles=Line.roles,
                    write=lambda line, name: self.named.emit(line.entry.path, name)),
-            Column("Date", lambda line: f"{line.entry.created:%d %b %Y, %H:%M}", roles=Line.roles),
-            Column("Rig", lambda line: line.entry.rig_name or DASH, roles=Line.roles),
-            Column("Length", lambda line: line.length, number=True, roles=Line.roles),
-            Column("Size", lambda line: bytes_text(line.entry.size), number=True, roles=Line.roles),
-            Column("Condition", lambda line: line.condition, roles=Line.bar)), parent)
+            Column(tr("Date"), lambda line: f"{line.entry.created:%d %b %Y, %H:%M}", roles=Line.roles),
+            Column(tr("Rig"), lambda line: line.entry.rig_name or DASH, roles=Line.roles),
+            Column(tr("Length"), lambda line: line.length, number=True, roles=Line.roles),
+            Column(tr("Size"), lambda line: bytes_text(line.entry.size), number=True, roles=Line.roles),
+            Column(tr("Condition"), lambda line: line.condition, roles=Line.bar)), parent)
         self._bars = BarDelegate(scheme, self)
         self.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.setShowGrid(False)

@@ -21,6 +21,7 @@ from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import Collected, collect_videos
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.job import Job, Progress
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.models.palette import Scheme
@@ -49,25 +50,25 @@ class LibraryWindow(ToolWindow):
     def __init__(self, scheme: Scheme, folder: Path, cache: Path | None = None,
                  parent: QWidget | None = None, rig: Callable[[], Rig | None] = lambda: None,
                  make_solver: Callable[[], Solver] = Solver) -> None:
-        super().__init__("Recordings", "recording", parent, _SIZE, "The recordings")
+        super().__init__(tr("Recordings"), "recording", parent, _SIZE, tr("The recordings"))
         self.library = Library(folder, cache or summaries_folder())
         self.summaries = Summaries(self.library, make_solver(), self)
         self._listing: Job | None = None
         self._collecting: Job | None = None
         self._rig = rig
-        self.empty = EmptyState("No recordings yet. Press Record, or R, while a rig is open.")
+        self.empty = EmptyState(tr("No recordings yet. Press Record, or R, while a rig is open."))
         self.table = RecordingTable(scheme)
         self.sentence = Sentence(2)
-        self.open_button = _button("Open", "Track the recording and play it (Enter).")
-        self.rename_button = _button("Rename", "Call the recording something else (F2).")
-        self.delete_button = _button("Delete", "Delete the recording; Undo brings it back until this page is closed "
-                                     "(Delete).")
-        self.undo_button = _button("Undo", "Bring back the recording that was deleted last (Ctrl+Z).")
-        self.video_button = _button("Collect video", "Fetch the frames that the cameras recorded beside the recording; "
-                                    "they come to lie beside it.")
+        self.open_button = _button(tr("Open"), tr("Track the recording and play it (Enter)."))
+        self.rename_button = _button(tr("Rename"), tr("Call the recording something else (F2)."))
+        self.delete_button = _button(tr("Delete"), tr("Delete the recording; Undo brings it back until this page is "
+                                                      "closed (Delete)."))
+        self.undo_button = _button(tr("Undo"), tr("Bring back the recording that was deleted last (Ctrl+Z)."))
+        self.video_button = _button(tr("Collect video"), tr("Fetch the frames that the cameras recorded beside the "
+                                                            "recording; they come to lie beside it."))
         self.strip = WorkStrip()
-        self.folder_button = _button("Open folder", "Show the recordings in the desktop's file manager.")
-        self.close_button = _button("Close", "Close this page. What was deleted is then gone for good.")
+        self.folder_button = _button(tr("Open folder"), tr("Show the recordings in the desktop's file manager."))
+        self.close_button = _button(tr("Close"), tr("Close this page. What was deleted is then gone for good."))
         self._lay_out()
         self._connect()
         self._show_choice()
@@ -159,12 +160,13 @@ class LibraryWindow(ToolWindow):
         self.video_button.setEnabled(entry is not None and entry.video and self._collecting is None)
         undoable = self.library.undoable
         self.undo_button.setEnabled(bool(undoable))
-        said = [f"Deleted {undoable}. Undo brings it back; it is gone for good when this page is closed."
-                ] if undoable else []
+        said = [tr("Deleted {undoable}. Undo brings it back; it is gone for good when this page is closed.",
+                   undoable=undoable)] if undoable else []
         if entry is not None and entry.problem:
             said.append(entry.problem)
         elif entry is not None and entry.continues:
-            said.append(f"{entry.path.stem} continues {entry.continues}: the engine had stopped and was started again.")
+            said.append(tr("{stem} continues {continues}: the engine had stopped and was started again.",
+                           stem=entry.path.stem, continues=entry.continues))
         self.sentence.setText("\n".join(said))
 
     # -- what the buttons do ---------------------------------------------------------------------------------------
@@ -225,15 +227,16 @@ class LibraryWindow(ToolWindow):
 
         def done(videos: list[Collected]) -> None:
             dropped = sum(video.info.dropped for video in videos)
-            end(f"Collected {', '.join(video.path.name for video in videos)}."
-                + (f" The cameras' computers were too slow for {dropped} frames." if dropped else ""))
+            end(tr("Collected {names}.", names=", ".join(video.path.name for video in videos))
+                + (tr(" The cameras' computers were too slow for {dropped} frames.", dropped=dropped) if dropped
+                   else ""))
 
         def show(text: str, fraction: float) -> None:
             now_s = time.monotonic()
             remaining.report(fraction, now_s)
             self.strip.show_work(text, fraction, remaining.text(now_s))
         self._collecting = Job(lambda progress: _collect(path, rig, progress), done, end, show, self).start()
-        self.strip.show_work("Asking the nodes …", 0.0, "")
+        self.strip.show_work(tr("Asking the nodes …"), 0.0, "")
         self._show_choice()
 
     def _stop_collecting(self) -> None:
@@ -248,7 +251,7 @@ class LibraryWindow(ToolWindow):
         """Show the folder in the desktop's own file manager."""
         folder = self.library.folder
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self.sentence.setText(f"This desktop opens no folders. The recordings lie in {folder}.")
+            self.sentence.setText(tr("This desktop opens no folders. The recordings lie in {folder}.", folder=folder))
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802
         """Back from another window: look again, a recording may have been made meanwhile."""

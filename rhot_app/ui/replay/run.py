@@ -33,6 +33,7 @@ from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.smoothing import NOT_SMOOTHED
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.models.meters import JitterWindow
 
 Array = NDArray[np.float64]
@@ -83,7 +84,7 @@ def track_log(log: Path, rig: Rig, out: Path, smooth: bool = False, *, progress:
     reader = LogReader(log)
     try:
         tracker = make_tracker(rig, smooth=smooth)
-        progress("Preparing the tracker …", 0.0)
+        progress(tr("Preparing the tracker …"), 0.0)
         warm_up(make_tracker(rig), rig)
         records = ReadableLog(reader, progress)
         collected = _Collected(rig)
@@ -125,15 +126,15 @@ def _write(file: io.FileIO, data: bytes, out: Path) -> None:
         while view:
             view = view[file.write(view):]
     except OSError as exc:
-        raise RecordingError(f"{out}: the states of the recording cannot be written ({exc.strerror}). They take about "
-                             "5 kB each; make room there.") from exc
+        raise RecordingError(tr("{out}: the states of the recording cannot be written ({strerror}). They take about 5 "
+                                "kB each; make room there.", out=out, strerror=exc.strerror)) from exc
 
 
 def _why_nothing(records: ReadableLog) -> str:
     if not records.datagrams:
-        return "it holds no datagrams: nothing was streaming while it was recorded. There is nothing to replay."
-    return (f"no state could be made of its {records.datagrams} datagrams. Is this the rig that it was recorded with, "
-            "and were both cameras streaming?")
+        return tr("it holds no datagrams: nothing was streaming while it was recorded. There is nothing to replay.")
+    return (tr("no state could be made of its {datagrams} datagrams. Is this the rig that it was recorded with, and "
+               "were both cameras streaming?", datagrams=records.datagrams))
 
 
 class ReadableLog:
@@ -160,7 +161,7 @@ class ReadableLog:
                 self.first_ns = record.t_master_ns if self.first_ns is None else self.first_ns
                 self.last_ns = record.t_master_ns
                 if self.datagrams % 64 == 0:
-                    self._progress("Tracking the recording …", min(1.0, done / size))
+                    self._progress(tr("Tracking the recording …"), min(1.0, done / size))
             elif record.kind is RecordKind.BOOKMARK:
                 self.marked.append(record)
             yield record
@@ -175,12 +176,12 @@ class ReadableLog:
         """What of the log could not be read, "" when all was."""
         losses, said = self._reader.losses, list[str]()
         if self._growing:
-            return f"{self._reader.path} is still being recorded: what was written until now is shown."
+            return tr("{path} is still being recorded: what was written until now is shown.", path=self._reader.path)
         if losses.damage:
-            said.append(f"In {self._reader.path} {losses.damage}.")
+            said.append(tr("In {path} {damage}.", path=self._reader.path, damage=losses.damage))
         if losses.end:
-            said.append(f"Of {self._reader.path} {losses.end}.")
-        return " ".join([*said, "Everything else is shown."] if said else said)
+            said.append(tr("Of {path} {end}.", path=self._reader.path, end=losses.end))
+        return " ".join([*said, tr("Everything else is shown.")] if said else said)
 
 
 class _Collected:
@@ -273,7 +274,8 @@ def new_run_path(folder: Path, number: int) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as exc:
-        raise RecordingError(f"{folder}: cannot be made ({exc.strerror}), so there is no room for the states.") from exc
+        raise RecordingError(tr("{folder}: cannot be made ({strerror}), so there is no room for the states.",
+                                folder=folder, strerror=exc.strerror)) from exc
     for path in folder.glob("*.states"):
         with contextlib.suppress(OSError):
             if time.time() - path.stat().st_mtime > _ABANDONED_S:

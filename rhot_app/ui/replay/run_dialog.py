@@ -23,11 +23,12 @@ from PySide6.QtWidgets import (
 
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.models.words import Remaining
 from rhot_app.ui.replay.run import Run, Tracked, new_run_path, track_log
 from rhot_app.ui.replay.session import Comparison, TrackerChoice
 
-_TRACKERS = (("as the rig says", ""), ("classic", "classic"), ("estimator", "estimator"))
+_TRACKERS = ((tr_noop("as the rig says"), ""), (tr_noop("classic"), "classic"), (tr_noop("estimator"), "estimator"))
 _WIDTH_PX = 480
 
 
@@ -36,12 +37,13 @@ class FileChoice(QWidget):
 
     changed = Signal()
 
-    def __init__(self, title: str, own: str, without: str = "As recorded", parent: QWidget | None = None) -> None:
+    def __init__(self, title: str, own: str, without: str = tr_noop("As recorded"),
+                 parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._title, self._own = title, own
         self.path: Path | None = None
         self.label = QLabel(own)
-        self.choose_button, self.forget_button = QPushButton("Choose …"), QPushButton(without)
+        self.choose_button, self.forget_button = QPushButton(tr("Choose …")), QPushButton(tr(without))
         for button in (self.choose_button, self.forget_button):
             button.setAutoDefault(False)
         self.choose_button.clicked.connect(self.choose)
@@ -56,7 +58,7 @@ class FileChoice(QWidget):
     def choose(self) -> None:
         """Ask for a file."""
         name, _ = QFileDialog.getOpenFileName(self, self._title, str(self.path.parent if self.path else Path.home()),
-                                              "JSON files (*.json);;All files (*)")
+                                              tr("JSON files (*.json);;All files (*)"))
         if name:
             self.show_path(Path(name))
 
@@ -77,28 +79,28 @@ class RunDialog(QDialog):
     def __init__(self, *, beside: bool, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._beside = beside
-        self.setWindowTitle("Compare with another run" if beside else "Track again")
+        self.setWindowTitle(tr("Compare with another run") if beside else tr("Track again"))
         self.setProperty("guide", "recording")
         self.setMinimumWidth(_WIDTH_PX)
-        words = QLabel("The recording is tracked once more, and both hands are shown together." if beside else
-                       "The recording is tracked once more; the moment that is shown stays.")
+        words = QLabel(tr("The recording is tracked once more, and both hands are shown together.") if beside
+                       else tr("The recording is tracked once more; the moment that is shown stays."))
         words.setWordWrap(True)
         self.tracker_box = QComboBox()
         for text, kind in _TRACKERS:
-            self.tracker_box.addItem(text, kind)
-        self.rig_choice = FileChoice("Track with a rig file", "as recorded")
-        self.hand_choice = FileChoice("Track with a hand file", "the rig's hand")
-        self.smooth_box = QCheckBox("Smooth")
-        self.smooth_box.setToolTip("Every state uses what came after it as well. Only the estimator can.")
-        self.start_button, close = QPushButton("Track"), QPushButton("Cancel")
+            self.tracker_box.addItem(tr(text), kind)
+        self.rig_choice = FileChoice(tr("Track with a rig file"), tr("as recorded"))
+        self.hand_choice = FileChoice(tr("Track with a hand file"), tr("the rig's hand"))
+        self.smooth_box = QCheckBox(tr("Smooth"))
+        self.smooth_box.setToolTip(tr("Every state uses what came after it as well. Only the estimator can."))
+        self.start_button, close = QPushButton(tr("Track")), QPushButton(tr("Cancel"))
         self.start_button.setDefault(True)
         self.start_button.clicked.connect(self._choose)
         close.clicked.connect(self.reject)
         form, buttons = QGridLayout(), QHBoxLayout()
         form.setColumnStretch(1, 1)
         form.setVerticalSpacing(8)
-        for row, (name, part) in enumerate((("Tracker", self.tracker_box), ("Rig", self.rig_choice),
-                                            ("Hand", self.hand_choice), ("", self.smooth_box))):
+        for row, (name, part) in enumerate(((tr("Tracker"), self.tracker_box), (tr("Rig"), self.rig_choice),
+                                            (tr("Hand"), self.hand_choice), ("", self.smooth_box))):
             form.addWidget(QLabel(name), row, 0)
             form.addWidget(part, row, 1)
         buttons.addStretch(1)
@@ -161,7 +163,7 @@ class TrackingWork(QObject):
     def start(self, log: Path, choice: TrackerChoice, other: Tracked | None = None) -> None:
         """Track `log`; what was under way is given up. `other`: the run that stays, to be compared with."""
         self.cancel()
-        self.text = "Reading the recording …"
+        self.text = tr("Reading the recording …")
         self._remaining = Remaining(time.monotonic())
         self._job = Job(lambda progress: self._compared(self._track(log, choice, progress), choice, other),
                         lambda found: self._finish(log, choice, *found), self._fail, self._report, self).start()
@@ -188,13 +190,13 @@ class TrackingWork(QObject):
             run = Run(tracked, out)
         except StoppedError as exc:
             out.unlink(missing_ok=True)
-            raise CancelledError("Cancelled.") from exc
+            raise CancelledError(tr("Cancelled.")) from exc
         except BaseException:
             out.unlink(missing_ok=True)
             raise
         if progress.cancelled:
             run.close()
-            raise CancelledError("Cancelled.")
+            raise CancelledError(tr("Cancelled."))
         return run
 
     @staticmethod

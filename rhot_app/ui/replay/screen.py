@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSpli
 
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.state import Condition, HandState
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.scrolled import scrolled
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import shape_pixmap
@@ -165,7 +166,7 @@ class DifferencePlot(PlotPanel):
     """One line per finger."""
 
     term = "fingertip difference"
-    title = "Fingertip difference"
+    title = tr_noop("Fingertip difference")
     unit = "mm"
     least_span = 1.0
 
@@ -222,21 +223,22 @@ class Transport(QWidget):
         super().__init__(parent)
         self._signs: list[tuple[QPushButton, str]] = []
         self._playing: bool | None = None
-        self.first_button = self._sign("first", "The beginning (Home).")
-        self.back_button = self._sign("previous", "One state back (left arrow).")
-        self.play_button = self._sign("play", "Play or pause (Space).")
-        self.on_button = self._sign("next", "One state on (right arrow).")
-        self.last_button = self._sign("last", "The end (End).")
+        self.first_button = self._sign("first", tr("The beginning (Home)."))
+        self.back_button = self._sign("previous", tr("One state back (left arrow)."))
+        self.play_button = self._sign("play", tr("Play or pause (Space)."))
+        self.on_button = self._sign("next", tr("One state on (right arrow)."))
+        self.last_button = self._sign("last", tr("The end (End)."))
         self.speed_box = QComboBox()
         self.speed_box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self.speed_box.setToolTip("How fast it plays, times real time.")
+        self.speed_box.setToolTip(tr("How fast it plays, times real time."))
         for speed in SPEEDS:
             self.speed_box.addItem(f"{speed:g} ×", speed)
         self.speed_box.setCurrentIndex(SPEEDS.index(1.0))
-        self.loop_begin_button = self._word("Loop from here", "The range that is repeated begins here ([).")
-        self.loop_end_button = self._word("to here", "The range that is repeated ends here (]).")
-        self.loop_clear_button = self._word("No loop", "Repeat nothing.")
-        self.bookmark_button = self._word("Bookmark", "Write a few words about this moment into the recording (B).")
+        self.loop_begin_button = self._word(tr("Loop from here"), tr("The range that is repeated begins here ([)."))
+        self.loop_end_button = self._word(tr("to here"), tr("The range that is repeated ends here (])."))
+        self.loop_clear_button = self._word(tr("No loop"), tr("Repeat nothing."))
+        self.bookmark_button = self._word(tr("Bookmark"),
+                                          tr("Write a few words about this moment into the recording (B)."))
         self.place = QLabel("")
         widest = "00:00.00 of 00:00.00"  # the number of the state is cut off in a narrow window
         self.place.setMinimumWidth(self.place.fontMetrics().horizontalAdvance(widest))

@@ -16,6 +16,7 @@ from rhot_app.project import Rig, load_rig, with_tracker
 from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.state import HandState
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.models.series import RecordedSeries
 from rhot_app.ui.replay.run import Codes, Run, Tracked, condition_bins
 
@@ -213,10 +214,10 @@ class TrackerChoice:
     @property
     def text(self) -> str:
         """In words, e.g. "estimator, desk.json"."""
-        parts = [{"classic": "classic tracker"}.get(self.tracker, self.tracker)] if self.tracker else []
+        parts = [tr({"classic": tr_noop("classic tracker")}.get(self.tracker, self.tracker))] if self.tracker else []
         parts += [path.name for path in (self.rig, self.hand) if path is not None]
-        parts += ["smoothed"] if self.smooth else []
-        return ", ".join(parts) or "as recorded"
+        parts += [tr("smoothed")] if self.smooth else []
+        return ", ".join(parts) or tr("as recorded")
 
 
 class Replay:
@@ -298,8 +299,8 @@ class Replay:
     def position_text(self) -> str:
         """Where the recording stands, e.g. "0:01.20 of 0:04.00, state 121 of 400"."""
         player = self.player
-        return (f"{time_text(player.position_s)} of {time_text(player.duration_s)}, state {player.number + 1} of "
-                f"{len(self.run)}")
+        return tr("{time} of {length}, state {number} of {count}", time=time_text(player.position_s),
+                  length=time_text(player.duration_s), number=player.number + 1, count=len(self.run))
 
     @property
     def rate_hz(self) -> float:

@@ -9,6 +9,7 @@ from PySide6.QtCore import QObject, Signal
 
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.replay.library import Entry, Library, Summary, summarise_log
 
 
@@ -43,7 +44,7 @@ class Summaries(QObject):
 
     def words(self, path: Path) -> str:
         """What stands in a summary's place: how far it is, or why there is none."""
-        return self._words.get(path, "waiting …")
+        return self._words.get(path, tr("waiting …"))
 
     def close(self) -> None:
         """End the work and its process."""
@@ -68,7 +69,7 @@ class Summaries(QObject):
         try:
             made: Summary = self._solver.run(summarise_log, (path,), progress.report)
         except StoppedError as exc:
-            raise CancelledError("Cancelled.") from exc
+            raise CancelledError(tr("Cancelled.")) from exc
         self._library.keep_summary(path, made)
         return made
 

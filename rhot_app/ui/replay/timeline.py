@@ -9,6 +9,7 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QHelpEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.replay.run import LOST, NO_STATE, PARTIAL, TRACKING, Codes
 from rhot_app.ui.replay.session import Replay, time_text
@@ -19,7 +20,8 @@ FLAG_PX = 12
 _NEAR_PX = 6
 _HEIGHT_PX = FLAG_PX + BAR_PX + 12
 
-WORDS = {TRACKING: "tracking", PARTIAL: "partial", LOST: "lost", NO_STATE: "no state"}
+WORDS = {TRACKING: tr_noop("tracking"), PARTIAL: tr_noop("partial"), LOST: tr_noop("lost"),
+         NO_STATE: tr_noop("no state")}
 _TONES = {TRACKING: "good", PARTIAL: "caution", LOST: "bad"}
 _HEIGHTS = {TRACKING: 1.0, PARTIAL: 0.6, LOST: 0.25}
 """Part of the bar's height, so that colour is not the only key."""
@@ -55,7 +57,7 @@ class Timeline(QWidget):
         self.setMinimumHeight(_HEIGHT_PX)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setAccessibleName("Timeline of the recording")
+        self.setAccessibleName(tr("Timeline of the recording"))
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Flat and wide."""
@@ -129,7 +131,7 @@ class Timeline(QWidget):
         position = self.position_at(x)
         code = int(self.codes[min(max(int(x - MARGIN_PX), 0), len(self.codes) - 1)])
         mark = self._replay.bookmark_near(position, self._seconds_per_px() * _NEAR_PX)
-        return f"{time_text(position)}: {WORDS[code]}" + (f"\n{mark.text}" if mark is not None else "")
+        return f"{time_text(position)}: {tr(WORDS[code])}" + (f"\n{mark.text}" if mark is not None else "")
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
         """Range, bar, flags, position."""

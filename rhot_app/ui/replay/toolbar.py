@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton,
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark
 from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.language import tr
 from rhot_app.ui.dialogs.recordings import BookmarkDialog
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.state_badge import StateBadge
@@ -23,24 +24,26 @@ class ReplayToolBar(QToolBar):
     bookmark_chosen = Signal(float)
 
     def __init__(self, scheme: Scheme, parent: QWidget | None = None) -> None:
-        super().__init__("Replay", parent)
+        super().__init__(tr("Replay"), parent)
         self.setObjectName("replay toolbar")
         self.setMovable(False)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        self.word = QLabel("REPLAY")
+        self.word = QLabel(tr("REPLAY"))
         self.name = QLabel("")
-        self.open = self._action("Open …", "Open a recording (Ctrl+O).")
-        self.again = self._action("Track again …", "Track the recording with another tracker, rig or hand.")
-        self.compare = self._action("Compare …", "Track it in another way too, and show both hands together.")
-        self.alone = self._action("End comparison", "Show one run alone again.")
-        self.export = self._action("Export …", "Write these states as a file for other programs (Ctrl+E).")
-        self.trim = self._action("Trim …", "Save the repeated range as a recording of its own.")
-        self.pictures = self._action("Pictures", "What the cameras saw, with the hand drawn over it (P).")
+        self.open = self._action(tr("Open …"), tr("Open a recording (Ctrl+O)."))
+        self.again = self._action(tr("Track again …"), tr("Track the recording with another tracker, rig or hand."))
+        self.compare = self._action(tr("Compare …"), tr("Track it in another way too, and show both hands together."))
+        self.alone = self._action(tr("End comparison"), tr("Show one run alone again."))
+        self.export = self._action(tr("Export …"), tr("Write these states as a file for other programs (Ctrl+E)."))
+        self.trim = self._action(tr("Trim …"), tr("Save the repeated range as a recording of its own."))
+        self.pictures = self._action(tr("Pictures"), tr("What the cameras saw, with the hand drawn over it (P)."))
         self.pictures.setCheckable(True)
-        self.remove = self._action("Remove the bookmark here", "Remove the bookmark at which the recording stands.")
+        self.remove = self._action(tr("Remove the bookmark here"),
+                                   tr("Remove the bookmark at which the recording stands."))
         self.bookmarks_button, self.menu = QToolButton(), QMenu(self)
-        self.bookmarks_button.setText("Bookmarks")
-        self.bookmarks_button.setToolTip("Moments that were marked, while recording or here; choose one to go there.")
+        self.bookmarks_button.setText(tr("Bookmarks"))
+        self.bookmarks_button.setToolTip(tr("Moments that were marked, while recording or here; choose one to go "
+                                            "there."))
         self.bookmarks_button.setMenu(self.menu)
         self.bookmarks_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self.badge = StateBadge(scheme)
@@ -69,7 +72,7 @@ class ReplayToolBar(QToolBar):
 
     def show_replay(self, replay: Replay | None) -> None:
         """Another recording, another run, or other bookmarks."""
-        name = replay.path.name if replay is not None else "no recording"
+        name = replay.path.name if replay is not None else tr("no recording")
         self.name.setText(f" {self.fontMetrics().elidedText(name, Qt.TextElideMode.ElideMiddle, _NAME_PX)}  ")
         self.name.setToolTip(str(replay.path) if replay is not None else "")
         for action in (self.again, self.compare, self.export, self.trim, self.pictures):
@@ -83,7 +86,7 @@ class ReplayToolBar(QToolBar):
             entry = self.menu.addAction(replay.bookmark_text(mark))
             entry.triggered.connect(lambda checked=False, position=position: self.bookmark_chosen.emit(position))
         if replay is not None and not replay.bookmarks:
-            self.menu.addAction("No bookmarks yet: B sets one.").setEnabled(False)
+            self.menu.addAction(tr("No bookmarks yet: B sets one.")).setEnabled(False)
         self.menu.addSeparator()
         self.menu.addAction(self.remove)
 

@@ -22,7 +22,7 @@ from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.tool_window import AS_MAIN, WindowTools
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
@@ -41,7 +41,7 @@ from rhot_app.ui.replay.work_strip import WorkStrip
 TICK_MS = 16
 _AT_BOOKMARK_S = 0.02  # a bookmark is where it was set, to a state or two
 
-_NO_STATE = Look("NO STATE", "cross", "bad", "The recording has no state at this moment.")
+_NO_STATE = Look(tr_noop("NO STATE"), "cross", "bad", tr_noop("The recording has no state at this moment."))
 
 
 class ReplayWindow(QMainWindow):
@@ -56,7 +56,7 @@ class ReplayWindow(QMainWindow):
         super().__init__(parent)
         self._clock = clock
         self.setObjectName("replay window")
-        self.tools = WindowTools(self, "RHOT replay", "recording", "Replay")
+        self.tools = WindowTools(self, tr("RHOT replay"), "recording", tr("Replay"))
         self.resize(AS_MAIN)
         self.replay: Replay | None = None
         self.work = TrackingWork(make_solver(), states, self)
@@ -135,7 +135,7 @@ class ReplayWindow(QMainWindow):
         """Ask for a recording and open it."""
         folder = self.replay.path.parent if self.replay is not None else self._settings.recordings_folder
         start = newest_recording(folder) or folder
-        name, _ = QFileDialog.getOpenFileName(self, "Open a recording", str(start), tr(LOG_FILTER))
+        name, _ = QFileDialog.getOpenFileName(self, tr("Open a recording"), str(start), tr(LOG_FILTER))
         if name:
             self.open(Path(name))
 
@@ -151,7 +151,8 @@ class ReplayWindow(QMainWindow):
 
     def _show_name(self) -> None:
         self.toolbar.show_replay(self.replay)
-        self.setWindowTitle(f"{self.replay.path.name} – RHOT replay" if self.replay is not None else "RHOT replay")
+        self.setWindowTitle(tr("{name} – RHOT replay", name=self.replay.path.name) if self.replay is not None
+                            else tr("RHOT replay"))
 
     def ask_for_run(self, *, beside: bool) -> None:
         """Ask how to track it again."""
@@ -199,8 +200,8 @@ class ReplayWindow(QMainWindow):
         self._settings.set_flag("films", wanted)
         self.parts.show_films(wanted)
         if wanted and self.replay is not None and not self.parts.films.films:
-            self.tell("info", "No video of this recording is on this computer. Rig, Recordings, Collect video fetches "
-                              "what the nodes recorded.")
+            self.tell("info", tr("No video of this recording is on this computer. Rig, Recordings, Collect video "
+                                 "fetches what the nodes recorded."))
 
     def export(self) -> None:
         """Ask what to write of the states that are shown."""
@@ -224,11 +225,11 @@ class ReplayWindow(QMainWindow):
             return
         loop = self.replay.player.loop
         if loop is None:
-            self.tell("info", "Choose the part first: [ and ] set where the repeated range begins and ends.")
+            self.tell("info", tr("Choose the part first: [ and ] set where the repeated range begins and ends."))
             return
         log = self.replay.path
         start = str(log.with_stem(f"{log.stem}-part"))
-        name, _ = QFileDialog.getSaveFileName(self, "Save the repeated range as", start, tr(LOG_FILTER))
+        name, _ = QFileDialog.getSaveFileName(self, tr("Save the repeated range as"), start, tr(LOG_FILTER))
         if name:
             self.trim(Path(name), *loop)
 
@@ -238,14 +239,14 @@ class ReplayWindow(QMainWindow):
             return
         log, first_ns = self.replay.path, int(self.replay.run.tracked.times_ns[0])
         begin_ns, end_ns = (first_ns + round(1e9 * s) for s in (begin_s, end_s))
-        self.tell("info", f"Saving {out.name} …")
+        self.tell("info", tr("Saving {name} …", name=out.name))
         self.trimming = Job(lambda progress: trim_log(log, out, begin_ns, end_ns, again=True, progress=progress.report),
                             self._show_trimmed, self._trim_failed, None, self).start()
 
     def _show_trimmed(self, done: Trimmed) -> None:
         self.trimming = None
-        films = f" and {len(done.videos)} videos" if done.videos else ""
-        self.tell("info", f"Saved {done.path}{films}. Open it with Ctrl+O.")
+        films = tr(" and {n} video", " and {n} videos", len(done.videos)) if done.videos else ""
+        self.tell("info", tr("Saved {path}{films}. Open it with Ctrl+O.", path=done.path, films=films))
 
     def _trim_failed(self, sentence: str) -> None:
         self.trimming = None
@@ -344,10 +345,11 @@ class ReplayWindow(QMainWindow):
 def lasting_notices(replay: Replay | None, *, working: bool) -> list[Notice]:
     """What is said of a recording as long as it is open."""
     if replay is None:
-        return [Notice("info", "One moment. Cancel leaves nothing behind." if working else
-                       "Open a recording (Ctrl+O). F1 opens the guide.")]
+        return [Notice("info", tr("One moment. Cancel leaves nothing behind.") if working
+                       else tr("Open a recording (Ctrl+O). F1 opens the guide."))]
     said = [Notice("warning", replay.run.tracked.note, subject="equipment")] if replay.run.tracked.note else []
     if replay.second is not None:
-        said.append(Notice("info", f"Solid: {replay.choice.text}. Blue and translucent: {replay.second_choice.text}."))
-    return said or [Notice("info", f"Tracked {replay.choice.text}. Space plays, the arrow keys go from state to "
-                                   "state.")]
+        said.append(Notice("info", tr("Solid: {first}. Blue and translucent: {second}.", first=replay.choice.text,
+                                      second=replay.second_choice.text)))
+    return said or [Notice("info", tr("Tracked {text}. Space plays, the arrow keys go from state to state.",
+                                      text=replay.choice.text))]

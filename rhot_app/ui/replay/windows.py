@@ -35,7 +35,7 @@ class ReplayWindows:
         """Ask for a recording and replay it."""
         folder = self._settings.recordings_folder
         start = newest_recording(folder) or folder
-        name, _ = QFileDialog.getOpenFileName(self._parent, "Open a recording", str(start), tr(LOG_FILTER))
+        name, _ = QFileDialog.getOpenFileName(self._parent, tr("Open a recording"), str(start), tr(LOG_FILTER))
         if name:
             self.open(Path(name))
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QWidget
 
+from rhot_app.ui.common.language import tr
+
 
 class WorkStrip(QWidget):
     """Hidden while nothing is done."""
@@ -13,7 +15,7 @@ class WorkStrip(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.label, self.bar, self.cancel_button = QLabel(), QProgressBar(), QPushButton("Cancel")
+        self.label, self.bar, self.cancel_button = QLabel(), QProgressBar(), QPushButton(tr("Cancel"))
         self.bar.setRange(0, 100)
         self.bar.setTextVisible(False)
         self.cancel_button.clicked.connect(self.cancel_asked)
