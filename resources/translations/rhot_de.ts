@@ -432,6 +432,82 @@
         <translation>Verbindung mit der laufenden Engine …</translation>
     </message>
     <message>
+        <source>Reading the rig file …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Starting two simulated cameras …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The engine had no rig file, so it cannot be started again. Open a rig.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Starting the engine again …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The engine in {path} was not started by this app and goes on running.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ending what ran before …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The engine in {path} records to {log_path}. Stop that recording first, or start with another --directory.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The engine in {path} records to {log_path} and gives no answer in {limit:g} s. Try again, or end it with `kill {pid}`; what it has recorded is kept.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>An engine that was started by hand runs in {path}. Stop it first, or start the app with another --directory.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Starting the engine …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Asking the engine for its rig …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>simulated cameras</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>cameras</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>they said nothing; see {errors}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The {what} did not start: {said}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message numerus="yes">
+        <source>Starting {n} camera …</source>
+        <comment>Starting {n} cameras …</comment>
+        <translation type="unfinished">
+            <numerusform></numerusform>
+            <numerusform></numerusform>
+        </translation>
+    </message>
+    <message>
+        <source>The {what} were not ready within {limit:.0f} s; see {errors}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The simulated rig has no {what!r} to show.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Opening the rig …</source>
         <translation>Das Rig wird geöffnet …</translation>
     </message>
@@ -664,8 +740,123 @@
         <translation>Dieser Desktop öffnet keine Ordner. Die Aufnahme liegt in {folder}.</translation>
     </message>
     <message>
+        <source>Connect nodes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Select a node in the list and say which camera it is. Left and right are as seen from behind the cameras. The address of a node that is not found can be typed in: it stands on the node&apos;s console, and &lt;b&gt;hostname&amp;nbsp;-I&lt;/b&gt; prints it there.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>camera</source>
         <translation>Kamera</translation>
+    </message>
+    <message>
+        <source>address or host name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>port</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>answer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The port is {port} unless the node&apos;s settings file says otherwise (pairing_port).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ask the nodes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Possible once both addresses are entered. Nothing is changed on the nodes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Write a rig file and open it …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Possible once both nodes have answered and are paired with this computer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not asked yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>e.g. {address}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Address of the {side} node</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Where the node says who it is. The default is right unless its settings file says otherwise.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pairing port of the {side} node</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pair …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Possible once the node has answered and is not paired with this computer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>asking …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Both nodes answer. The new rig starts with textbook lenses and a 75 mm baseline: calibrate before you trust millimetres.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Write the rig file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rig files (*.json)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pairing makes sure that this computer and the node know each other, so that nobody else on the network can see its pictures, steer it, or pretend to be it.
+
+1. On the node {name}, at its console or over SSH, run:  rhot-node pair
+2. It shows a code of three groups, such as 7K2QD-9M4XT-BNWH3. Type it here within five minutes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pair with {name}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>code shown by the node</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pairing code</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pair</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Possible once {code_length} letters and digits are entered; dashes are free.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>pairing …</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>picture [px]</source>
@@ -756,8 +947,154 @@
         <translation>{name}, {hand}; Handgelenk {breadth:.0f} × {thickness:.0f} mm.</translation>
     </message>
     <message>
+        <source>{name} ({device})
+cannot be used now</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tick one camera or more, and look at each. The first one tracks alone until the others are put together with it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Films …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add films of one camera each, recorded at the same time.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Folder …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add a folder of pictures, or of raw frames.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Network …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add a camera or a phone that sends its pictures by HTTP (motion JPEG) or RTSP.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Look for webcams that were plugged in meanwhile.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name of the camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>How the camera is called in the rig, such as left.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Picture size and rate</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Larger pictures show a hand farther away, and take longer to search.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>upside down</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>mirrored</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Turn the picture by 180 degrees: the camera hangs upside down.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Exchange left and right, where a phone&apos;s program has mirrored the picture. In a mirrored picture a right hand looks like a left one.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the right hand</source>
+        <translation type="unfinished">der rechten Hand</translation>
+    </message>
+    <message>
+        <source>the left hand</source>
+        <translation type="unfinished">der linken Hand</translation>
+    </message>
+    <message>
         <source>Hand</source>
         <translation>Hand</translation>
+    </message>
+    <message>
+        <source>Which hand is tracked.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Possible once a camera is ticked.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>track</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Films of one camera each</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Films and pictures (*.mp4 *.avi *.mov *.mkv *.webm *.png *.jpg *.jpeg);;All files (*)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A folder of pictures</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Network camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Address of the pictures, such as
+http://192.168.1.20:8080/video or rtsp://192.168.1.21/live</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>looking …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{title} is in the list already.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message numerus="yes">
+        <source>Open {n} camera</source>
+        <comment>Open {n} cameras</comment>
+        <translation type="unfinished">
+            <numerusform></numerusform>
+            <numerusform></numerusform>
+        </translation>
+    </message>
+    <message>
+        <source>{rate:.0f} frames/s come.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Two cameras are called {doubled}. Give each a name of its own.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose a camera, or add a film.</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>beside the recording</source>
@@ -836,8 +1173,148 @@
         <translation>Gilt vom nächsten Start an.</translation>
     </message>
     <message>
+        <source>as recorded</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>leave gaps</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>classic</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>estimator</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>wrist, along the palm&apos;s axes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Export recording</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Choose …</source>
         <translation>Auswählen …</translation>
+    </message>
+    <message>
+        <source>Another recording (.rhotlog).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Which programs shall read it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Which tracker makes a hand of the recorded datagrams.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Where positions are told: in the rig frame, or relative to the wrist joint.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Unit of length, where the format leaves a choice.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Smooth</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Every state uses what came after it as well. Only the estimator can.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>States at equal intervals. As recorded each keeps its own time, and formats that have a rate get the cameras&apos;.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Gaps up to this length are interpolated. What is filled in is marked: by its knowledge, or in a table beside the file where the format has none.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The first fingertips as they would be written; the file holds much more.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Export …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose a file; it appears when it is whole.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recording</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Format</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tracker</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rate</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fill gaps up to</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Positions in</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Lengths in</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>, tracked as shown</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose a recording.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose a recording</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Recordings (*.rhotlog *.log);;All files (*)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cancelled; nothing was written.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Export to</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Exporting to {out} …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Exported {states} states to {path}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not all of the recording could be read: {loss}.</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Another folder.</source>
@@ -900,8 +1377,88 @@
         <translation>{title}. Dann stellt sich die Engine um.</translation>
     </message>
     <message>
+        <source>Outputs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Undo</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Which protocol the other program understands.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The joint set: which joints, in whose order and axes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source> states/s</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>every state</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>At most so many states per second; at the lowest value every state is sent.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take the last change back (Ctrl+Z).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Added {output}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Changed to {output}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{output} is on.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{output} is off.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Removed {output}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Taken back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The engine changes over …</source>
         <translation>Die Engine stellt sich um …</translation>
+    </message>
+    <message>
+        <source>Change {output}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Change</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add a stream</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>It opens at once; tracking goes on.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{meaning} Target: {target}</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>never arrived: the network lost them</source>
@@ -1745,6 +2302,18 @@
         <translation>Bild der Kamera {name}</translation>
     </message>
     <message>
+        <source>Drag a joint to its place; the right button frees it. The wheel zooms, the middle button moves the picture, a double click shows all of it, F frames the hand. Without a mouse: comma and point choose a joint, arrows move it, Delete frees it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no picture of this camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>, {error:.1f} px away</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Camera {name}: what it saw a moment ago, and the markers found in that picture.
 A full ring is a marker seen whole, a broken ring one that is half hidden or doubtful.
 Names stand in large pictures, and in small ones while the mouse is over them.
@@ -1922,16 +2491,208 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Weitere Knöpfe</translation>
     </message>
     <message>
+        <source>No hand is tracked, so there are no layers. Press Start, and show the hand to the cameras.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The first picture takes a moment, the very first one of all half a minute.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>1 is the link that nothing hides. A line is white beside the background, and black before another link. A number in brackets: the links hide each other in a circle, which is cut there.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Layers of the hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Whose picture is shown. Each camera has an order of its own.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Over the picture</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Off: the layers on plain grey, as fast as states come.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Pause</source>
         <translation>Pause</translation>
+    </message>
+    <message>
+        <source>Hold what is shown (Space).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Visibility order</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Layers over the camera&apos;s picture</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Stop the plot to look at it; the measurement goes on.</source>
         <translation>Das Diagramm anhalten, um es anzusehen; die Messung läuft weiter.</translation>
     </message>
     <message>
+        <source>the pose alone</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>pose and lengths</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>pose, lengths and finger roots</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take pictures</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The pictures of all cameras now, as one more instant (Space). Hold the hand still.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open pictures …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Picture or video files of one instant, one for each camera. They are told apart by the cameras&apos; names in theirs, or sorted (Ctrl+O).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Find the hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Look for the hand by the landmark networks (rhot landmarks install), and put all its joints there.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Which pictures are shown. All instants share the lengths; each has its own pose.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Instant</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Remove the instant shown; undo brings it back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Redo</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>What a drag or a fit may change</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>What a drag or a fit may change. Begin with the pose; free lengths when the anchors or contours of two cameras or two instants show them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Standard deviation of an anchor</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>How exactly you can point at a joint in these pictures. The standard deviations and Fit to anchors go by it; a drag meets the pointer whatever it is.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fit to anchors</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The most probable hand by all anchors at once (Ctrl+Return).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fit to contours</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search the edges of the hand in the pictures, from where it is now, and fit it to them (Ctrl+Shift+Return).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Free all joints</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Remove all anchors of this instant.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Reset</source>
         <translation>Neu</translation>
+    </message>
+    <message>
+        <source>Back to the hand and the poses of the beginning; undo brings everything back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save hand file …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Write the hand as a hand file (Ctrl+S).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use this hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Put the hand into the rig. The rig file keeps what it had; Calibrate, Bring back an earlier calibration restores it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Escape.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Give the search up.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save hand file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Write the hand to {out} (Ctrl+S).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Anchors ±</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Takes back: {change}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nothing to undo.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Brings back: {change}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nothing to redo.</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Begin the plot anew and fit the axes.</source>
@@ -2280,6 +3041,1454 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     <message>
         <source>The rig opened last: {name}</source>
         <translation>Das zuletzt geöffnete Rig: {name}</translation>
+    </message>
+    <message>
+        <source>camera {camera} gave a picture that cannot be read; restart its node.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{name} (id {node_id}) answers; it is {state}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{begin} Paired with this computer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{begin} Open: anybody on the network may see its pictures and steer it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{begin} Not paired with this computer: press Pair.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A rig needs two nodes that answer and are paired with this computer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Both nodes have the id {ids}; give one another node_id in its settings file.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The process that computes ended unexpectedly; try again. If it happens again, it may have run out of memory: use fewer pictures or a shorter recording.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No node was found. Is rhot-node running there, and on the same network? Some networks let no search through: then type the address in below.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>open to everybody</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not paired yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>paired</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>id</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>address</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>trust</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>state</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>announces itself</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nodes on the network</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Looking for nodes …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use as {side} camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Possible once a node is selected in the list.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Two networks find 21 landmarks of a bare hand in a picture. They are MediaPipe&apos;s, under the {licence}, which is placed beside them. Install downloads the package {package} (36 MB), takes them out of it and checks them. Nothing else of it is kept. Nodes on other computers install theirs by `rhot-node landmarks install`.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hand networks</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Install</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>From a file …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Download and place them. What is there is replaced when all is complete.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take them out of the wheel of {package} that you have, without network.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>End the installation; what was there stays.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cancelled. What was there before is there still.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wheel of {package}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Wheels (*.whl);;All files (*)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>They are not installed on this computer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>They are installed and whole, in {folder}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Paint or tape in six colours</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A bare hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Landmarks or nodes of my own</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>one camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>two cameras</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Do not open by itself</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Do not show these steps by themselves. Calibrate, What to do next shows them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>done</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not done yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>All is done: hold the hand before the cameras.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Write the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>PDF (*.pdf)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Written: {path}. Print it at 100 % and measure the ruler on it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{path}: cannot be written ({strerror}).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{title} is on</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>On or off, at once; one that is off stays in the rig.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Change …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Remove</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Another target, other joints, another rate: in the form below.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Close it and take it out of the rig; Undo brings it back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Where to connect. The web view&apos;s address has a secret in it: whoever knows it sees the hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Put the address on the clipboard.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The address as a QR code, for a telephone&apos;s or headset&apos;s camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Estimate the hand&apos;s size</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Flat, for the 3-D mouse</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use this size for the rig&apos;s hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Makes every length of the rig&apos;s hand so much larger or smaller. What was there is kept.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fingers bent by</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tracked by</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fingers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Limits</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Size</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In force.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In force until the engine ends: this rig came from no file. Rig, Save rig keeps it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>As in the beginning. Undo brings the fit back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Undone</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Done again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fitting to the anchors</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>fitting to anchors</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fitted to the anchors of this instant.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fitted to the anchors of all instants.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{found:.0%} of the hand&apos;s contour was found in the pictures.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source> Drag what is wrong to its place, then fit again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fitting to the contours</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>fitting to contours</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Looking for the hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>finding the hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Look whether it is the hand; if not, undo and drag the joints instead.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cancelled; nothing was changed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save the hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hand files (*.json)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{out}: cannot be written ({strerror}); nothing was saved.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Saved: {out}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The rig has this hand already: only the pose was fitted.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The rig has this hand now. Calibrate, Bring back an earlier calibration restores the old one.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The videos show {length:.2f} s together, and second {at:g} is before that. Choose a later one.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The videos show {length:.2f} s together, and second {at:g} is beyond that. Choose an earlier one.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{path}: its frame at second {at_s:g} cannot be read; is the file complete?</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fit the hand to pictures</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pictures of one instant, one for each camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Which second of the videos?</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Live pictures</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>waiting for the first picture</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Drag the wrist, the knuckles and the fingertips to their places, or press Find the hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The hand begins where it is tracked. Drag joints, or fit to the contours.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Standard deviation in the unit beside, by the anchors and what is known of people&apos;s hands; after Fit to contours by the contours, too.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{group}, {name}, slider</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Which numbers the sliders below move.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Numbers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The hand was changed and not saved. Close without it?</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Palm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hold the hand still in all pictures, fingers spread, and press Take pictures.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open a picture of each camera, taken at the same moment.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Drag joints in the pictures or move the numbers until the outline lies on the hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no anchors</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message numerus="yes">
+        <source>{n} anchor, {rms:.1f} px rms, {most:.1f} px most</source>
+        <comment>{n} anchors, {rms:.1f} px rms, {most:.1f} px most</comment>
+        <translation type="unfinished">
+            <numerusform></numerusform>
+            <numerusform></numerusform>
+        </translation>
+    </message>
+    <message>
+        <source>Choose two cameras</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Both see the hand; 10 to 50 cm apart.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Install the hand networks</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>They find the joints of a bare hand (36 MB).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Print the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A chessboard on A4 at 100 %, glued to something flat.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Calibrate each lens</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Until then distances are a guess.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Missing: {names}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>All lenses are known.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Put the cameras together</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Where they stand to each other, from the board before both.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Compare the cameras&apos; times</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Teach the colours</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Which colour each marker has in this light.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measure your hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>How long its bones are, from a minute of movement.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track painted markers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Six colours: five fingertips and the wrist.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track landmarks</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The joints of a bare hand, as networks find them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No program listens yet. Add OSC for Unity, Blender or TouchDesigner, VMC for avatars, or the web view to see the hand in a browser or a headset.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>own: 21 joints</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Wrist, then four joints of each finger; positions in the rig frame.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>openxr: 26 joints</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>XR_EXT_hand_tracking: positions, orientations and radii in OpenXR&apos;s axes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>mediapipe: 21 joints</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In the order and by the names of MediaPipe; positions in the rig frame.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>What the plug-in understands; see its own documentation.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Messages by UDP, for Unity, Blender, Unreal, TouchDesigner, Max, Pure Data.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>HOST:PORT of the program that listens.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Finger bones for avatars: EVMC4U in Unity, VMC4B in Blender, Warudo, VSeeFace.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>HOST:PORT of the program that listens; most take 39539.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Programs connect to this port and get every state as JSON.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>[HOST:]PORT to listen on, unencrypted. 127.0.0.1 is this computer only; 0.0.0.0 lets others in.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>on</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Web view</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A page that shows the hand in browsers and headsets.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>[HOST:]PORT to listen on. 127.0.0.1 is this computer only; 0.0.0.0 lets others in, by HTTPS.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>LabRecorder and others find the streams by name.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name of the streams; RHOT when empty.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>as</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>JSON under the key rhot/state, for robots and ROS 2.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>HOST:PORT of a router; when empty, whoever is found on the network.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>by</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>off</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Switched off: kept in the rig, and not opened.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>opens</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The output is being opened.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>waits</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The output is open; nobody listens, or there is nothing to send yet.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>sending</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>States leave for the other program.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>slow</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The receiver takes states too slowly; some are dropped. Tracking goes on.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>failed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The output does not work. It is tried again every 3 s; tracking goes on.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>left out</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A replay opens none of the rig&apos;s outputs: nothing old is sent anywhere unasked.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The installed plug-in {name}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>output {spec!r}: it is in the list already.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>at most {rate:g} states/s</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{joints} joints, {rate}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>; asked for when the engine was started</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{sent} states sent, {dropped} dropped.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>waits for a browser</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>waits for a client</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message numerus="yes">
+        <source>, {n} client</source>
+        <comment>, {n} clients</comment>
+        <translation type="unfinished">
+            <numerusform></numerusform>
+            <numerusform></numerusform>
+        </translation>
+    </message>
+    <message>
+        <source>sending {rate:.0f} states/s{clients}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>waits for a hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>waits for Start</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Whoever has this address sees the hand. The connection is encrypted, by a certificate that this computer made: the browser warns once; choose Advanced, then Proceed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open it in a browser on this computer. For a headset or telephone change the target to 0.0.0.0:{port}: other computers are let in, by HTTPS only.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>It lasts for this run: the simulated rig is made anew each time.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>It lasts until the engine ends: this rig came from no file.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save rig (Ctrl+S) keeps it in {name}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>output {spec!r}: it is not in the engine&apos;s rig any more; another program has changed it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Another program has changed the outputs since; nothing was taken back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Three-dimensional scene of the mouse: ground, cursor and balls</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Thumb</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Little finger</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No engine is heard, so no hand moves the mouse. Open a rig, or the simulated rig, in the main window and press Start.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>3-D mouse</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rest here</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The hand as it lies for the next half second becomes the cursor&apos;s origin (H).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take the last move of a ball back (Ctrl+Z).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Target test</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Click nine targets with the thumb: how many bits per second the hand conveys (T).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>What sets the pole&apos;s length: the index fingertip above the palm, or the palm.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Height from</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Height from the index finger</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Height from the palm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cursor: right and forward of the ground&apos;s middle, and above it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pressed while the {finger} is spread away from the hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hold the hand still.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The target test moves no ball. End it to undo moves.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>End the test</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hold the hand still for half a second: that becomes the cursor&apos;s origin.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>right – mm   forward – mm   height – mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>right {right:+4.0f} mm   forward {forward:+4.0f} mm   height {height:3.0f} mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move the cursor&apos;s foot into the blue target and spread the thumb.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Done: {sentence}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The {name} moves with the cursor until the thumb returns.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Spread the thumb to pick the {name}, the little finger to put it on the ground.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Bring the cursor to a ball.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Camera {name}: the picture nearest to this moment, and the tracked hand. Dotted bones are guessed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Films of a bare hand by one camera, or by several at the same time. The hand networks find its landmarks; the tracked hand is then shown beside the pictures. Several films need the rig file that says where their cameras stand; one film is tracked without, at a distance that is a guess.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track films</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The rig of the films&apos; cameras</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>none: one film, its lens assumed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Film</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Begins later by</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add films …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add a folder …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>All films in a folder, in the order of their names.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take the chosen film off the list (Delete); the file stays.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Align by sound</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Align by a flash</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Find by how much later each film began: what all of them heard, such as a clap.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Find by how much later each film began: a lamp that goes on in all of them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose where the recording is written; it opens when it is whole.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>By how much this film began after the others.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Films</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Films ({names});;All files (*)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A folder of films</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{name} holds no films ({names}).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no film</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add the film of a hand, or those of several cameras.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Several films need the rig of their cameras: choose its file, or remove all films but one.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Camera {twice} has two films: choose another camera for one of them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ready. Looking for hands takes about as long as the films.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Write the recording to</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Aligned: {offsets}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>It holds no datagrams: nothing was streaming.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>“{name}” is no name for a recording: use letters, figures, blanks, dots and dashes, no slash, and no dot at the beginning.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>there is a recording called {name} already; choose another name.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{trash}: cannot be made ({strerror}), so nothing was deleted.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>there is another recording called {stem} now; rename it first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{stem} is being recorded; stop the recording first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{path}: cannot be read ({strerror}).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>there are videos of another recording called {stem} already; move them first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{path}: cannot be moved to {target} ({strerror}).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>cannot be read</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{states} states, {bookmarks} bookmarks. Green and full: tracking; yellow: partial; red and low: lost; empty: no state.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Date</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Length</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Condition</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The recordings</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No recordings yet. Press Record, or R, while a rig is open.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track the recording and play it (Enter).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rename</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Call the recording something else (F2).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Delete</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Delete the recording; Undo brings it back until this page is closed (Delete).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Bring back the recording that was deleted last (Ctrl+Z).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Collect video</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fetch the frames that the cameras recorded beside the recording; they come to lie beside it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the recordings in the desktop&apos;s file manager.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Close this page. What was deleted is then gone for good.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Deleted {undoable}. Undo brings it back; it is gone for good when this page is closed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{stem} continues {continues}: the engine had stopped and was started again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Collected {names}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source> The cameras&apos; computers were too slow for {dropped} frames.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Asking the nodes …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>This desktop opens no folders. The recordings lie in {folder}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Preparing the tracker …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{out}: the states of the recording cannot be written ({strerror}). They take about 5 kB each; make room there.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>it holds no datagrams: nothing was streaming while it was recorded. There is nothing to replay.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no state could be made of its {datagrams} datagrams. Is this the rig that it was recorded with, and were both cameras streaming?</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tracking the recording …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{path} is still being recorded: what was written until now is shown.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In {path} {damage}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Of {path} {end}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Everything else is shown.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{folder}: cannot be made ({strerror}), so there is no room for the states.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>as the rig says</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>As recorded</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>JSON files (*.json);;All files (*)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Compare with another run</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The recording is tracked once more, and both hands are shown together.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The recording is tracked once more; the moment that is shown stays.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track with a rig file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track with a hand file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the rig&apos;s hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Reading the recording …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fingertip difference</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The beginning (Home).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One state back (left arrow).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Play or pause (Space).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One state on (right arrow).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The end (End).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>How fast it plays, times real time.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Loop from here</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The range that is repeated begins here ([).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to here</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The range that is repeated ends here (]).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No loop</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Repeat nothing.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Write a few words about this moment into the recording (B).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>classic tracker</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>smoothed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{time} of {length}, state {number} of {count}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>waiting …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>tracking</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>partial</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no state</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Timeline of the recording</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Replay</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>REPLAY</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open a recording (Ctrl+O).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track again …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track the recording with another tracker, rig or hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Compare …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track it in another way too, and show both hands together.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>End comparison</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show one run alone again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Write these states as a file for other programs (Ctrl+E).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trim …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save the repeated range as a recording of its own.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pictures</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>What the cameras saw, with the hand drawn over it (P).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Remove the bookmark here</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Remove the bookmark at which the recording stands.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Bookmarks</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Moments that were marked, while recording or here; choose one to go there.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no recording</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No bookmarks yet: B sets one.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>NO STATE</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The recording has no state at this moment.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RHOT replay</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open a recording</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{name} – RHOT replay</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No video of this recording is on this computer. Rig, Recordings, Collect video fetches what the nodes recorded.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose the part first: [ and ] set where the repeated range begins and ends.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save the repeated range as</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Saving {name} …</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message numerus="yes">
+        <source> and {n} video</source>
+        <comment> and {n} videos</comment>
+        <translation type="unfinished">
+            <numerusform></numerusform>
+            <numerusform></numerusform>
+        </translation>
+    </message>
+    <message>
+        <source>Saved {path}{films}. Open it with Ctrl+O.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One moment. Cancel leaves nothing behind.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open a recording (Ctrl+O). F1 opens the guide.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solid: {first}. Blue and translucent: {second}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tracked {text}. Space plays, the arrow keys go from state to state.</source>
+        <translation type="unfinished"></translation>
     </message>
 </context>
 </TS>
