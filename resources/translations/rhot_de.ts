@@ -433,79 +433,79 @@
     </message>
     <message>
         <source>Reading the rig file …</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Rig-Datei wird gelesen …</translation>
     </message>
     <message>
         <source>Starting two simulated cameras …</source>
-        <translation type="unfinished"></translation>
+        <translation>Zwei simulierte Kameras werden gestartet …</translation>
     </message>
     <message>
         <source>The engine had no rig file, so it cannot be started again. Open a rig.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine hatte keine Rig-Datei und lässt sich daher nicht neu starten. Ein Rig öffnen.</translation>
     </message>
     <message>
         <source>Starting the engine again …</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine wird neu gestartet …</translation>
     </message>
     <message>
         <source>The engine in {path} was not started by this app and goes on running.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine in {path} wurde nicht von dieser App gestartet und läuft weiter.</translation>
     </message>
     <message>
         <source>Ending what ran before …</source>
-        <translation type="unfinished"></translation>
+        <translation>Was vorher lief, wird beendet …</translation>
     </message>
     <message>
         <source>The engine in {path} records to {log_path}. Stop that recording first, or start with another --directory.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine in {path} nimmt in {log_path} auf. Zuerst diese Aufnahme beenden oder mit einem anderen --directory starten.</translation>
     </message>
     <message>
         <source>The engine in {path} records to {log_path} and gives no answer in {limit:g} s. Try again, or end it with `kill {pid}`; what it has recorded is kept.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine in {path} nimmt in {log_path} auf und antwortet seit {limit:g} s nicht. Noch einmal versuchen oder sie mit `kill {pid}` beenden; was sie aufgenommen hat, bleibt erhalten.</translation>
     </message>
     <message>
         <source>An engine that was started by hand runs in {path}. Stop it first, or start the app with another --directory.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine von Hand gestartete Engine läuft in {path}. Sie zuerst anhalten oder die App mit einem anderen --directory starten.</translation>
     </message>
     <message>
         <source>Starting the engine …</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine wird gestartet …</translation>
     </message>
     <message>
         <source>Asking the engine for its rig …</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Engine wird nach ihrem Rig gefragt …</translation>
     </message>
     <message>
         <source>simulated cameras</source>
-        <translation type="unfinished"></translation>
+        <translation>simulierten Kameras</translation>
     </message>
     <message>
         <source>cameras</source>
-        <translation type="unfinished"></translation>
+        <translation>Kameras</translation>
     </message>
     <message>
         <source>they said nothing; see {errors}</source>
-        <translation type="unfinished"></translation>
+        <translation>sie haben nichts gesagt; siehe {errors}</translation>
     </message>
     <message>
         <source>The {what} did not start: {said}</source>
-        <translation type="unfinished"></translation>
+        <translation>Die {what} sind nicht gestartet: {said}</translation>
     </message>
     <message numerus="yes">
         <source>Starting {n} camera …</source>
         <comment>Starting {n} cameras …</comment>
-        <translation type="unfinished">
-            <numerusform></numerusform>
-            <numerusform></numerusform>
+        <translation>
+            <numerusform>{n} Kamera wird gestartet …</numerusform>
+            <numerusform>{n} Kameras werden gestartet …</numerusform>
         </translation>
     </message>
     <message>
         <source>The {what} were not ready within {limit:.0f} s; see {errors}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die {what} waren nach {limit:.0f} s nicht bereit; siehe {errors}.</translation>
     </message>
     <message>
         <source>The simulated rig has no {what!r} to show.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das simulierte Rig hat kein {what!r} zu zeigen.</translation>
     </message>
     <message>
         <source>Opening the rig …</source>
@@ -741,11 +741,11 @@
     </message>
     <message>
         <source>Connect nodes</source>
-        <translation type="unfinished"></translation>
+        <translation>Knoten verbinden</translation>
     </message>
     <message>
         <source>Select a node in the list and say which camera it is. Left and right are as seen from behind the cameras. The address of a node that is not found can be typed in: it stands on the node&apos;s console, and &lt;b&gt;hostname&amp;nbsp;-I&lt;/b&gt; prints it there.</source>
-        <translation type="unfinished"></translation>
+        <translation>Einen Knoten in der Liste auswählen und sagen, welche Kamera er ist. Links und rechts gelten von hinter den Kameras gesehen. Die Adresse eines Knotens, der nicht gefunden wird, lässt sich eintippen: Sie steht auf seiner Konsole, und &lt;b&gt;hostname&amp;nbsp;-I&lt;/b&gt; gibt sie dort aus.</translation>
     </message>
     <message>
         <source>camera</source>
@@ -753,110 +753,113 @@
     </message>
     <message>
         <source>address or host name</source>
-        <translation type="unfinished"></translation>
+        <translation>Adresse oder Rechnername</translation>
     </message>
     <message>
         <source>port</source>
-        <translation type="unfinished"></translation>
+        <translation>Port</translation>
     </message>
     <message>
         <source>answer</source>
-        <translation type="unfinished"></translation>
+        <translation>Antwort</translation>
     </message>
     <message>
         <source>The port is {port} unless the node&apos;s settings file says otherwise (pairing_port).</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Port ist {port}, wenn die Einstellungsdatei des Knotens nichts anderes sagt (pairing_port).</translation>
     </message>
     <message>
         <source>Ask the nodes</source>
-        <translation type="unfinished"></translation>
+        <translation>Knoten fragen</translation>
     </message>
     <message>
         <source>Possible once both addresses are entered. Nothing is changed on the nodes.</source>
-        <translation type="unfinished"></translation>
+        <translation>Möglich, sobald beide Adressen eingegeben sind. An den Knoten wird nichts geändert.</translation>
     </message>
     <message>
         <source>Write a rig file and open it …</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig-Datei schreiben und öffnen …</translation>
     </message>
     <message>
         <source>Possible once both nodes have answered and are paired with this computer.</source>
-        <translation type="unfinished"></translation>
+        <translation>Möglich, sobald beide Knoten geantwortet haben und mit diesem Rechner gekoppelt sind.</translation>
     </message>
     <message>
         <source>not asked yet</source>
-        <translation type="unfinished"></translation>
+        <translation>noch nicht gefragt</translation>
     </message>
     <message>
         <source>e.g. {address}</source>
-        <translation type="unfinished"></translation>
+        <translation>z. B. {address}</translation>
     </message>
     <message>
         <source>Address of the {side} node</source>
-        <translation type="unfinished"></translation>
+        <translation>Adresse des Knotens {side}</translation>
     </message>
     <message>
         <source>Where the node says who it is. The default is right unless its settings file says otherwise.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wo der Knoten sagt, wer er ist. Die Vorgabe stimmt, wenn seine Einstellungsdatei nichts anderes sagt.</translation>
     </message>
     <message>
         <source>Pairing port of the {side} node</source>
-        <translation type="unfinished"></translation>
+        <translation>Kopplungs-Port des Knotens {side}</translation>
     </message>
     <message>
         <source>Pair …</source>
-        <translation type="unfinished"></translation>
+        <translation>Koppeln …</translation>
     </message>
     <message>
         <source>Possible once the node has answered and is not paired with this computer.</source>
-        <translation type="unfinished"></translation>
+        <translation>Möglich, sobald der Knoten geantwortet hat und nicht mit diesem Rechner gekoppelt ist.</translation>
     </message>
     <message>
         <source>asking …</source>
-        <translation type="unfinished"></translation>
+        <translation>wird gefragt …</translation>
     </message>
     <message>
         <source>Both nodes answer. The new rig starts with textbook lenses and a 75 mm baseline: calibrate before you trust millimetres.</source>
-        <translation type="unfinished"></translation>
+        <translation>Beide Knoten antworten. Das neue Rig beginnt mit Lehrbuch-Objektiven und einer Basis von 75 mm: Erst kalibrieren, dann den Millimetern trauen.</translation>
     </message>
     <message>
         <source>Write the rig file</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Rig-Datei schreiben</translation>
     </message>
     <message>
         <source>Rig files (*.json)</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig-Dateien (*.json)</translation>
     </message>
     <message>
         <source>Pairing makes sure that this computer and the node know each other, so that nobody else on the network can see its pictures, steer it, or pretend to be it.
 
 1. On the node {name}, at its console or over SSH, run:  rhot-node pair
 2. It shows a code of three groups, such as 7K2QD-9M4XT-BNWH3. Type it here within five minutes.</source>
-        <translation type="unfinished"></translation>
+        <translation>Durch Koppeln kennen dieser Rechner und der Knoten einander, sodass niemand sonst im Netz seine Bilder sehen, ihn steuern oder sich für ihn ausgeben kann.
+
+1. Auf dem Knoten {name}, an seiner Konsole oder über SSH, ausführen:  rhot-node pair
+2. Er zeigt einen Code aus drei Gruppen, etwa 7K2QD-9M4XT-BNWH3. Ihn innerhalb von fünf Minuten hier eintippen.</translation>
     </message>
     <message>
         <source>Pair with {name}</source>
-        <translation type="unfinished"></translation>
+        <translation>Mit {name} koppeln</translation>
     </message>
     <message>
         <source>code shown by the node</source>
-        <translation type="unfinished"></translation>
+        <translation>Code, den der Knoten zeigt</translation>
     </message>
     <message>
         <source>Pairing code</source>
-        <translation type="unfinished"></translation>
+        <translation>Kopplungscode</translation>
     </message>
     <message>
         <source>Pair</source>
-        <translation type="unfinished"></translation>
+        <translation>Koppeln</translation>
     </message>
     <message>
         <source>Possible once {code_length} letters and digits are entered; dashes are free.</source>
-        <translation type="unfinished"></translation>
+        <translation>Möglich, sobald {code_length} Buchstaben und Ziffern eingegeben sind; Striche sind frei.</translation>
     </message>
     <message>
         <source>pairing …</source>
-        <translation type="unfinished"></translation>
+        <translation>wird gekoppelt …</translation>
     </message>
     <message>
         <source>picture [px]</source>
@@ -949,83 +952,84 @@
     <message>
         <source>{name} ({device})
 cannot be used now</source>
-        <translation type="unfinished"></translation>
+        <translation>{name} ({device})
+jetzt nicht benutzbar</translation>
     </message>
     <message>
         <source>Tick one camera or more, and look at each. The first one tracks alone until the others are put together with it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine oder mehrere Kameras ankreuzen und jede ansehen. Die erste verfolgt allein, bis die anderen mit ihr zusammengesetzt sind.</translation>
     </message>
     <message>
         <source>Films …</source>
-        <translation type="unfinished"></translation>
+        <translation>Filme …</translation>
     </message>
     <message>
         <source>Add films of one camera each, recorded at the same time.</source>
-        <translation type="unfinished"></translation>
+        <translation>Filme je einer Kamera hinzufügen, die gleichzeitig aufgenommen wurden.</translation>
     </message>
     <message>
         <source>Folder …</source>
-        <translation type="unfinished"></translation>
+        <translation>Ordner …</translation>
     </message>
     <message>
         <source>Add a folder of pictures, or of raw frames.</source>
-        <translation type="unfinished"></translation>
+        <translation>Einen Ordner mit Bildern oder Rohbildern hinzufügen.</translation>
     </message>
     <message>
         <source>Network …</source>
-        <translation type="unfinished"></translation>
+        <translation>Netz …</translation>
     </message>
     <message>
         <source>Add a camera or a phone that sends its pictures by HTTP (motion JPEG) or RTSP.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Kamera oder ein Telefon hinzufügen, das seine Bilder per HTTP (Motion JPEG) oder RTSP sendet.</translation>
     </message>
     <message>
         <source>Search again</source>
-        <translation type="unfinished"></translation>
+        <translation>Neu suchen</translation>
     </message>
     <message>
         <source>Look for webcams that were plugged in meanwhile.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nach Webcams suchen, die inzwischen angesteckt wurden.</translation>
     </message>
     <message>
         <source>Name of the camera</source>
-        <translation type="unfinished"></translation>
+        <translation>Name der Kamera</translation>
     </message>
     <message>
         <source>How the camera is called in the rig, such as left.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie die Kamera im Rig heißt, etwa left.</translation>
     </message>
     <message>
         <source>Picture size and rate</source>
-        <translation type="unfinished"></translation>
+        <translation>Bildgröße und Rate</translation>
     </message>
     <message>
         <source>Larger pictures show a hand farther away, and take longer to search.</source>
-        <translation type="unfinished"></translation>
+        <translation>Größere Bilder zeigen eine Hand in größerer Entfernung und brauchen länger zum Durchsuchen.</translation>
     </message>
     <message>
         <source>upside down</source>
-        <translation type="unfinished"></translation>
+        <translation>kopfüber</translation>
     </message>
     <message>
         <source>mirrored</source>
-        <translation type="unfinished"></translation>
+        <translation>gespiegelt</translation>
     </message>
     <message>
         <source>Turn the picture by 180 degrees: the camera hangs upside down.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Bild um 180 Grad drehen: Die Kamera hängt kopfüber.</translation>
     </message>
     <message>
         <source>Exchange left and right, where a phone&apos;s program has mirrored the picture. In a mirrored picture a right hand looks like a left one.</source>
-        <translation type="unfinished"></translation>
+        <translation>Links und rechts vertauschen, wo das Programm eines Telefons das Bild gespiegelt hat. In einem gespiegelten Bild sieht eine rechte Hand wie eine linke aus.</translation>
     </message>
     <message>
         <source>the right hand</source>
-        <translation type="unfinished">der rechten Hand</translation>
+        <translation>die rechte Hand</translation>
     </message>
     <message>
         <source>the left hand</source>
-        <translation type="unfinished">der linken Hand</translation>
+        <translation>die linke Hand</translation>
     </message>
     <message>
         <source>Hand</source>
@@ -1033,68 +1037,69 @@ cannot be used now</source>
     </message>
     <message>
         <source>Which hand is tracked.</source>
-        <translation type="unfinished"></translation>
+        <translation>Welche Hand verfolgt wird.</translation>
     </message>
     <message>
         <source>Open</source>
-        <translation type="unfinished"></translation>
+        <translation>Öffnen</translation>
     </message>
     <message>
         <source>Possible once a camera is ticked.</source>
-        <translation type="unfinished"></translation>
+        <translation>Möglich, sobald eine Kamera angekreuzt ist.</translation>
     </message>
     <message>
         <source>track</source>
-        <translation type="unfinished"></translation>
+        <translation>verfolgen</translation>
     </message>
     <message>
         <source>Films of one camera each</source>
-        <translation type="unfinished"></translation>
+        <translation>Filme je einer Kamera</translation>
     </message>
     <message>
         <source>Films and pictures (*.mp4 *.avi *.mov *.mkv *.webm *.png *.jpg *.jpeg);;All files (*)</source>
-        <translation type="unfinished"></translation>
+        <translation>Filme und Bilder (*.mp4 *.avi *.mov *.mkv *.webm *.png *.jpg *.jpeg);;Alle Dateien (*)</translation>
     </message>
     <message>
         <source>A folder of pictures</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Ordner mit Bildern</translation>
     </message>
     <message>
         <source>Network camera</source>
-        <translation type="unfinished"></translation>
+        <translation>Netzwerkkamera</translation>
     </message>
     <message>
         <source>Address of the pictures, such as
 http://192.168.1.20:8080/video or rtsp://192.168.1.21/live</source>
-        <translation type="unfinished"></translation>
+        <translation>Adresse der Bilder, etwa
+http://192.168.1.20:8080/video oder rtsp://192.168.1.21/live</translation>
     </message>
     <message>
         <source>looking …</source>
-        <translation type="unfinished"></translation>
+        <translation>wird angesehen …</translation>
     </message>
     <message>
         <source>{title} is in the list already.</source>
-        <translation type="unfinished"></translation>
+        <translation>{title} steht schon in der Liste.</translation>
     </message>
     <message numerus="yes">
         <source>Open {n} camera</source>
         <comment>Open {n} cameras</comment>
-        <translation type="unfinished">
-            <numerusform></numerusform>
-            <numerusform></numerusform>
+        <translation>
+            <numerusform>{n} Kamera öffnen</numerusform>
+            <numerusform>{n} Kameras öffnen</numerusform>
         </translation>
     </message>
     <message>
         <source>{rate:.0f} frames/s come.</source>
-        <translation type="unfinished"></translation>
+        <translation>{rate:.0f} Bilder/s kommen an.</translation>
     </message>
     <message>
         <source>Two cameras are called {doubled}. Give each a name of its own.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zwei Kameras heißen {doubled}. Jeder einen eigenen Namen geben.</translation>
     </message>
     <message>
         <source>Choose a camera, or add a film.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Kamera auswählen oder einen Film hinzufügen.</translation>
     </message>
     <message>
         <source>beside the recording</source>
@@ -1174,31 +1179,31 @@ http://192.168.1.20:8080/video or rtsp://192.168.1.21/live</source>
     </message>
     <message>
         <source>as recorded</source>
-        <translation type="unfinished"></translation>
+        <translation>wie aufgenommen</translation>
     </message>
     <message>
         <source>leave gaps</source>
-        <translation type="unfinished"></translation>
+        <translation>Lücken lassen</translation>
     </message>
     <message>
         <source>classic</source>
-        <translation type="unfinished"></translation>
+        <translation>klassisch</translation>
     </message>
     <message>
         <source>estimator</source>
-        <translation type="unfinished"></translation>
+        <translation>Schätzer</translation>
     </message>
     <message>
         <source>rig</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig</translation>
     </message>
     <message>
         <source>wrist, along the palm&apos;s axes</source>
-        <translation type="unfinished"></translation>
+        <translation>Handgelenk, entlang der Achsen der Handfläche</translation>
     </message>
     <message>
         <source>Export recording</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahme exportieren</translation>
     </message>
     <message>
         <source>Choose …</source>
@@ -1206,115 +1211,115 @@ http://192.168.1.20:8080/video or rtsp://192.168.1.21/live</source>
     </message>
     <message>
         <source>Another recording (.rhotlog).</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine andere Aufnahme (.rhotlog).</translation>
     </message>
     <message>
         <source>Which programs shall read it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Welche Programme sie lesen sollen.</translation>
     </message>
     <message>
         <source>Which tracker makes a hand of the recorded datagrams.</source>
-        <translation type="unfinished"></translation>
+        <translation>Welcher Tracker aus den aufgenommenen Datagrammen eine Hand macht.</translation>
     </message>
     <message>
         <source>Where positions are told: in the rig frame, or relative to the wrist joint.</source>
-        <translation type="unfinished"></translation>
+        <translation>Worin Positionen angegeben werden: im Rig-Koordinatensystem oder relativ zum Handgelenk.</translation>
     </message>
     <message>
         <source>Unit of length, where the format leaves a choice.</source>
-        <translation type="unfinished"></translation>
+        <translation>Längeneinheit, wo das Format die Wahl lässt.</translation>
     </message>
     <message>
         <source>Smooth</source>
-        <translation type="unfinished"></translation>
+        <translation>Glätten</translation>
     </message>
     <message>
         <source>Every state uses what came after it as well. Only the estimator can.</source>
-        <translation type="unfinished"></translation>
+        <translation>Jeder Zustand nutzt auch, was nach ihm kam. Nur der Schätzer kann das.</translation>
     </message>
     <message>
         <source>States at equal intervals. As recorded each keeps its own time, and formats that have a rate get the cameras&apos;.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zustände in gleichen Abständen. Wie aufgenommen behält jeder seine Zeit, und Formate mit einer Rate erhalten die der Kameras.</translation>
     </message>
     <message>
         <source>Gaps up to this length are interpolated. What is filled in is marked: by its knowledge, or in a table beside the file where the format has none.</source>
-        <translation type="unfinished"></translation>
+        <translation>Lücken bis zu dieser Länge werden interpoliert. Gefülltes ist gekennzeichnet: durch seine Kenntnis oder, wo das Format keine hat, in einer Tabelle neben der Datei.</translation>
     </message>
     <message>
         <source>The first fingertips as they would be written; the file holds much more.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die ersten Fingerspitzen, wie sie geschrieben würden; die Datei enthält viel mehr.</translation>
     </message>
     <message>
         <source>Export …</source>
-        <translation type="unfinished"></translation>
+        <translation>Exportieren …</translation>
     </message>
     <message>
         <source>Choose a file; it appears when it is whole.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Datei auswählen; sie erscheint, wenn sie vollständig ist.</translation>
     </message>
     <message>
         <source>Recording</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahme</translation>
     </message>
     <message>
         <source>Format</source>
-        <translation type="unfinished"></translation>
+        <translation>Format</translation>
     </message>
     <message>
         <source>Tracker</source>
-        <translation type="unfinished"></translation>
+        <translation>Tracker</translation>
     </message>
     <message>
         <source>Rate</source>
-        <translation type="unfinished"></translation>
+        <translation>Rate</translation>
     </message>
     <message>
         <source>Fill gaps up to</source>
-        <translation type="unfinished"></translation>
+        <translation>Lücken füllen bis</translation>
     </message>
     <message>
         <source>Positions in</source>
-        <translation type="unfinished"></translation>
+        <translation>Positionen in</translation>
     </message>
     <message>
         <source>Lengths in</source>
-        <translation type="unfinished"></translation>
+        <translation>Längen in</translation>
     </message>
     <message>
         <source>, tracked as shown</source>
-        <translation type="unfinished"></translation>
+        <translation>, verfolgt wie gezeigt</translation>
     </message>
     <message>
         <source>Choose a recording.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Aufnahme auswählen.</translation>
     </message>
     <message>
         <source>Choose a recording</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Aufnahme auswählen</translation>
     </message>
     <message>
         <source>Recordings (*.rhotlog *.log);;All files (*)</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahmen (*.rhotlog *.log);;Alle Dateien (*)</translation>
     </message>
     <message>
         <source>Cancelled; nothing was written.</source>
-        <translation type="unfinished"></translation>
+        <translation>Abgebrochen; nichts wurde geschrieben.</translation>
     </message>
     <message>
         <source>Export to</source>
-        <translation type="unfinished"></translation>
+        <translation>Exportieren nach</translation>
     </message>
     <message>
         <source>Exporting to {out} …</source>
-        <translation type="unfinished"></translation>
+        <translation>Export nach {out} …</translation>
     </message>
     <message>
         <source>Exported {states} states to {path}.</source>
-        <translation type="unfinished"></translation>
+        <translation>{states} Zustände nach {path} exportiert.</translation>
     </message>
     <message>
         <source>Not all of the recording could be read: {loss}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nicht die ganze Aufnahme war lesbar: {loss}.</translation>
     </message>
     <message>
         <source>Another folder.</source>
@@ -1378,63 +1383,63 @@ http://192.168.1.20:8080/video or rtsp://192.168.1.21/live</source>
     </message>
     <message>
         <source>Outputs</source>
-        <translation type="unfinished"></translation>
+        <translation>Ausgaben</translation>
     </message>
     <message>
         <source>Add</source>
-        <translation type="unfinished"></translation>
+        <translation>Hinzufügen</translation>
     </message>
     <message>
         <source>Undo</source>
-        <translation type="unfinished"></translation>
+        <translation>Rückgängig</translation>
     </message>
     <message>
         <source>Which protocol the other program understands.</source>
-        <translation type="unfinished"></translation>
+        <translation>Welches Protokoll das andere Programm versteht.</translation>
     </message>
     <message>
         <source>The joint set: which joints, in whose order and axes.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Gelenksatz: welche Gelenke, in welcher Reihenfolge und welchen Achsen.</translation>
     </message>
     <message>
         <source> states/s</source>
-        <translation type="unfinished"></translation>
+        <translation> Zustände/s</translation>
     </message>
     <message>
         <source>every state</source>
-        <translation type="unfinished"></translation>
+        <translation>jeder Zustand</translation>
     </message>
     <message>
         <source>At most so many states per second; at the lowest value every state is sent.</source>
-        <translation type="unfinished"></translation>
+        <translation>Höchstens so viele Zustände pro Sekunde; beim kleinsten Wert wird jeder gesendet.</translation>
     </message>
     <message>
         <source>Take the last change back (Ctrl+Z).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die letzte Änderung zurücknehmen (Strg+Z).</translation>
     </message>
     <message>
         <source>Added {output}.</source>
-        <translation type="unfinished"></translation>
+        <translation>{output} hinzugefügt.</translation>
     </message>
     <message>
         <source>Changed to {output}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Geändert in {output}.</translation>
     </message>
     <message>
         <source>{output} is on.</source>
-        <translation type="unfinished"></translation>
+        <translation>{output} ist an.</translation>
     </message>
     <message>
         <source>{output} is off.</source>
-        <translation type="unfinished"></translation>
+        <translation>{output} ist aus.</translation>
     </message>
     <message>
         <source>Removed {output}.</source>
-        <translation type="unfinished"></translation>
+        <translation>{output} entfernt.</translation>
     </message>
     <message>
         <source>Taken back.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zurückgenommen.</translation>
     </message>
     <message>
         <source>The engine changes over …</source>
@@ -1442,23 +1447,23 @@ http://192.168.1.20:8080/video or rtsp://192.168.1.21/live</source>
     </message>
     <message>
         <source>Change {output}</source>
-        <translation type="unfinished"></translation>
+        <translation>{output} ändern</translation>
     </message>
     <message>
         <source>Change</source>
-        <translation type="unfinished"></translation>
+        <translation>Ändern</translation>
     </message>
     <message>
         <source>Add a stream</source>
-        <translation type="unfinished"></translation>
+        <translation>Einen Datenstrom hinzufügen</translation>
     </message>
     <message>
         <source>It opens at once; tracking goes on.</source>
-        <translation type="unfinished"></translation>
+        <translation>Er öffnet sofort; die Verfolgung läuft weiter.</translation>
     </message>
     <message>
         <source>{meaning} Target: {target}</source>
-        <translation type="unfinished"></translation>
+        <translation>{meaning} Ziel: {target}</translation>
     </message>
     <message>
         <source>never arrived: the network lost them</source>
@@ -2074,7 +2079,7 @@ http://192.168.1.20:8080/video or rtsp://192.168.1.21/live</source>
     </message>
     <message>
         <source>FABRIK, allowing for noise</source>
-        <translation>FABRIK mit Rücksicht auf Rauschen</translation>
+        <translation>FABRIK, rauschbewusst</translation>
     </message>
     <message>
         <source>FABRIK, then a descent to the natural pose. The default.</source>
@@ -2303,15 +2308,15 @@ http://192.168.1.20:8080/video or rtsp://192.168.1.21/live</source>
     </message>
     <message>
         <source>Drag a joint to its place; the right button frees it. The wheel zooms, the middle button moves the picture, a double click shows all of it, F frames the hand. Without a mouse: comma and point choose a joint, arrows move it, Delete frees it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Gelenk an seinen Ort ziehen; die rechte Taste gibt es frei. Das Rad zoomt, die mittlere Taste verschiebt das Bild, ein Doppelklick zeigt alles, F holt die Hand ins Bild. Ohne Maus: Komma und Punkt wählen ein Gelenk, Pfeile bewegen es, Entf gibt es frei.</translation>
     </message>
     <message>
         <source>no picture of this camera</source>
-        <translation type="unfinished"></translation>
+        <translation>kein Bild dieser Kamera</translation>
     </message>
     <message>
         <source>, {error:.1f} px away</source>
-        <translation type="unfinished"></translation>
+        <translation>, {error:.1f} px entfernt</translation>
     </message>
     <message>
         <source>Camera {name}: what it saw a moment ago, and the markers found in that picture.
@@ -2492,35 +2497,35 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>No hand is tracked, so there are no layers. Press Start, and show the hand to the cameras.</source>
-        <translation type="unfinished"></translation>
+        <translation>Keine Hand wird verfolgt, daher gibt es keine Ebenen. Start drücken und die Hand den Kameras zeigen.</translation>
     </message>
     <message>
         <source>The first picture takes a moment, the very first one of all half a minute.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das erste Bild dauert einen Moment, das allererste eine halbe Minute.</translation>
     </message>
     <message>
         <source>1 is the link that nothing hides. A line is white beside the background, and black before another link. A number in brackets: the links hide each other in a circle, which is cut there.</source>
-        <translation type="unfinished"></translation>
+        <translation>1 ist das Glied, das nichts verdeckt. Eine Linie ist weiß neben dem Hintergrund und schwarz vor einem anderen Glied. Eine Zahl in Klammern: Die Glieder verdecken einander im Kreis, der dort aufgetrennt ist.</translation>
     </message>
     <message>
         <source>Layers of the hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Ebenen der Hand</translation>
     </message>
     <message>
         <source>Whose picture is shown. Each camera has an order of its own.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wessen Bild gezeigt wird. Jede Kamera hat eine eigene Reihenfolge.</translation>
     </message>
     <message>
         <source>Camera</source>
-        <translation type="unfinished"></translation>
+        <translation>Kamera</translation>
     </message>
     <message>
         <source>Over the picture</source>
-        <translation type="unfinished"></translation>
+        <translation>Über dem Bild</translation>
     </message>
     <message>
         <source>Off: the layers on plain grey, as fast as states come.</source>
-        <translation type="unfinished"></translation>
+        <translation>Aus: die Ebenen auf schlichtem Grau, so schnell Zustände kommen.</translation>
     </message>
     <message>
         <source>Pause</source>
@@ -2528,15 +2533,15 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>Hold what is shown (Space).</source>
-        <translation type="unfinished"></translation>
+        <translation>Festhalten, was gezeigt wird (Leertaste).</translation>
     </message>
     <message>
         <source>Visibility order</source>
-        <translation type="unfinished"></translation>
+        <translation>Sichtbarkeitsreihenfolge</translation>
     </message>
     <message>
         <source>Layers over the camera&apos;s picture</source>
-        <translation type="unfinished"></translation>
+        <translation>Ebenen über dem Bild der Kamera</translation>
     </message>
     <message>
         <source>Stop the plot to look at it; the measurement goes on.</source>
@@ -2544,95 +2549,95 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>the pose alone</source>
-        <translation type="unfinished"></translation>
+        <translation>nur die Pose</translation>
     </message>
     <message>
         <source>pose and lengths</source>
-        <translation type="unfinished"></translation>
+        <translation>Pose und Längen</translation>
     </message>
     <message>
         <source>pose, lengths and finger roots</source>
-        <translation type="unfinished"></translation>
+        <translation>Pose, Längen und Fingerwurzeln</translation>
     </message>
     <message>
         <source>Take pictures</source>
-        <translation type="unfinished"></translation>
+        <translation>Bilder aufnehmen</translation>
     </message>
     <message>
         <source>The pictures of all cameras now, as one more instant (Space). Hold the hand still.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Bilder aller Kameras jetzt, als weiterer Augenblick (Leertaste). Die Hand still halten.</translation>
     </message>
     <message>
         <source>Open pictures …</source>
-        <translation type="unfinished"></translation>
+        <translation>Bilder öffnen …</translation>
     </message>
     <message>
         <source>Picture or video files of one instant, one for each camera. They are told apart by the cameras&apos; names in theirs, or sorted (Ctrl+O).</source>
-        <translation type="unfinished"></translation>
+        <translation>Bild- oder Videodateien eines Augenblicks, eine je Kamera. Sie werden am Namen der Kamera in ihrem Namen unterschieden oder sortiert (Strg+O).</translation>
     </message>
     <message>
         <source>Find the hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Hand suchen</translation>
     </message>
     <message>
         <source>Look for the hand by the landmark networks (rhot landmarks install), and put all its joints there.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand mit den Landmarken-Netzen suchen (rhot landmarks install) und alle Gelenke dorthin setzen.</translation>
     </message>
     <message>
         <source>Which pictures are shown. All instants share the lengths; each has its own pose.</source>
-        <translation type="unfinished"></translation>
+        <translation>Welche Bilder gezeigt werden. Alle Augenblicke teilen sich die Längen; jeder hat seine eigene Pose.</translation>
     </message>
     <message>
         <source>Instant</source>
-        <translation type="unfinished"></translation>
+        <translation>Augenblick</translation>
     </message>
     <message>
         <source>Remove the instant shown; undo brings it back.</source>
-        <translation type="unfinished"></translation>
+        <translation>Den gezeigten Augenblick entfernen; Rückgängig holt ihn zurück.</translation>
     </message>
     <message>
         <source>Redo</source>
-        <translation type="unfinished"></translation>
+        <translation>Wiederholen</translation>
     </message>
     <message>
         <source>What a drag or a fit may change</source>
-        <translation type="unfinished"></translation>
+        <translation>Was Ziehen oder Anpassen ändern darf</translation>
     </message>
     <message>
         <source>What a drag or a fit may change. Begin with the pose; free lengths when the anchors or contours of two cameras or two instants show them.</source>
-        <translation type="unfinished"></translation>
+        <translation>Was Ziehen oder Anpassen ändern darf. Mit der Pose beginnen; Längen freigeben, wenn Anker oder Konturen zweier Kameras oder zweier Augenblicke sie zeigen.</translation>
     </message>
     <message>
         <source>Standard deviation of an anchor</source>
-        <translation type="unfinished"></translation>
+        <translation>Standardabweichung eines Ankers</translation>
     </message>
     <message>
         <source>How exactly you can point at a joint in these pictures. The standard deviations and Fit to anchors go by it; a drag meets the pointer whatever it is.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie genau sich ein Gelenk in diesen Bildern zeigen lässt. Die Standardabweichungen und „An Anker anpassen“ richten sich danach; beim Ziehen folgt das Gelenk dem Zeiger in jedem Fall.</translation>
     </message>
     <message>
         <source>Fit to anchors</source>
-        <translation type="unfinished"></translation>
+        <translation>An Anker anpassen</translation>
     </message>
     <message>
         <source>The most probable hand by all anchors at once (Ctrl+Return).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die wahrscheinlichste Hand nach allen Ankern zugleich (Strg+Eingabe).</translation>
     </message>
     <message>
         <source>Fit to contours</source>
-        <translation type="unfinished"></translation>
+        <translation>An Konturen anpassen</translation>
     </message>
     <message>
         <source>Search the edges of the hand in the pictures, from where it is now, and fit it to them (Ctrl+Shift+Return).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Kanten der Hand in den Bildern suchen, ausgehend von ihrem jetzigen Ort, und sie daran anpassen (Strg+Umschalt+Eingabe).</translation>
     </message>
     <message>
         <source>Free all joints</source>
-        <translation type="unfinished"></translation>
+        <translation>Alle Gelenke freigeben</translation>
     </message>
     <message>
         <source>Remove all anchors of this instant.</source>
-        <translation type="unfinished"></translation>
+        <translation>Alle Anker dieses Augenblicks entfernen.</translation>
     </message>
     <message>
         <source>Reset</source>
@@ -2640,59 +2645,59 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>Back to the hand and the poses of the beginning; undo brings everything back.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zurück zur Hand und den Posen vom Anfang; Rückgängig holt alles zurück.</translation>
     </message>
     <message>
         <source>Save hand file …</source>
-        <translation type="unfinished"></translation>
+        <translation>Handdatei speichern …</translation>
     </message>
     <message>
         <source>Write the hand as a hand file (Ctrl+S).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand als Handdatei schreiben (Strg+S).</translation>
     </message>
     <message>
         <source>Use this hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Diese Hand benutzen</translation>
     </message>
     <message>
         <source>Put the hand into the rig. The rig file keeps what it had; Calibrate, Bring back an earlier calibration restores it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand ins Rig übernehmen. Die Rig-Datei behält, was sie hatte; Kalibrieren, Frühere Kalibrierung zurückholen stellt es wieder her.</translation>
     </message>
     <message>
         <source>Escape.</source>
-        <translation type="unfinished"></translation>
+        <translation>Escape.</translation>
     </message>
     <message>
         <source>Give the search up.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Suche aufgeben.</translation>
     </message>
     <message>
         <source>Save hand file</source>
-        <translation type="unfinished"></translation>
+        <translation>Handdatei speichern</translation>
     </message>
     <message>
         <source>Write the hand to {out} (Ctrl+S).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand in {out} schreiben (Strg+S).</translation>
     </message>
     <message>
         <source>Anchors ±</source>
-        <translation type="unfinished"></translation>
+        <translation>Anker ±</translation>
     </message>
     <message>
         <source>Takes back: {change}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nimmt zurück: {change}.</translation>
     </message>
     <message>
         <source>Nothing to undo.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nichts rückgängig zu machen.</translation>
     </message>
     <message>
         <source>Brings back: {change}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Holt zurück: {change}.</translation>
     </message>
     <message>
         <source>Nothing to redo.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nichts zu wiederholen.</translation>
     </message>
     <message>
         <source>Begin the plot anew and fit the axes.</source>
@@ -3044,1451 +3049,1451 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>camera {camera} gave a picture that cannot be read; restart its node.</source>
-        <translation type="unfinished"></translation>
+        <translation>Kamera {camera} lieferte ein Bild, das nicht lesbar ist; ihren Knoten neu starten.</translation>
     </message>
     <message>
         <source>{name} (id {node_id}) answers; it is {state}.</source>
-        <translation type="unfinished"></translation>
+        <translation>{name} (ID {node_id}) antwortet; Zustand: {state}.</translation>
     </message>
     <message>
         <source>{begin} Paired with this computer.</source>
-        <translation type="unfinished"></translation>
+        <translation>{begin} Mit diesem Rechner gekoppelt.</translation>
     </message>
     <message>
         <source>{begin} Open: anybody on the network may see its pictures and steer it.</source>
-        <translation type="unfinished"></translation>
+        <translation>{begin} Offen: Jeder im Netz kann seine Bilder sehen und ihn steuern.</translation>
     </message>
     <message>
         <source>{begin} Not paired with this computer: press Pair.</source>
-        <translation type="unfinished"></translation>
+        <translation>{begin} Nicht mit diesem Rechner gekoppelt: Koppeln drücken.</translation>
     </message>
     <message>
         <source>A rig needs two nodes that answer and are paired with this computer.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Rig braucht zwei Knoten, die antworten und mit diesem Rechner gekoppelt sind.</translation>
     </message>
     <message>
         <source>Both nodes have the id {ids}; give one another node_id in its settings file.</source>
-        <translation type="unfinished"></translation>
+        <translation>Beide Knoten haben die ID {ids}; einem davon in seiner Einstellungsdatei eine andere node_id geben.</translation>
     </message>
     <message>
         <source>The process that computes ended unexpectedly; try again. If it happens again, it may have run out of memory: use fewer pictures or a shorter recording.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der rechnende Prozess endete unerwartet; noch einmal versuchen. Geschieht es wieder, reichte vielleicht der Speicher nicht: weniger Bilder oder eine kürzere Aufnahme nehmen.</translation>
     </message>
     <message>
         <source>No node was found. Is rhot-node running there, and on the same network? Some networks let no search through: then type the address in below.</source>
-        <translation type="unfinished"></translation>
+        <translation>Kein Knoten wurde gefunden. Läuft rhot-node dort, und im selben Netz? Manche Netze lassen keine Suche durch: dann die Adresse unten eintippen.</translation>
     </message>
     <message>
         <source>open to everybody</source>
-        <translation type="unfinished"></translation>
+        <translation>offen für alle</translation>
     </message>
     <message>
         <source>not paired yet</source>
-        <translation type="unfinished"></translation>
+        <translation>noch nicht gekoppelt</translation>
     </message>
     <message>
         <source>paired</source>
-        <translation type="unfinished"></translation>
+        <translation>gekoppelt</translation>
     </message>
     <message>
         <source>id</source>
-        <translation type="unfinished"></translation>
+        <translation>ID</translation>
     </message>
     <message>
         <source>address</source>
-        <translation type="unfinished"></translation>
+        <translation>Adresse</translation>
     </message>
     <message>
         <source>trust</source>
-        <translation type="unfinished"></translation>
+        <translation>Vertrauen</translation>
     </message>
     <message>
         <source>state</source>
-        <translation type="unfinished"></translation>
+        <translation>Zustand</translation>
     </message>
     <message>
         <source>announces itself</source>
-        <translation type="unfinished"></translation>
+        <translation>meldet sich</translation>
     </message>
     <message>
         <source>Nodes on the network</source>
-        <translation type="unfinished"></translation>
+        <translation>Knoten im Netz</translation>
     </message>
     <message>
         <source>Looking for nodes …</source>
-        <translation type="unfinished"></translation>
+        <translation>Knoten werden gesucht …</translation>
     </message>
     <message>
         <source>Use as {side} camera</source>
-        <translation type="unfinished"></translation>
+        <translation>Als Kamera {side} nehmen</translation>
     </message>
     <message>
         <source>Possible once a node is selected in the list.</source>
-        <translation type="unfinished"></translation>
+        <translation>Möglich, sobald ein Knoten in der Liste ausgewählt ist.</translation>
     </message>
     <message>
         <source>Two networks find 21 landmarks of a bare hand in a picture. They are MediaPipe&apos;s, under the {licence}, which is placed beside them. Install downloads the package {package} (36 MB), takes them out of it and checks them. Nothing else of it is kept. Nodes on other computers install theirs by `rhot-node landmarks install`.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zwei Netze finden 21 Landmarken einer bloßen Hand in einem Bild. Sie stammen von MediaPipe, unter der {licence}, die daneben abgelegt wird. Installieren lädt das Paket {package} herunter (36 MB), nimmt sie heraus und prüft sie. Sonst wird nichts davon behalten. Knoten auf anderen Rechnern installieren ihre mit `rhot-node landmarks install`.</translation>
     </message>
     <message>
         <source>Hand networks</source>
-        <translation type="unfinished"></translation>
+        <translation>Hand-Netze</translation>
     </message>
     <message>
         <source>Install</source>
-        <translation type="unfinished"></translation>
+        <translation>Installieren</translation>
     </message>
     <message>
         <source>From a file …</source>
-        <translation type="unfinished"></translation>
+        <translation>Aus einer Datei …</translation>
     </message>
     <message>
         <source>Download and place them. What is there is replaced when all is complete.</source>
-        <translation type="unfinished"></translation>
+        <translation>Herunterladen und ablegen. Vorhandenes wird ersetzt, wenn alles vollständig ist.</translation>
     </message>
     <message>
         <source>Take them out of the wheel of {package} that you have, without network.</source>
-        <translation type="unfinished"></translation>
+        <translation>Sie ohne Netz aus dem vorhandenen Wheel von {package} nehmen.</translation>
     </message>
     <message>
         <source>End the installation; what was there stays.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Installation beenden; was da war, bleibt.</translation>
     </message>
     <message>
         <source>Cancelled. What was there before is there still.</source>
-        <translation type="unfinished"></translation>
+        <translation>Abgebrochen. Was vorher da war, ist noch da.</translation>
     </message>
     <message>
         <source>The wheel of {package}</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Wheel von {package}</translation>
     </message>
     <message>
         <source>Wheels (*.whl);;All files (*)</source>
-        <translation type="unfinished"></translation>
+        <translation>Wheels (*.whl);;Alle Dateien (*)</translation>
     </message>
     <message>
         <source>They are not installed on this computer.</source>
-        <translation type="unfinished"></translation>
+        <translation>Sie sind auf diesem Rechner nicht installiert.</translation>
     </message>
     <message>
         <source>They are installed and whole, in {folder}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Sie sind vollständig installiert, in {folder}.</translation>
     </message>
     <message>
         <source>Paint or tape in six colours</source>
-        <translation type="unfinished"></translation>
+        <translation>Farbe oder Klebeband in sechs Farben</translation>
     </message>
     <message>
         <source>A bare hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine bloße Hand</translation>
     </message>
     <message>
         <source>Landmarks or nodes of my own</source>
-        <translation type="unfinished"></translation>
+        <translation>Eigene Landmarken oder Knoten</translation>
     </message>
     <message>
         <source>one camera</source>
-        <translation type="unfinished"></translation>
+        <translation>eine Kamera</translation>
     </message>
     <message>
         <source>two cameras</source>
-        <translation type="unfinished"></translation>
+        <translation>zwei Kameras</translation>
     </message>
     <message>
         <source>Do not open by itself</source>
-        <translation type="unfinished"></translation>
+        <translation>Nicht von selbst öffnen</translation>
     </message>
     <message>
         <source>Do not show these steps by themselves. Calibrate, What to do next shows them.</source>
-        <translation type="unfinished"></translation>
+        <translation>Diese Schritte nicht von selbst zeigen. Kalibrieren, Was als Nächstes zu tun ist zeigt sie.</translation>
     </message>
     <message>
         <source>done</source>
-        <translation type="unfinished"></translation>
+        <translation>erledigt</translation>
     </message>
     <message>
         <source>not done yet</source>
-        <translation type="unfinished"></translation>
+        <translation>noch nicht erledigt</translation>
     </message>
     <message>
         <source>All is done: hold the hand before the cameras.</source>
-        <translation type="unfinished"></translation>
+        <translation>Alles ist erledigt: die Hand vor die Kameras halten.</translation>
     </message>
     <message>
         <source>Write the board</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Brett schreiben</translation>
     </message>
     <message>
         <source>PDF (*.pdf)</source>
-        <translation type="unfinished"></translation>
+        <translation>PDF (*.pdf)</translation>
     </message>
     <message>
         <source>Written: {path}. Print it at 100 % and measure the ruler on it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Geschrieben: {path}. Mit 100 % drucken und das Lineal darauf nachmessen.</translation>
     </message>
     <message>
         <source>{path}: cannot be written ({strerror}).</source>
-        <translation type="unfinished"></translation>
+        <translation>{path}: lässt sich nicht schreiben ({strerror}).</translation>
     </message>
     <message>
         <source>{title} is on</source>
-        <translation type="unfinished"></translation>
+        <translation>{title} ist an</translation>
     </message>
     <message>
         <source>On or off, at once; one that is off stays in the rig.</source>
-        <translation type="unfinished"></translation>
+        <translation>Sofort an oder aus; eine ausgeschaltete bleibt im Rig.</translation>
     </message>
     <message>
         <source>Change …</source>
-        <translation type="unfinished"></translation>
+        <translation>Ändern …</translation>
     </message>
     <message>
         <source>Remove</source>
-        <translation type="unfinished"></translation>
+        <translation>Entfernen</translation>
     </message>
     <message>
         <source>Another target, other joints, another rate: in the form below.</source>
-        <translation type="unfinished"></translation>
+        <translation>Anderes Ziel, andere Gelenke, andere Rate: im Formular unten.</translation>
     </message>
     <message>
         <source>Close it and take it out of the rig; Undo brings it back.</source>
-        <translation type="unfinished"></translation>
+        <translation>Schließen und aus dem Rig nehmen; Rückgängig holt sie zurück.</translation>
     </message>
     <message>
         <source>Where to connect. The web view&apos;s address has a secret in it: whoever knows it sees the hand.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wohin man sich verbindet. Die Adresse der Webansicht enthält ein Geheimnis: Wer sie kennt, sieht die Hand.</translation>
     </message>
     <message>
         <source>Put the address on the clipboard.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Adresse in die Zwischenablage kopieren.</translation>
     </message>
     <message>
         <source>The address as a QR code, for a telephone&apos;s or headset&apos;s camera.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Adresse als QR-Code, für die Kamera eines Telefons oder Headsets.</translation>
     </message>
     <message>
         <source>Estimate the hand&apos;s size</source>
-        <translation type="unfinished"></translation>
+        <translation>Größe der Hand schätzen</translation>
     </message>
     <message>
         <source>Flat, for the 3-D mouse</source>
-        <translation type="unfinished"></translation>
+        <translation>Flach, für die 3-D-Maus</translation>
     </message>
     <message>
         <source>Use this size for the rig&apos;s hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Diese Größe ins Rig übernehmen</translation>
     </message>
     <message>
         <source>Makes every length of the rig&apos;s hand so much larger or smaller. What was there is kept.</source>
-        <translation type="unfinished"></translation>
+        <translation>Macht jede Länge der Hand des Rigs um so viel größer oder kleiner. Was da war, bleibt erhalten.</translation>
     </message>
     <message>
         <source>Fingers bent by</source>
-        <translation type="unfinished"></translation>
+        <translation>Beugung durch</translation>
     </message>
     <message>
         <source>Tracked by</source>
-        <translation type="unfinished"></translation>
+        <translation>Verfolgt über</translation>
     </message>
     <message>
         <source>Fingers</source>
-        <translation type="unfinished"></translation>
+        <translation>Finger</translation>
     </message>
     <message>
         <source>Limits</source>
-        <translation type="unfinished"></translation>
+        <translation>Grenzen</translation>
     </message>
     <message>
         <source>Size</source>
-        <translation type="unfinished"></translation>
+        <translation>Größe</translation>
     </message>
     <message>
         <source>In force.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gilt.</translation>
     </message>
     <message>
         <source>In force until the engine ends: this rig came from no file. Rig, Save rig keeps it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gilt, bis die Engine endet: Dieses Rig kam aus keiner Datei. Rig, Rig speichern bewahrt es auf.</translation>
     </message>
     <message>
         <source>As in the beginning. Undo brings the fit back.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie am Anfang. Rückgängig holt die Anpassung zurück.</translation>
     </message>
     <message>
         <source>Undone</source>
-        <translation type="unfinished"></translation>
+        <translation>Rückgängig gemacht</translation>
     </message>
     <message>
         <source>Done again</source>
-        <translation type="unfinished"></translation>
+        <translation>Wiederholt</translation>
     </message>
     <message>
         <source>Fitting to the anchors</source>
-        <translation type="unfinished"></translation>
+        <translation>Anpassung an die Anker</translation>
     </message>
     <message>
         <source>fitting to anchors</source>
-        <translation type="unfinished"></translation>
+        <translation>Anpassung an Anker</translation>
     </message>
     <message>
         <source>Fitted to the anchors of this instant.</source>
-        <translation type="unfinished"></translation>
+        <translation>An die Anker dieses Augenblicks angepasst.</translation>
     </message>
     <message>
         <source>Fitted to the anchors of all instants.</source>
-        <translation type="unfinished"></translation>
+        <translation>An die Anker aller Augenblicke angepasst.</translation>
     </message>
     <message>
         <source>{found:.0%} of the hand&apos;s contour was found in the pictures.</source>
-        <translation type="unfinished"></translation>
+        <translation>{found:.0%} der Kontur der Hand wurde in den Bildern gefunden.</translation>
     </message>
     <message>
         <source> Drag what is wrong to its place, then fit again.</source>
-        <translation type="unfinished"></translation>
+        <translation> Falsches an seinen Ort ziehen und noch einmal anpassen.</translation>
     </message>
     <message>
         <source>Fitting to the contours</source>
-        <translation type="unfinished"></translation>
+        <translation>Anpassung an die Konturen</translation>
     </message>
     <message>
         <source>fitting to contours</source>
-        <translation type="unfinished"></translation>
+        <translation>Anpassung an Konturen</translation>
     </message>
     <message>
         <source>Looking for the hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand wird gesucht</translation>
     </message>
     <message>
         <source>finding the hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Suche der Hand</translation>
     </message>
     <message>
         <source>Look whether it is the hand; if not, undo and drag the joints instead.</source>
-        <translation type="unfinished"></translation>
+        <translation>Prüfen, ob es die Hand ist; sonst rückgängig machen und die Gelenke ziehen.</translation>
     </message>
     <message>
         <source>Cancelled; nothing was changed.</source>
-        <translation type="unfinished"></translation>
+        <translation>Abgebrochen; nichts wurde geändert.</translation>
     </message>
     <message>
         <source>Save the hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand speichern</translation>
     </message>
     <message>
         <source>Hand files (*.json)</source>
-        <translation type="unfinished"></translation>
+        <translation>Handdateien (*.json)</translation>
     </message>
     <message>
         <source>{out}: cannot be written ({strerror}); nothing was saved.</source>
-        <translation type="unfinished"></translation>
+        <translation>{out}: lässt sich nicht schreiben ({strerror}); nichts wurde gespeichert.</translation>
     </message>
     <message>
         <source>Saved: {out}</source>
-        <translation type="unfinished"></translation>
+        <translation>Gespeichert: {out}</translation>
     </message>
     <message>
         <source>The rig has this hand already: only the pose was fitted.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Rig hat diese Hand schon: Nur die Pose wurde angepasst.</translation>
     </message>
     <message>
         <source>The rig has this hand now. Calibrate, Bring back an earlier calibration restores the old one.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Rig hat jetzt diese Hand. Kalibrieren, Frühere Kalibrierung zurückholen stellt die alte wieder her.</translation>
     </message>
     <message>
         <source>The videos show {length:.2f} s together, and second {at:g} is before that. Choose a later one.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Videos zeigen gemeinsam {length:.2f} s, und Sekunde {at:g} liegt davor. Eine spätere wählen.</translation>
     </message>
     <message>
         <source>The videos show {length:.2f} s together, and second {at:g} is beyond that. Choose an earlier one.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Videos zeigen gemeinsam {length:.2f} s, und Sekunde {at:g} liegt dahinter. Eine frühere wählen.</translation>
     </message>
     <message>
         <source>{path}: its frame at second {at_s:g} cannot be read; is the file complete?</source>
-        <translation type="unfinished"></translation>
+        <translation>{path}: Das Bild bei Sekunde {at_s:g} ist nicht lesbar; ist die Datei vollständig?</translation>
     </message>
     <message>
         <source>Fit the hand to pictures</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand an Bilder anpassen</translation>
     </message>
     <message>
         <source>Pictures of one instant, one for each camera</source>
-        <translation type="unfinished"></translation>
+        <translation>Bilder eines Augenblicks, eines je Kamera</translation>
     </message>
     <message>
         <source>Which second of the videos?</source>
-        <translation type="unfinished"></translation>
+        <translation>Welche Sekunde der Videos?</translation>
     </message>
     <message>
         <source>Live pictures</source>
-        <translation type="unfinished"></translation>
+        <translation>Live-Bilder</translation>
     </message>
     <message>
         <source>waiting for the first picture</source>
-        <translation type="unfinished"></translation>
+        <translation>wartet auf das erste Bild</translation>
     </message>
     <message>
         <source>Drag the wrist, the knuckles and the fingertips to their places, or press Find the hand.</source>
-        <translation type="unfinished"></translation>
+        <translation>Handgelenk, Knöchel und Fingerspitzen an ihre Orte ziehen oder Hand suchen drücken.</translation>
     </message>
     <message>
         <source>The hand begins where it is tracked. Drag joints, or fit to the contours.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand beginnt, wo sie verfolgt wird. Gelenke ziehen oder an die Konturen anpassen.</translation>
     </message>
     <message>
         <source>Standard deviation in the unit beside, by the anchors and what is known of people&apos;s hands; after Fit to contours by the contours, too.</source>
-        <translation type="unfinished"></translation>
+        <translation>Standardabweichung in der Einheit daneben, nach den Ankern und dem, was über Menschenhände bekannt ist; nach „An Konturen anpassen“ auch nach den Konturen.</translation>
     </message>
     <message>
         <source>{group}, {name}, slider</source>
-        <translation type="unfinished"></translation>
+        <translation>{group}, {name}, Regler</translation>
     </message>
     <message>
         <source>Which numbers the sliders below move.</source>
-        <translation type="unfinished"></translation>
+        <translation>Welche Zahlen die Regler unten bewegen.</translation>
     </message>
     <message>
         <source>Numbers</source>
-        <translation type="unfinished"></translation>
+        <translation>Zahlen</translation>
     </message>
     <message>
         <source>The hand was changed and not saved. Close without it?</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand wurde geändert und nicht gespeichert. Trotzdem schließen?</translation>
     </message>
     <message>
         <source>Palm</source>
-        <translation type="unfinished"></translation>
+        <translation>Handfläche</translation>
     </message>
     <message>
         <source>Hold the hand still in all pictures, fingers spread, and press Take pictures.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand in allen Bildern still halten, Finger gespreizt, und Bilder aufnehmen drücken.</translation>
     </message>
     <message>
         <source>Open a picture of each camera, taken at the same moment.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Bild jeder Kamera öffnen, im selben Augenblick aufgenommen.</translation>
     </message>
     <message>
         <source>Drag joints in the pictures or move the numbers until the outline lies on the hand.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gelenke in den Bildern ziehen oder die Zahlen verschieben, bis der Umriss auf der Hand liegt.</translation>
     </message>
     <message>
         <source>no anchors</source>
-        <translation type="unfinished"></translation>
+        <translation>keine Anker</translation>
     </message>
     <message numerus="yes">
         <source>{n} anchor, {rms:.1f} px rms, {most:.1f} px most</source>
         <comment>{n} anchors, {rms:.1f} px rms, {most:.1f} px most</comment>
-        <translation type="unfinished">
-            <numerusform></numerusform>
-            <numerusform></numerusform>
+        <translation>
+            <numerusform>{n} Anker, {rms:.1f} px rms, {most:.1f} px höchstens</numerusform>
+            <numerusform>{n} Anker, {rms:.1f} px rms, {most:.1f} px höchstens</numerusform>
         </translation>
     </message>
     <message>
         <source>Choose two cameras</source>
-        <translation type="unfinished"></translation>
+        <translation>Zwei Kameras auswählen</translation>
     </message>
     <message>
         <source>Both see the hand; 10 to 50 cm apart.</source>
-        <translation type="unfinished"></translation>
+        <translation>Beide sehen die Hand; 10 bis 50 cm Abstand.</translation>
     </message>
     <message>
         <source>Install the hand networks</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand-Netze installieren</translation>
     </message>
     <message>
         <source>They find the joints of a bare hand (36 MB).</source>
-        <translation type="unfinished"></translation>
+        <translation>Sie finden die Gelenke einer bloßen Hand (36 MB).</translation>
     </message>
     <message>
         <source>Print the board</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Brett drucken</translation>
     </message>
     <message>
         <source>A chessboard on A4 at 100 %, glued to something flat.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Schachbrett auf A4 bei 100 %, auf etwas Ebenes geklebt.</translation>
     </message>
     <message>
         <source>Calibrate each lens</source>
-        <translation type="unfinished"></translation>
+        <translation>Jedes Objektiv kalibrieren</translation>
     </message>
     <message>
         <source>Until then distances are a guess.</source>
-        <translation type="unfinished"></translation>
+        <translation>Bis dahin sind Abstände geraten.</translation>
     </message>
     <message>
         <source>Missing: {names}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Es fehlt: {names}.</translation>
     </message>
     <message>
         <source>All lenses are known.</source>
-        <translation type="unfinished"></translation>
+        <translation>Alle Objektive sind bekannt.</translation>
     </message>
     <message>
         <source>Put the cameras together</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Kameras zusammensetzen</translation>
     </message>
     <message>
         <source>Where they stand to each other, from the board before both.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie sie zueinander stehen, vom Brett vor beiden.</translation>
     </message>
     <message>
         <source>Compare the cameras&apos; times</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Zeiten der Kameras vergleichen</translation>
     </message>
     <message>
         <source>Teach the colours</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Farben lernen</translation>
     </message>
     <message>
         <source>Which colour each marker has in this light.</source>
-        <translation type="unfinished"></translation>
+        <translation>Welche Farbe jeder Marker in diesem Licht hat.</translation>
     </message>
     <message>
         <source>Measure your hand</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand vermessen</translation>
     </message>
     <message>
         <source>How long its bones are, from a minute of movement.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie lang ihre Knochen sind, aus einer Minute Bewegung.</translation>
     </message>
     <message>
         <source>Track painted markers</source>
-        <translation type="unfinished"></translation>
+        <translation>Bemalte Marker verfolgen</translation>
     </message>
     <message>
         <source>Six colours: five fingertips and the wrist.</source>
-        <translation type="unfinished"></translation>
+        <translation>Sechs Farben: fünf Fingerspitzen und das Handgelenk.</translation>
     </message>
     <message>
         <source>Track landmarks</source>
-        <translation type="unfinished"></translation>
+        <translation>Landmarken verfolgen</translation>
     </message>
     <message>
         <source>The joints of a bare hand, as networks find them.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Gelenke einer bloßen Hand, wie Netze sie finden.</translation>
     </message>
     <message>
         <source>No program listens yet. Add OSC for Unity, Blender or TouchDesigner, VMC for avatars, or the web view to see the hand in a browser or a headset.</source>
-        <translation type="unfinished"></translation>
+        <translation>Noch hört kein Programm zu. OSC für Unity, Blender oder TouchDesigner, VMC für Avatare oder die Webansicht hinzufügen, um die Hand in einem Browser oder Headset zu sehen.</translation>
     </message>
     <message>
         <source>own: 21 joints</source>
-        <translation type="unfinished"></translation>
+        <translation>eigener: 21 Gelenke</translation>
     </message>
     <message>
         <source>Wrist, then four joints of each finger; positions in the rig frame.</source>
-        <translation type="unfinished"></translation>
+        <translation>Handgelenk, dann vier Gelenke jedes Fingers; Positionen im Rig-Koordinatensystem.</translation>
     </message>
     <message>
         <source>openxr: 26 joints</source>
-        <translation type="unfinished"></translation>
+        <translation>openxr: 26 Gelenke</translation>
     </message>
     <message>
         <source>XR_EXT_hand_tracking: positions, orientations and radii in OpenXR&apos;s axes.</source>
-        <translation type="unfinished"></translation>
+        <translation>XR_EXT_hand_tracking: Positionen, Orientierungen und Radien in den Achsen von OpenXR.</translation>
     </message>
     <message>
         <source>mediapipe: 21 joints</source>
-        <translation type="unfinished"></translation>
+        <translation>mediapipe: 21 Gelenke</translation>
     </message>
     <message>
         <source>In the order and by the names of MediaPipe; positions in the rig frame.</source>
-        <translation type="unfinished"></translation>
+        <translation>In der Reihenfolge und mit den Namen von MediaPipe; Positionen im Rig-Koordinatensystem.</translation>
     </message>
     <message>
         <source>What the plug-in understands; see its own documentation.</source>
-        <translation type="unfinished"></translation>
+        <translation>Was das Plug-in versteht; siehe seine eigene Dokumentation.</translation>
     </message>
     <message>
         <source>to</source>
-        <translation type="unfinished"></translation>
+        <translation>an</translation>
     </message>
     <message>
         <source>Messages by UDP, for Unity, Blender, Unreal, TouchDesigner, Max, Pure Data.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nachrichten per UDP, für Unity, Blender, Unreal, TouchDesigner, Max, Pure Data.</translation>
     </message>
     <message>
         <source>HOST:PORT of the program that listens.</source>
-        <translation type="unfinished"></translation>
+        <translation>HOST:PORT des Programms, das zuhört.</translation>
     </message>
     <message>
         <source>Finger bones for avatars: EVMC4U in Unity, VMC4B in Blender, Warudo, VSeeFace.</source>
-        <translation type="unfinished"></translation>
+        <translation>Fingerknochen für Avatare: EVMC4U in Unity, VMC4B in Blender, Warudo, VSeeFace.</translation>
     </message>
     <message>
         <source>HOST:PORT of the program that listens; most take 39539.</source>
-        <translation type="unfinished"></translation>
+        <translation>HOST:PORT des Programms, das zuhört; die meisten nehmen 39539.</translation>
     </message>
     <message>
         <source>Programs connect to this port and get every state as JSON.</source>
-        <translation type="unfinished"></translation>
+        <translation>Programme verbinden sich mit diesem Port und erhalten jeden Zustand als JSON.</translation>
     </message>
     <message>
         <source>[HOST:]PORT to listen on, unencrypted. 127.0.0.1 is this computer only; 0.0.0.0 lets others in.</source>
-        <translation type="unfinished"></translation>
+        <translation>[HOST:]PORT zum Zuhören, unverschlüsselt. 127.0.0.1 ist nur dieser Rechner; 0.0.0.0 lässt andere herein.</translation>
     </message>
     <message>
         <source>on</source>
-        <translation type="unfinished"></translation>
+        <translation>auf</translation>
     </message>
     <message>
         <source>Web view</source>
-        <translation type="unfinished"></translation>
+        <translation>Webansicht</translation>
     </message>
     <message>
         <source>A page that shows the hand in browsers and headsets.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Seite, die die Hand in Browsern und Headsets zeigt.</translation>
     </message>
     <message>
         <source>[HOST:]PORT to listen on. 127.0.0.1 is this computer only; 0.0.0.0 lets others in, by HTTPS.</source>
-        <translation type="unfinished"></translation>
+        <translation>[HOST:]PORT zum Zuhören. 127.0.0.1 ist nur dieser Rechner; 0.0.0.0 lässt andere herein, per HTTPS.</translation>
     </message>
     <message>
         <source>LabRecorder and others find the streams by name.</source>
-        <translation type="unfinished"></translation>
+        <translation>LabRecorder und andere finden die Datenströme am Namen.</translation>
     </message>
     <message>
         <source>Name of the streams; RHOT when empty.</source>
-        <translation type="unfinished"></translation>
+        <translation>Name der Datenströme; leer: RHOT.</translation>
     </message>
     <message>
         <source>as</source>
-        <translation type="unfinished"></translation>
+        <translation>als</translation>
     </message>
     <message>
         <source>JSON under the key rhot/state, for robots and ROS 2.</source>
-        <translation type="unfinished"></translation>
+        <translation>JSON unter dem Schlüssel rhot/state, für Roboter und ROS 2.</translation>
     </message>
     <message>
         <source>HOST:PORT of a router; when empty, whoever is found on the network.</source>
-        <translation type="unfinished"></translation>
+        <translation>HOST:PORT eines Routers; leer: wer im Netz gefunden wird.</translation>
     </message>
     <message>
         <source>by</source>
-        <translation type="unfinished"></translation>
+        <translation>über</translation>
     </message>
     <message>
         <source>off</source>
-        <translation type="unfinished"></translation>
+        <translation>aus</translation>
     </message>
     <message>
         <source>Switched off: kept in the rig, and not opened.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ausgeschaltet: bleibt im Rig und wird nicht geöffnet.</translation>
     </message>
     <message>
         <source>opens</source>
-        <translation type="unfinished"></translation>
+        <translation>öffnet</translation>
     </message>
     <message>
         <source>The output is being opened.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Ausgabe wird geöffnet.</translation>
     </message>
     <message>
         <source>waits</source>
-        <translation type="unfinished"></translation>
+        <translation>wartet</translation>
     </message>
     <message>
         <source>The output is open; nobody listens, or there is nothing to send yet.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Ausgabe ist offen; niemand hört zu, oder es gibt noch nichts zu senden.</translation>
     </message>
     <message>
         <source>sending</source>
-        <translation type="unfinished"></translation>
+        <translation>sendet</translation>
     </message>
     <message>
         <source>States leave for the other program.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zustände gehen an das andere Programm.</translation>
     </message>
     <message>
         <source>slow</source>
-        <translation type="unfinished"></translation>
+        <translation>langsam</translation>
     </message>
     <message>
         <source>The receiver takes states too slowly; some are dropped. Tracking goes on.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Empfänger nimmt Zustände zu langsam ab; einige entfallen. Die Verfolgung läuft weiter.</translation>
     </message>
     <message>
         <source>failed</source>
-        <translation type="unfinished"></translation>
+        <translation>gescheitert</translation>
     </message>
     <message>
         <source>The output does not work. It is tried again every 3 s; tracking goes on.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Ausgabe arbeitet nicht. Alle 3 s wird es wieder versucht; die Verfolgung läuft weiter.</translation>
     </message>
     <message>
         <source>left out</source>
-        <translation type="unfinished"></translation>
+        <translation>ausgelassen</translation>
     </message>
     <message>
         <source>A replay opens none of the rig&apos;s outputs: nothing old is sent anywhere unasked.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Wiedergabe öffnet keine Ausgabe des Rigs: Nichts Altes wird ungefragt irgendwohin gesendet.</translation>
     </message>
     <message>
         <source>The installed plug-in {name}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das installierte Plug-in {name}.</translation>
     </message>
     <message>
         <source>output {spec!r}: it is in the list already.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ausgabe {spec!r}: steht schon in der Liste.</translation>
     </message>
     <message>
         <source>at most {rate:g} states/s</source>
-        <translation type="unfinished"></translation>
+        <translation>höchstens {rate:g} Zustände/s</translation>
     </message>
     <message>
         <source>{joints} joints, {rate}</source>
-        <translation type="unfinished"></translation>
+        <translation>{joints} Gelenke, {rate}</translation>
     </message>
     <message>
         <source>; asked for when the engine was started</source>
-        <translation type="unfinished"></translation>
+        <translation>; beim Start der Engine verlangt</translation>
     </message>
     <message>
         <source>{sent} states sent, {dropped} dropped.</source>
-        <translation type="unfinished"></translation>
+        <translation>{sent} Zustände gesendet, {dropped} entfallen.</translation>
     </message>
     <message>
         <source>waits for a browser</source>
-        <translation type="unfinished"></translation>
+        <translation>wartet auf einen Browser</translation>
     </message>
     <message>
         <source>waits for a client</source>
-        <translation type="unfinished"></translation>
+        <translation>wartet auf einen Empfänger</translation>
     </message>
     <message numerus="yes">
         <source>, {n} client</source>
         <comment>, {n} clients</comment>
-        <translation type="unfinished">
-            <numerusform></numerusform>
-            <numerusform></numerusform>
+        <translation>
+            <numerusform>, {n} Empfänger</numerusform>
+            <numerusform>, {n} Empfänger</numerusform>
         </translation>
     </message>
     <message>
         <source>sending {rate:.0f} states/s{clients}</source>
-        <translation type="unfinished"></translation>
+        <translation>sendet {rate:.0f} Zustände/s{clients}</translation>
     </message>
     <message>
         <source>waits for a hand</source>
-        <translation type="unfinished"></translation>
+        <translation>wartet auf eine Hand</translation>
     </message>
     <message>
         <source>waits for Start</source>
-        <translation type="unfinished"></translation>
+        <translation>wartet auf Start</translation>
     </message>
     <message>
         <source>Whoever has this address sees the hand. The connection is encrypted, by a certificate that this computer made: the browser warns once; choose Advanced, then Proceed.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wer diese Adresse hat, sieht die Hand. Die Verbindung ist verschlüsselt, mit einem Zertifikat dieses Rechners: Der Browser warnt einmal; Erweitert wählen, dann fortfahren.</translation>
     </message>
     <message>
         <source>Open it in a browser on this computer. For a headset or telephone change the target to 0.0.0.0:{port}: other computers are let in, by HTTPS only.</source>
-        <translation type="unfinished"></translation>
+        <translation>In einem Browser auf diesem Rechner öffnen. Für ein Headset oder Telefon das Ziel in 0.0.0.0:{port} ändern: Andere Rechner kommen dann herein, nur per HTTPS.</translation>
     </message>
     <message>
         <source>It lasts for this run: the simulated rig is made anew each time.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gilt für diesen Lauf: Das simulierte Rig entsteht jedes Mal neu.</translation>
     </message>
     <message>
         <source>It lasts until the engine ends: this rig came from no file.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gilt, bis die Engine endet: Dieses Rig kam aus keiner Datei.</translation>
     </message>
     <message>
         <source>Save rig (Ctrl+S) keeps it in {name}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Rig speichern (Strg+S) behält es in {name}.</translation>
     </message>
     <message>
         <source>output {spec!r}: it is not in the engine&apos;s rig any more; another program has changed it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ausgabe {spec!r}: nicht mehr im Rig der Engine; ein anderes Programm hat es geändert.</translation>
     </message>
     <message>
         <source>Another program has changed the outputs since; nothing was taken back.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein anderes Programm hat die Ausgaben inzwischen geändert; nichts wurde zurückgenommen.</translation>
     </message>
     <message>
         <source>Three-dimensional scene of the mouse: ground, cursor and balls</source>
-        <translation type="unfinished"></translation>
+        <translation>Dreidimensionale Szene der Maus: Boden, Zeiger und Kugeln</translation>
     </message>
     <message>
         <source>Thumb</source>
-        <translation type="unfinished"></translation>
+        <translation>Daumen</translation>
     </message>
     <message>
         <source>Little finger</source>
-        <translation type="unfinished"></translation>
+        <translation>Kleiner Finger</translation>
     </message>
     <message>
         <source>No engine is heard, so no hand moves the mouse. Open a rig, or the simulated rig, in the main window and press Start.</source>
-        <translation type="unfinished"></translation>
+        <translation>Keine Engine ist zu hören, daher bewegt keine Hand die Maus. Im Hauptfenster ein Rig oder das simulierte Rig öffnen und Start drücken.</translation>
     </message>
     <message>
         <source>3-D mouse</source>
-        <translation type="unfinished"></translation>
+        <translation>3-D-Maus</translation>
     </message>
     <message>
         <source>Rest here</source>
-        <translation type="unfinished"></translation>
+        <translation>Hier ruhen</translation>
     </message>
     <message>
         <source>The hand as it lies for the next half second becomes the cursor&apos;s origin (H).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand, wie sie in der nächsten halben Sekunde liegt, wird zum Ursprung des Zeigers (H).</translation>
     </message>
     <message>
         <source>Take the last move of a ball back (Ctrl+Z).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die letzte Bewegung einer Kugel zurücknehmen (Strg+Z).</translation>
     </message>
     <message>
         <source>Target test</source>
-        <translation type="unfinished"></translation>
+        <translation>Zieltest</translation>
     </message>
     <message>
         <source>Click nine targets with the thumb: how many bits per second the hand conveys (T).</source>
-        <translation type="unfinished"></translation>
+        <translation>Neun Ziele mit dem Daumen anklicken: wie viele Bit pro Sekunde die Hand überträgt (T).</translation>
     </message>
     <message>
         <source>What sets the pole&apos;s length: the index fingertip above the palm, or the palm.</source>
-        <translation type="unfinished"></translation>
+        <translation>Was die Länge der Stange bestimmt: die Zeigefingerspitze über der Handfläche oder die Handfläche.</translation>
     </message>
     <message>
         <source>Height from</source>
-        <translation type="unfinished"></translation>
+        <translation>Höhe von</translation>
     </message>
     <message>
         <source>Height from the index finger</source>
-        <translation type="unfinished"></translation>
+        <translation>Höhe vom Zeigefinger</translation>
     </message>
     <message>
         <source>Height from the palm</source>
-        <translation type="unfinished"></translation>
+        <translation>Höhe von der Handfläche</translation>
     </message>
     <message>
         <source>Cursor: right and forward of the ground&apos;s middle, and above it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zeiger: rechts und vor der Mitte des Bodens und darüber.</translation>
     </message>
     <message>
         <source>Pressed while the {finger} is spread away from the hand.</source>
-        <translation type="unfinished"></translation>
+        <translation>Gedrückt, solange der {finger} von der Hand abgespreizt ist.</translation>
     </message>
     <message>
         <source>Hold the hand still.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand still halten.</translation>
     </message>
     <message>
         <source>The target test moves no ball. End it to undo moves.</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Zieltest bewegt keine Kugel. Ihn beenden, um Bewegungen zurückzunehmen.</translation>
     </message>
     <message>
         <source>End the test</source>
-        <translation type="unfinished"></translation>
+        <translation>Test beenden</translation>
     </message>
     <message>
         <source>Hold the hand still for half a second: that becomes the cursor&apos;s origin.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Hand eine halbe Sekunde still halten: Das wird der Ursprung des Zeigers.</translation>
     </message>
     <message>
         <source>right – mm   forward – mm   height – mm</source>
-        <translation type="unfinished"></translation>
+        <translation>rechts – mm   vorn – mm   Höhe – mm</translation>
     </message>
     <message>
         <source>right {right:+4.0f} mm   forward {forward:+4.0f} mm   height {height:3.0f} mm</source>
-        <translation type="unfinished"></translation>
+        <translation>rechts {right:+4.0f} mm   vorn {forward:+4.0f} mm   Höhe {height:3.0f} mm</translation>
     </message>
     <message>
         <source>Move the cursor&apos;s foot into the blue target and spread the thumb.</source>
-        <translation type="unfinished"></translation>
+        <translation>Den Fuß des Zeigers in das blaue Ziel bewegen und den Daumen spreizen.</translation>
     </message>
     <message>
         <source>Done: {sentence}</source>
-        <translation type="unfinished"></translation>
+        <translation>Fertig: {sentence}</translation>
     </message>
     <message>
         <source>The {name} moves with the cursor until the thumb returns.</source>
-        <translation type="unfinished"></translation>
+        <translation>{name}: bewegt sich mit dem Zeiger, bis der Daumen zurückkehrt.</translation>
     </message>
     <message>
         <source>Spread the thumb to pick the {name}, the little finger to put it on the ground.</source>
-        <translation type="unfinished"></translation>
+        <translation>{name}: mit gespreiztem Daumen greifen, mit dem kleinen Finger auf den Boden legen.</translation>
     </message>
     <message>
         <source>Bring the cursor to a ball.</source>
-        <translation type="unfinished"></translation>
+        <translation>Den Zeiger zu einer Kugel bringen.</translation>
     </message>
     <message>
         <source>Camera {name}: the picture nearest to this moment, and the tracked hand. Dotted bones are guessed.</source>
-        <translation type="unfinished"></translation>
+        <translation>Kamera {name}: das Bild, das diesem Moment am nächsten ist, und die verfolgte Hand. Gepunktete Knochen sind geraten.</translation>
     </message>
     <message>
         <source>Films of a bare hand by one camera, or by several at the same time. The hand networks find its landmarks; the tracked hand is then shown beside the pictures. Several films need the rig file that says where their cameras stand; one film is tracked without, at a distance that is a guess.</source>
-        <translation type="unfinished"></translation>
+        <translation>Filme einer bloßen Hand von einer Kamera oder von mehreren zugleich. Die Hand-Netze finden ihre Landmarken; die verfolgte Hand erscheint dann neben den Bildern. Mehrere Filme brauchen die Rig-Datei, die sagt, wo ihre Kameras stehen; ein Film wird ohne sie verfolgt, in einem geratenen Abstand.</translation>
     </message>
     <message>
         <source>Track films</source>
-        <translation type="unfinished"></translation>
+        <translation>Filme verfolgen</translation>
     </message>
     <message>
         <source>The rig of the films&apos; cameras</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Rig der Kameras der Filme</translation>
     </message>
     <message>
         <source>none: one film, its lens assumed</source>
-        <translation type="unfinished"></translation>
+        <translation>keines: ein Film, mit angenommenem Objektiv</translation>
     </message>
     <message>
         <source>No rig</source>
-        <translation type="unfinished"></translation>
+        <translation>Kein Rig</translation>
     </message>
     <message>
         <source>Film</source>
-        <translation type="unfinished"></translation>
+        <translation>Film</translation>
     </message>
     <message>
         <source>Begins later by</source>
-        <translation type="unfinished"></translation>
+        <translation>Beginnt später um</translation>
     </message>
     <message>
         <source>Add films …</source>
-        <translation type="unfinished"></translation>
+        <translation>Filme hinzufügen …</translation>
     </message>
     <message>
         <source>Add a folder …</source>
-        <translation type="unfinished"></translation>
+        <translation>Ordner hinzufügen …</translation>
     </message>
     <message>
         <source>All films in a folder, in the order of their names.</source>
-        <translation type="unfinished"></translation>
+        <translation>Alle Filme eines Ordners, nach Namen geordnet.</translation>
     </message>
     <message>
         <source>Take the chosen film off the list (Delete); the file stays.</source>
-        <translation type="unfinished"></translation>
+        <translation>Den gewählten Film von der Liste nehmen (Entf); die Datei bleibt.</translation>
     </message>
     <message>
         <source>Align by sound</source>
-        <translation type="unfinished"></translation>
+        <translation>Nach Ton ausrichten</translation>
     </message>
     <message>
         <source>Align by a flash</source>
-        <translation type="unfinished"></translation>
+        <translation>Nach Blitz ausrichten</translation>
     </message>
     <message>
         <source>Find by how much later each film began: what all of them heard, such as a clap.</source>
-        <translation type="unfinished"></translation>
+        <translation>Finden, um wie viel später jeder Film begann: durch etwas, das alle hörten, etwa ein Klatschen.</translation>
     </message>
     <message>
         <source>Find by how much later each film began: a lamp that goes on in all of them.</source>
-        <translation type="unfinished"></translation>
+        <translation>Finden, um wie viel später jeder Film begann: durch eine Lampe, die in allen angeht.</translation>
     </message>
     <message>
         <source>Track …</source>
-        <translation type="unfinished"></translation>
+        <translation>Verfolgen …</translation>
     </message>
     <message>
         <source>Choose where the recording is written; it opens when it is whole.</source>
-        <translation type="unfinished"></translation>
+        <translation>Auswählen, wohin die Aufnahme geschrieben wird; sie öffnet sich, wenn sie vollständig ist.</translation>
     </message>
     <message>
         <source>By how much this film began after the others.</source>
-        <translation type="unfinished"></translation>
+        <translation>Um wie viel dieser Film nach den anderen begann.</translation>
     </message>
     <message>
         <source>Films</source>
-        <translation type="unfinished"></translation>
+        <translation>Filme</translation>
     </message>
     <message>
         <source>Films ({names});;All files (*)</source>
-        <translation type="unfinished"></translation>
+        <translation>Filme ({names});;Alle Dateien (*)</translation>
     </message>
     <message>
         <source>A folder of films</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein Ordner mit Filmen</translation>
     </message>
     <message>
         <source>{name} holds no films ({names}).</source>
-        <translation type="unfinished"></translation>
+        <translation>{name} enthält keine Filme ({names}).</translation>
     </message>
     <message>
         <source>no film</source>
-        <translation type="unfinished"></translation>
+        <translation>kein Film</translation>
     </message>
     <message>
         <source>Add the film of a hand, or those of several cameras.</source>
-        <translation type="unfinished"></translation>
+        <translation>Den Film einer Hand hinzufügen oder die mehrerer Kameras.</translation>
     </message>
     <message>
         <source>Several films need the rig of their cameras: choose its file, or remove all films but one.</source>
-        <translation type="unfinished"></translation>
+        <translation>Mehrere Filme brauchen das Rig ihrer Kameras: seine Datei auswählen oder alle Filme bis auf einen entfernen.</translation>
     </message>
     <message>
         <source>Camera {twice} has two films: choose another camera for one of them.</source>
-        <translation type="unfinished"></translation>
+        <translation>Kamera {twice} hat zwei Filme: für einen davon eine andere Kamera wählen.</translation>
     </message>
     <message>
         <source>Ready. Looking for hands takes about as long as the films.</source>
-        <translation type="unfinished"></translation>
+        <translation>Bereit. Die Suche nach Händen dauert etwa so lange wie die Filme.</translation>
     </message>
     <message>
         <source>Write the recording to</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahme schreiben nach</translation>
     </message>
     <message>
         <source>Aligned: {offsets}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Ausgerichtet: {offsets}.</translation>
     </message>
     <message>
         <source>It holds no datagrams: nothing was streaming.</source>
-        <translation type="unfinished"></translation>
+        <translation>Sie enthält keine Datagramme: Nichts wurde gesendet.</translation>
     </message>
     <message>
         <source>“{name}” is no name for a recording: use letters, figures, blanks, dots and dashes, no slash, and no dot at the beginning.</source>
-        <translation type="unfinished"></translation>
+        <translation>„{name}“ ist kein Name für eine Aufnahme: Buchstaben, Ziffern, Leerzeichen, Punkte und Striche benutzen, keinen Schrägstrich und keinen Punkt am Anfang.</translation>
     </message>
     <message>
         <source>there is a recording called {name} already; choose another name.</source>
-        <translation type="unfinished"></translation>
+        <translation>es gibt schon eine Aufnahme namens {name}; einen anderen Namen wählen.</translation>
     </message>
     <message>
         <source>{trash}: cannot be made ({strerror}), so nothing was deleted.</source>
-        <translation type="unfinished"></translation>
+        <translation>{trash}: lässt sich nicht anlegen ({strerror}), daher wurde nichts gelöscht.</translation>
     </message>
     <message>
         <source>there is another recording called {stem} now; rename it first.</source>
-        <translation type="unfinished"></translation>
+        <translation>es gibt jetzt eine andere Aufnahme namens {stem}; sie zuerst umbenennen.</translation>
     </message>
     <message>
         <source>{stem} is being recorded; stop the recording first.</source>
-        <translation type="unfinished"></translation>
+        <translation>{stem} wird gerade aufgenommen; die Aufnahme zuerst beenden.</translation>
     </message>
     <message>
         <source>{path}: cannot be read ({strerror}).</source>
-        <translation type="unfinished"></translation>
+        <translation>{path}: nicht lesbar ({strerror}).</translation>
     </message>
     <message>
         <source>there are videos of another recording called {stem} already; move them first.</source>
-        <translation type="unfinished"></translation>
+        <translation>es gibt schon Videos einer anderen Aufnahme namens {stem}; sie zuerst verschieben.</translation>
     </message>
     <message>
         <source>{path}: cannot be moved to {target} ({strerror}).</source>
-        <translation type="unfinished"></translation>
+        <translation>{path}: lässt sich nicht nach {target} verschieben ({strerror}).</translation>
     </message>
     <message>
         <source>cannot be read</source>
-        <translation type="unfinished"></translation>
+        <translation>nicht lesbar</translation>
     </message>
     <message>
         <source>{states} states, {bookmarks} bookmarks. Green and full: tracking; yellow: partial; red and low: lost; empty: no state.</source>
-        <translation type="unfinished"></translation>
+        <translation>{states} Zustände, {bookmarks} Lesezeichen. Grün und voll: verfolgt; gelb: teilweise; rot und niedrig: verloren; leer: kein Zustand.</translation>
     </message>
     <message>
         <source>Name</source>
-        <translation type="unfinished"></translation>
+        <translation>Name</translation>
     </message>
     <message>
         <source>Date</source>
-        <translation type="unfinished"></translation>
+        <translation>Datum</translation>
     </message>
     <message>
         <source>Length</source>
-        <translation type="unfinished"></translation>
+        <translation>Länge</translation>
     </message>
     <message>
         <source>Condition</source>
-        <translation type="unfinished"></translation>
+        <translation>Zustand</translation>
     </message>
     <message>
         <source>The recordings</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahmen</translation>
     </message>
     <message>
         <source>No recordings yet. Press Record, or R, while a rig is open.</source>
-        <translation type="unfinished"></translation>
+        <translation>Noch keine Aufnahmen. Aufnehmen oder R drücken, während ein Rig geöffnet ist.</translation>
     </message>
     <message>
         <source>Track the recording and play it (Enter).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahme verfolgen und abspielen (Eingabe).</translation>
     </message>
     <message>
         <source>Rename</source>
-        <translation type="unfinished"></translation>
+        <translation>Umbenennen</translation>
     </message>
     <message>
         <source>Call the recording something else (F2).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahme anders nennen (F2).</translation>
     </message>
     <message>
         <source>Delete</source>
-        <translation type="unfinished"></translation>
+        <translation>Löschen</translation>
     </message>
     <message>
         <source>Delete the recording; Undo brings it back until this page is closed (Delete).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahme löschen; Rückgängig holt sie zurück, bis diese Seite geschlossen wird (Entf).</translation>
     </message>
     <message>
         <source>Bring back the recording that was deleted last (Ctrl+Z).</source>
-        <translation type="unfinished"></translation>
+        <translation>Die zuletzt gelöschte Aufnahme zurückholen (Strg+Z).</translation>
     </message>
     <message>
         <source>Collect video</source>
-        <translation type="unfinished"></translation>
+        <translation>Video abholen</translation>
     </message>
     <message>
         <source>Fetch the frames that the cameras recorded beside the recording; they come to lie beside it.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Bilder holen, die die Kameras neben der Aufnahme aufgezeichnet haben; sie liegen dann daneben.</translation>
     </message>
     <message>
         <source>Open folder</source>
-        <translation type="unfinished"></translation>
+        <translation>Ordner öffnen</translation>
     </message>
     <message>
         <source>Show the recordings in the desktop&apos;s file manager.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahmen in der Dateiverwaltung zeigen.</translation>
     </message>
     <message>
         <source>Close this page. What was deleted is then gone for good.</source>
-        <translation type="unfinished"></translation>
+        <translation>Diese Seite schließen. Gelöschtes ist dann endgültig weg.</translation>
     </message>
     <message>
         <source>Deleted {undoable}. Undo brings it back; it is gone for good when this page is closed.</source>
-        <translation type="unfinished"></translation>
+        <translation>{undoable} gelöscht. Rückgängig holt es zurück; es ist endgültig weg, wenn diese Seite schließt.</translation>
     </message>
     <message>
         <source>{stem} continues {continues}: the engine had stopped and was started again.</source>
-        <translation type="unfinished"></translation>
+        <translation>{stem} setzt {continues} fort: Die Engine war stehen geblieben und wurde neu gestartet.</translation>
     </message>
     <message>
         <source>Collected {names}.</source>
-        <translation type="unfinished"></translation>
+        <translation>{names} abgeholt.</translation>
     </message>
     <message>
         <source> The cameras&apos; computers were too slow for {dropped} frames.</source>
-        <translation type="unfinished"></translation>
+        <translation> Die Rechner der Kameras waren für {dropped} Bilder zu langsam.</translation>
     </message>
     <message>
         <source>Asking the nodes …</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Knoten werden gefragt …</translation>
     </message>
     <message>
         <source>This desktop opens no folders. The recordings lie in {folder}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Dieser Desktop öffnet keine Ordner. Die Aufnahmen liegen in {folder}.</translation>
     </message>
     <message>
         <source>Preparing the tracker …</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Tracker wird vorbereitet …</translation>
     </message>
     <message>
         <source>{out}: the states of the recording cannot be written ({strerror}). They take about 5 kB each; make room there.</source>
-        <translation type="unfinished"></translation>
+        <translation>{out}: Die Zustände der Aufnahme lassen sich nicht schreiben ({strerror}). Sie brauchen je etwa 5 kB; dort Platz schaffen.</translation>
     </message>
     <message>
         <source>it holds no datagrams: nothing was streaming while it was recorded. There is nothing to replay.</source>
-        <translation type="unfinished"></translation>
+        <translation>enthält keine Datagramme: Während der Aufnahme wurde nichts gesendet. Es gibt nichts abzuspielen.</translation>
     </message>
     <message>
         <source>no state could be made of its {datagrams} datagrams. Is this the rig that it was recorded with, and were both cameras streaming?</source>
-        <translation type="unfinished"></translation>
+        <translation>aus den {datagrams} Datagrammen ließ sich kein Zustand bilden. Ist es das Rig, mit dem aufgenommen wurde, und haben beide Kameras gesendet?</translation>
     </message>
     <message>
         <source>Tracking the recording …</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahme wird verfolgt …</translation>
     </message>
     <message>
         <source>{path} is still being recorded: what was written until now is shown.</source>
-        <translation type="unfinished"></translation>
+        <translation>{path} wird noch aufgenommen: Gezeigt wird, was bis jetzt geschrieben ist.</translation>
     </message>
     <message>
         <source>In {path} {damage}.</source>
-        <translation type="unfinished"></translation>
+        <translation>In {path} {damage}.</translation>
     </message>
     <message>
         <source>Of {path} {end}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Von {path} {end}.</translation>
     </message>
     <message>
         <source>Everything else is shown.</source>
-        <translation type="unfinished"></translation>
+        <translation>Alles andere wird gezeigt.</translation>
     </message>
     <message>
         <source>{folder}: cannot be made ({strerror}), so there is no room for the states.</source>
-        <translation type="unfinished"></translation>
+        <translation>{folder}: lässt sich nicht anlegen ({strerror}), daher ist kein Platz für die Zustände.</translation>
     </message>
     <message>
         <source>as the rig says</source>
-        <translation type="unfinished"></translation>
+        <translation>wie das Rig sagt</translation>
     </message>
     <message>
         <source>As recorded</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie aufgenommen</translation>
     </message>
     <message>
         <source>JSON files (*.json);;All files (*)</source>
-        <translation type="unfinished"></translation>
+        <translation>JSON-Dateien (*.json);;Alle Dateien (*)</translation>
     </message>
     <message>
         <source>Compare with another run</source>
-        <translation type="unfinished"></translation>
+        <translation>Mit einem anderen Lauf vergleichen</translation>
     </message>
     <message>
         <source>Track again</source>
-        <translation type="unfinished"></translation>
+        <translation>Noch einmal verfolgen</translation>
     </message>
     <message>
         <source>The recording is tracked once more, and both hands are shown together.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahme wird noch einmal verfolgt, und beide Hände werden zusammen gezeigt.</translation>
     </message>
     <message>
         <source>The recording is tracked once more; the moment that is shown stays.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahme wird noch einmal verfolgt; der gezeigte Moment bleibt.</translation>
     </message>
     <message>
         <source>Track with a rig file</source>
-        <translation type="unfinished"></translation>
+        <translation>Mit einer Rig-Datei verfolgen</translation>
     </message>
     <message>
         <source>Track with a hand file</source>
-        <translation type="unfinished"></translation>
+        <translation>Mit einer Handdatei verfolgen</translation>
     </message>
     <message>
         <source>the rig&apos;s hand</source>
-        <translation type="unfinished"></translation>
+        <translation>die Hand des Rigs</translation>
     </message>
     <message>
         <source>Track</source>
-        <translation type="unfinished"></translation>
+        <translation>Verfolgen</translation>
     </message>
     <message>
         <source>Reading the recording …</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahme wird gelesen …</translation>
     </message>
     <message>
         <source>Fingertip difference</source>
-        <translation type="unfinished"></translation>
+        <translation>Abstand der Fingerspitzen</translation>
     </message>
     <message>
         <source>The beginning (Home).</source>
-        <translation type="unfinished"></translation>
+        <translation>Der Anfang (Pos1).</translation>
     </message>
     <message>
         <source>One state back (left arrow).</source>
-        <translation type="unfinished"></translation>
+        <translation>Einen Zustand zurück (Pfeil links).</translation>
     </message>
     <message>
         <source>Play or pause (Space).</source>
-        <translation type="unfinished"></translation>
+        <translation>Abspielen oder anhalten (Leertaste).</translation>
     </message>
     <message>
         <source>One state on (right arrow).</source>
-        <translation type="unfinished"></translation>
+        <translation>Einen Zustand weiter (Pfeil rechts).</translation>
     </message>
     <message>
         <source>The end (End).</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Ende (Ende).</translation>
     </message>
     <message>
         <source>How fast it plays, times real time.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wie schnell abgespielt wird, als Vielfaches der Echtzeit.</translation>
     </message>
     <message>
         <source>Loop from here</source>
-        <translation type="unfinished"></translation>
+        <translation>Schleife ab hier</translation>
     </message>
     <message>
         <source>The range that is repeated begins here ([).</source>
-        <translation type="unfinished"></translation>
+        <translation>Der wiederholte Bereich beginnt hier ([).</translation>
     </message>
     <message>
         <source>to here</source>
-        <translation type="unfinished"></translation>
+        <translation>bis hier</translation>
     </message>
     <message>
         <source>The range that is repeated ends here (]).</source>
-        <translation type="unfinished"></translation>
+        <translation>Der wiederholte Bereich endet hier (]).</translation>
     </message>
     <message>
         <source>No loop</source>
-        <translation type="unfinished"></translation>
+        <translation>Keine Schleife</translation>
     </message>
     <message>
         <source>Repeat nothing.</source>
-        <translation type="unfinished"></translation>
+        <translation>Nichts wiederholen.</translation>
     </message>
     <message>
         <source>Write a few words about this moment into the recording (B).</source>
-        <translation type="unfinished"></translation>
+        <translation>Ein paar Worte über diesen Augenblick in die Aufnahme schreiben (B).</translation>
     </message>
     <message>
         <source>classic tracker</source>
-        <translation type="unfinished"></translation>
+        <translation>klassischer Tracker</translation>
     </message>
     <message>
         <source>smoothed</source>
-        <translation type="unfinished"></translation>
+        <translation>geglättet</translation>
     </message>
     <message>
         <source>{time} of {length}, state {number} of {count}</source>
-        <translation type="unfinished"></translation>
+        <translation>{time} von {length}, Zustand {number} von {count}</translation>
     </message>
     <message>
         <source>waiting …</source>
-        <translation type="unfinished"></translation>
+        <translation>wartet …</translation>
     </message>
     <message>
         <source>tracking</source>
-        <translation type="unfinished"></translation>
+        <translation>verfolgt</translation>
     </message>
     <message>
         <source>partial</source>
-        <translation type="unfinished"></translation>
+        <translation>teilweise</translation>
     </message>
     <message>
         <source>no state</source>
-        <translation type="unfinished"></translation>
+        <translation>kein Zustand</translation>
     </message>
     <message>
         <source>Timeline of the recording</source>
-        <translation type="unfinished"></translation>
+        <translation>Zeitleiste der Aufnahme</translation>
     </message>
     <message>
         <source>Replay</source>
-        <translation type="unfinished"></translation>
+        <translation>Wiedergabe</translation>
     </message>
     <message>
         <source>REPLAY</source>
-        <translation type="unfinished"></translation>
+        <translation>WIEDERGABE</translation>
     </message>
     <message>
         <source>Open …</source>
-        <translation type="unfinished"></translation>
+        <translation>Öffnen …</translation>
     </message>
     <message>
         <source>Open a recording (Ctrl+O).</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Aufnahme öffnen (Strg+O).</translation>
     </message>
     <message>
         <source>Track again …</source>
-        <translation type="unfinished"></translation>
+        <translation>Noch einmal verfolgen …</translation>
     </message>
     <message>
         <source>Track the recording with another tracker, rig or hand.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahme mit einem anderen Tracker, Rig oder einer anderen Hand verfolgen.</translation>
     </message>
     <message>
         <source>Compare …</source>
-        <translation type="unfinished"></translation>
+        <translation>Vergleichen …</translation>
     </message>
     <message>
         <source>Track it in another way too, and show both hands together.</source>
-        <translation type="unfinished"></translation>
+        <translation>Sie auch auf andere Weise verfolgen und beide Hände zusammen zeigen.</translation>
     </message>
     <message>
         <source>End comparison</source>
-        <translation type="unfinished"></translation>
+        <translation>Vergleich beenden</translation>
     </message>
     <message>
         <source>Show one run alone again.</source>
-        <translation type="unfinished"></translation>
+        <translation>Wieder nur einen Lauf zeigen.</translation>
     </message>
     <message>
         <source>Write these states as a file for other programs (Ctrl+E).</source>
-        <translation type="unfinished"></translation>
+        <translation>Diese Zustände als Datei für andere Programme schreiben (Strg+E).</translation>
     </message>
     <message>
         <source>Trim …</source>
-        <translation type="unfinished"></translation>
+        <translation>Zuschneiden …</translation>
     </message>
     <message>
         <source>Save the repeated range as a recording of its own.</source>
-        <translation type="unfinished"></translation>
+        <translation>Den wiederholten Bereich als eigene Aufnahme speichern.</translation>
     </message>
     <message>
         <source>Pictures</source>
-        <translation type="unfinished"></translation>
+        <translation>Bilder</translation>
     </message>
     <message>
         <source>What the cameras saw, with the hand drawn over it (P).</source>
-        <translation type="unfinished"></translation>
+        <translation>Was die Kameras sahen, mit der Hand darüber gezeichnet (P).</translation>
     </message>
     <message>
         <source>Remove the bookmark here</source>
-        <translation type="unfinished"></translation>
+        <translation>Lesezeichen hier entfernen</translation>
     </message>
     <message>
         <source>Remove the bookmark at which the recording stands.</source>
-        <translation type="unfinished"></translation>
+        <translation>Das Lesezeichen entfernen, bei dem die Aufnahme steht.</translation>
     </message>
     <message>
         <source>Bookmarks</source>
-        <translation type="unfinished"></translation>
+        <translation>Lesezeichen</translation>
     </message>
     <message>
         <source>Moments that were marked, while recording or here; choose one to go there.</source>
-        <translation type="unfinished"></translation>
+        <translation>Momente, die beim Aufnehmen oder hier markiert wurden; einen auswählen, um dorthin zu gehen.</translation>
     </message>
     <message>
         <source>no recording</source>
-        <translation type="unfinished"></translation>
+        <translation>keine Aufnahme</translation>
     </message>
     <message>
         <source>No bookmarks yet: B sets one.</source>
-        <translation type="unfinished"></translation>
+        <translation>Noch keine Lesezeichen: B setzt eines.</translation>
     </message>
     <message>
         <source>NO STATE</source>
-        <translation type="unfinished"></translation>
+        <translation>KEIN ZUSTAND</translation>
     </message>
     <message>
         <source>The recording has no state at this moment.</source>
-        <translation type="unfinished"></translation>
+        <translation>Die Aufnahme hat in diesem Moment keinen Zustand.</translation>
     </message>
     <message>
         <source>RHOT replay</source>
-        <translation type="unfinished"></translation>
+        <translation>RHOT-Wiedergabe</translation>
     </message>
     <message>
         <source>Open a recording</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Aufnahme öffnen</translation>
     </message>
     <message>
         <source>{name} – RHOT replay</source>
-        <translation type="unfinished"></translation>
+        <translation>{name} – RHOT-Wiedergabe</translation>
     </message>
     <message>
         <source>No video of this recording is on this computer. Rig, Recordings, Collect video fetches what the nodes recorded.</source>
-        <translation type="unfinished"></translation>
+        <translation>Auf diesem Rechner ist kein Video dieser Aufnahme. Rig, Aufnahmen, Video abholen holt, was die Knoten aufgezeichnet haben.</translation>
     </message>
     <message>
         <source>Choose the part first: [ and ] set where the repeated range begins and ends.</source>
-        <translation type="unfinished"></translation>
+        <translation>Zuerst den Teil wählen: [ und ] setzen Anfang und Ende des wiederholten Bereichs.</translation>
     </message>
     <message>
         <source>Save the repeated range as</source>
-        <translation type="unfinished"></translation>
+        <translation>Den wiederholten Bereich speichern als</translation>
     </message>
     <message>
         <source>Saving {name} …</source>
-        <translation type="unfinished"></translation>
+        <translation>{name} wird gespeichert …</translation>
     </message>
     <message numerus="yes">
         <source> and {n} video</source>
         <comment> and {n} videos</comment>
-        <translation type="unfinished">
-            <numerusform></numerusform>
-            <numerusform></numerusform>
+        <translation>
+            <numerusform> und {n} Video</numerusform>
+            <numerusform> und {n} Videos</numerusform>
         </translation>
     </message>
     <message>
         <source>Saved {path}{films}. Open it with Ctrl+O.</source>
-        <translation type="unfinished"></translation>
+        <translation>{path}{films} gespeichert. Mit Strg+O öffnen.</translation>
     </message>
     <message>
         <source>One moment. Cancel leaves nothing behind.</source>
-        <translation type="unfinished"></translation>
+        <translation>Einen Moment. Abbrechen hinterlässt nichts.</translation>
     </message>
     <message>
         <source>Open a recording (Ctrl+O). F1 opens the guide.</source>
-        <translation type="unfinished"></translation>
+        <translation>Eine Aufnahme öffnen (Strg+O). F1 öffnet die Anleitung.</translation>
     </message>
     <message>
         <source>Solid: {first}. Blue and translucent: {second}.</source>
-        <translation type="unfinished"></translation>
+        <translation>Voll: {first}. Blau und durchscheinend: {second}.</translation>
     </message>
     <message>
         <source>Tracked {text}. Space plays, the arrow keys go from state to state.</source>
-        <translation type="unfinished"></translation>
+        <translation>Verfolgt: {text}. Die Leertaste spielt ab, die Pfeiltasten gehen von Zustand zu Zustand.</translation>
     </message>
 </context>
 </TS>

@@ -327,6 +327,7 @@ def _form(rows: Sequence[tuple[str, QWidget]]) -> QWidget:
 
 def _choices(words: dict[str, tuple[str, str]]) -> QComboBox:
     box = QComboBox()
+    box.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)  # widens no dialog
     for name, (title, meaning) in words.items():
         box.addItem(tr(title), name)
         box.setItemData(box.count() - 1, tr(meaning), Qt.ItemDataRole.ToolTipRole)
