@@ -1048,6 +1048,10 @@ jetzt nicht benutzbar</translation>
         <translation>Möglich, sobald eine Kamera angekreuzt ist.</translation>
     </message>
     <message>
+        <source>name</source>
+        <translation>Name</translation>
+    </message>
+    <message>
         <source>track</source>
         <translation>verfolgen</translation>
     </message>
@@ -1308,6 +1312,10 @@ http://192.168.1.20:8080/video oder rtsp://192.168.1.21/live</translation>
     <message>
         <source>Export to</source>
         <translation>Exportieren nach</translation>
+    </message>
+    <message>
+        <source>{format} (*{ending});;All files (*)</source>
+        <translation>{format} (*{ending});;Alle Dateien (*)</translation>
     </message>
     <message>
         <source>Exporting to {out} …</source>
@@ -3418,6 +3426,10 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     <message>
         <source>Pictures of one instant, one for each camera</source>
         <translation>Bilder eines Augenblicks, eines je Kamera</translation>
+    </message>
+    <message>
+        <source>Pictures and videos ({endings});;All files (*)</source>
+        <translation>Bilder und Videos ({endings});;Alle Dateien (*)</translation>
     </message>
     <message>
         <source>Which second of the videos?</source>

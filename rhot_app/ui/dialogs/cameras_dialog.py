@@ -164,7 +164,7 @@ class CamerasDialog(QDialog):
         left.addLayout(add)
         left.addWidget(self.again_button)
         right.addWidget(self.picture, 1)
-        for widget in (QLabel("name"), self.name_field, self.mode_box):
+        for widget in (QLabel(tr("name")), self.name_field, self.mode_box):
             row.addWidget(widget)
         for box in (self.turned_box, self.mirrored_box):
             turn.addWidget(box)

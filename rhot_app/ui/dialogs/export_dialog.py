@@ -230,7 +230,8 @@ class ExportDialog(QDialog):
         beside = self.log.with_suffix(ending)
         start = beside if self._out_folder is None else self._out_folder / beside.name
         name, _ = QFileDialog.getSaveFileName(self, tr("Export to"), str(start),
-                                              f"{self.format} (*{ending});;All files (*)")
+                                              tr("{format} (*{ending});;All files (*)", format=self.format,
+                                                 ending=ending))
         if name:
             out = Path(name)
             named = out.suffix.lower() in all_formats()[self.format].endings

@@ -29,7 +29,8 @@ NOBODY = tr_noop("No node was found. Is rhot-node running there, and on the same
 _TRUST = {TrustState.OPEN: tr_noop("open to everybody"), TrustState.UNPAIRED: tr_noop("not paired yet"),
           TrustState.PAIRED: tr_noop("paired")}
 COLUMNS: tuple[Column[FoundNode], ...] = (
-    Column("name", lambda node: node.presence.name), Column(tr_noop("id"), lambda node: str(node.presence.node_id)),
+    Column(tr_noop("name"), lambda node: node.presence.name),
+    Column(tr_noop("id"), lambda node: str(node.presence.node_id)),
     Column(tr_noop("address"), lambda node: ", ".join(node.addresses)),
     Column(tr_noop("trust"), lambda node: tr(_TRUST[node.presence.trust])),
     Column(tr_noop("state"), lambda node: tr("announces itself") if node.state is None else node.state.name.lower()))

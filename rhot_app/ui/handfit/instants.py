@@ -22,9 +22,7 @@ from rhot_app.ui.wizards.framework.definition import SettingsStore
 from rhot_node.pictures import VIDEO_SUFFIXES
 
 TITLE: Final = tr_noop("Fit the hand to pictures")
-_PICTURES = ("Pictures and videos (*.png *.jpg *.jpeg *.tif *.tiff *.webp "
-             f"{' '.join(f'*{end}' for end in sorted(VIDEO_SUFFIXES))});;"
-             "All files (*)")
+_ENDINGS = " ".join(["*.png *.jpg *.jpeg *.tif *.tiff *.webp", *(f"*{end}" for end in sorted(VIDEO_SUFFIXES))])
 _LONGEST_S = 1e5  # of a video: a day
 
 
@@ -68,7 +66,8 @@ class Instants(QObject):
         if not self._changes.idle:
             return
         names, _ = QFileDialog.getOpenFileNames(self._window, tr("Pictures of one instant, one for each camera"),
-                                                self._memory.remembered(FOLDER_KEY) or str(Path.home()), _PICTURES)
+                                                self._memory.remembered(FOLDER_KEY) or str(Path.home()),
+                                                tr("Pictures and videos ({endings});;All files (*)", endings=_ENDINGS))
         if names:
             self._memory.remember(FOLDER_KEY, str(Path(names[0]).parent))
             self.open_pictures(in_order(self._fit.rig, names))

@@ -1,0 +1,199 @@
+"""What a person reads in the window passes `tr`, and the translations fit: complete where promised, with the same
+placeholders, and made into the file that the app loads."""
+
+from __future__ import annotations
+
+import ast
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from resources.translations.update import collect, release
+from rhot_app.ui.common.language import LANGUAGES, placeholders
+
+ROOT = Path(__file__).parents[2]
+UI = ROOT / "rhot_app" / "ui"
+TRANSLATIONS = ROOT / "resources" / "translations"
+LANGUAGE_FILES = sorted(TRANSLATIONS.glob("rhot_*.ts"))
+
+MARKS = {"tr", "tr_noop"}
+SHOWING = {
+    "setText", "setToolTip", "setWindowTitle", "setTitle", "setAccessibleName", "setPlaceholderText", "setLabelText",
+    "setSpecialValueText", "setHorizontalHeaderLabels", "addItem", "addTab", "addRow", "addMenu", "drawText",
+    "QLabel", "QAction", "QPushButton", "QCheckBox", "QRadioButton", "QMenu", "QToolBar", "QDockWidget", "Column",
+    "EmptyState"}
+"""What is given to these is read, a single word as well."""
+
+INTERNAL = {
+    "setObjectName", "setProperty", "property", "findChild", "setStyleSheet", "fromString", "QKeySequence",
+    "flag", "set_flag", "remembered", "remember", "strftime", "Thread", "put_away", "tip", "TypeError", "parse_rig",
+    "add_argument", "exception", "debug"}
+"""What is given to these is never read: names, keys, styles, logs."""
+
+NO_WORDS = {
+    "rhot_app/ui/app.py": "the command line is English",
+    "rhot_app/ui/demo_command.py": "the command line is English",
+    "rhot_app/ui/handfit/fit_command.py": "the command line is English",
+    "rhot_app/ui/scene/mesh_item.py": "shaders",
+    "rhot_app/ui/common/theme.py": "a style sheet",
+}
+NOT_TRANSLATED = {
+    "names in the settings and the session": (
+        "in true size", "clouds larger", "clouds of {}", "next steps", "board printed", "fit/anchor sd px",
+        "show the recording's folder", "simulated nodes"),
+    "terms of `tip`, keys of tables": ("node rate", "fingertip difference", "first {}", "other {}", "left", "right"),
+    "columns of copied tables": ("all p50", "all p99", "time [s]"),
+    "reasons in a rig's history, which others may read": (
+        "choosing the tracker {}", "hand {} times as large", "{}, fitted to pictures", "hand fitted to pictures",
+        "{} what was before the {}"),
+    "versions for a report of a fault, licences, proper names": (
+        "RHOT", "RHOT {}", "Python {}", "Qt {}", "System {}", "Screen {}", "License :: OSI Approved :: ",
+        "three.js (web view)", "JSON over WebSocket", "Lab Streaming Layer"),
+    "the process that computes speaks English": ("The program made a mistake ({}: {}). Please report it.",),
+    "only its width counts": ("00:00.00 of 00:00.00",),
+}
+"""Texts that stay English, by the reason."""
+
+UNITS = re.compile(r"\b(mm|cm|px|Hz|kHz|ms|sigma|s|Ctrl|Shift|Z|x)\b")
+LATER = ("rhot_app/ui/wizards/",)
+"""Folders that do not pass `tr` yet."""
+
+COMPLETE = ("rhot_app/ui", "rhot_app/ui/common", "rhot_app/ui/models", "rhot_app/ui/panels", "rhot_app/ui/plots",
+            "rhot_app/ui/scene", "rhot_app/ui/dialogs")
+"""Folders whose sentences every language has."""
+
+
+def functions_around(stack: list[ast.AST]) -> Iterator[str]:
+    """Names of what a node is given to, the nearest first."""
+    for node in reversed(stack):
+        if isinstance(node, ast.Call):
+            yield node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        elif not isinstance(node, (ast.keyword, ast.IfExp, ast.BoolOp, ast.JoinedStr, ast.FormattedValue, ast.Tuple,
+                                   ast.List)):
+            return
+
+
+def texts(tree: ast.AST) -> Iterator[tuple[ast.expr, str, list[ast.AST]]]:
+    """String literals but docstrings, keys of dictionaries and what is compared, with what is around them. "{}" stands
+    for the values of an f-string."""
+    docstrings = {id(node.body[0].value) for node in ast.walk(tree)
+                  if isinstance(getattr(node, "body", None), list) and node.body
+                  and isinstance(node.body[0], ast.Expr)}
+
+    def visit(node: ast.AST, stack: list[ast.AST]) -> Iterator[tuple[ast.expr, str, list[ast.AST]]]:
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            return
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings:
+            yield node, node.value, stack
+        if isinstance(node, ast.JoinedStr):
+            yield node, "".join(part.value if isinstance(part, ast.Constant) else "{}" for part in node.values), stack
+        for name, value in ast.iter_fields(node):
+            if name in ("annotation", "returns") or (name, type(node)) == ("keys", ast.Dict):
+                continue
+            if isinstance(node, (ast.Compare, ast.Subscript)) and name in ("comparators", "slice", "left"):
+                continue
+            for child in value if isinstance(value, list) else [value]:
+                if isinstance(child, ast.AST) and not (isinstance(node, ast.JoinedStr)
+                                                       and isinstance(child, ast.Constant)):
+                    yield from visit(child, [*stack, node])
+
+    yield from visit(tree, [])
+
+
+def unmarked(source: str) -> Iterator[tuple[int, str]]:
+    """(line, text) of words that a person reads and that pass no `tr`."""
+    for node, text, stack in texts(ast.parse(source)):
+        around = list(functions_around(stack))
+        if set(around) & (MARKS | INTERNAL) or not re.search("[A-Za-z]", UNITS.sub("", text.replace("{}", ""))):
+            continue
+        if re.search(r"\S\s+\S", text) or set(around[:1]) & SHOWING:
+            yield node.lineno, text
+
+
+def marked(source: str) -> Iterator[tuple[str, str]]:
+    """(text, comment or plural) of the literals that pass `tr`."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in MARKS:
+            words = [part.value for part in node.args[:2] if isinstance(part, ast.Constant)]
+            if words and isinstance(words[0], str):
+                yield words[0], words[1] if len(words) > 1 and isinstance(words[1], str) else ""
+
+
+@cache
+def translations(path: Path) -> dict[tuple[str, str], list[str]]:
+    """By (text, comment): the forms of the translation, none while it is unfinished."""
+    found = {}
+    for message in ElementTree.parse(path).iter("message"):
+        translation = message.find("translation")
+        assert translation is not None
+        forms = [form.text or "" for form in translation.iter("numerusform")] or [translation.text or ""]
+        unfinished = translation.get("type") == "unfinished"
+        found[message.findtext("source", ""), message.findtext("comment", "")] = [] if unfinished else forms
+    return found
+
+
+def test_what_a_person_reads_passes_tr() -> None:
+    allowed = {text for group in NOT_TRANSLATED.values() for text in group}
+    found = [f"{name}:{line}: {text!r}" for path in sorted(UI.rglob("*.py"))
+             if (name := str(path.relative_to(ROOT))) not in NO_WORDS and not name.startswith(LATER)
+             for line, text in unmarked(path.read_text()) if text not in allowed]
+    assert not found, "write tr(\"...\"), or say in this file why not:\n" + "\n".join(found)
+
+
+@pytest.mark.parametrize(("source", "found"), [
+    ('label.setText("Two words")', ["Two words"]), ('label.setText(tr("Two words"))', []),
+    ('QPushButton("Open")', ["Open"]), ('say(f"saved {path}")', ["saved {}"]), ('name = "key"', []),
+    ('say(tr("{n} file", "{n} files", len(names)))', []), ('part.setObjectName("a name")', []),
+    ('"""Two words."""', []), ('words = {"a key": 1}', []), ('label.setText(f"{value:.1f} mm")', []),
+    ('QLabel("rig" if rig else "no rig")', ["rig", "no rig"])])
+def test_words_without_tr_are_found(source: str, found: list[str]) -> None:
+    assert [text for _, text in unmarked(source)] == found
+
+
+def test_tr_has_literals() -> None:
+    """`pyside6-lupdate` collects nothing else."""
+    wrong = [f"{path.relative_to(ROOT)}:{node.lineno}" for path in sorted(UI.rglob("*.py"))
+             for node in ast.walk(ast.parse(path.read_text()))
+             if isinstance(node, ast.Call) and getattr(node.func, "id", "") in MARKS
+             and isinstance(node.args[0], (ast.JoinedStr, ast.BinOp))]
+    assert not wrong, f"tr() of an f-string or a sum: use named placeholders: {', '.join(wrong)}"
+
+
+def test_every_language_has_a_file_and_every_file_a_language() -> None:
+    assert {path.stem.removeprefix("rhot_") for path in LANGUAGE_FILES} == LANGUAGES.keys() - {"en"}
+
+
+@pytest.mark.parametrize("path", LANGUAGE_FILES, ids=lambda path: path.stem)
+def test_translations_are_renewed_and_complete_where_promised(path: Path, tmp_path: Path) -> None:
+    known = translations(path)
+    written = {key for source in UI.rglob("*.py") for key in marked(source.read_text())}
+    assert known.keys() == written, "run resources/translations/update.py"
+    open_ = [f"{source.relative_to(ROOT)}: {key[0]!r}" for source in sorted(UI.rglob("*.py"))
+             if str(source.parent.relative_to(ROOT)) in COMPLETE
+             for key in marked(source.read_text()) if not any(known[key])]
+    assert not open_, f"not in {path.name}:\n" + "\n".join(open_)
+
+
+@pytest.mark.parametrize("path", LANGUAGE_FILES, ids=lambda path: path.stem)
+def test_no_placeholder_differs(path: Path) -> None:
+    wrong = [f"{text!r} -> {form!r}" for (text, _), forms in translations(path).items() for form in forms
+             if placeholders(form) != placeholders(text)]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("path", LANGUAGE_FILES, ids=lambda path: path.stem)
+def test_what_the_app_loads_is_what_is_written(path: Path, tmp_path: Path) -> None:
+    release(path, tmp_path / "made.qm")
+    same = (tmp_path / "made.qm").read_bytes() == path.with_suffix(".qm").read_bytes()
+    assert same, "run resources/translations/update.py"
+
+
+def test_sentences_are_collected_as_this_file_reads_them(tmp_path: Path) -> None:
+    """The tool of Qt and the tests here agree about a file that has every form."""
+    begun = tmp_path / "rhot_fr.ts"
+    collect(begun)
+    assert translations(begun).keys() == {key for source in UI.rglob("*.py") for key in marked(source.read_text())}
