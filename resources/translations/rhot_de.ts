@@ -3908,6 +3908,14 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>rechts {right:+4.0f} mm   vorn {forward:+4.0f} mm   Höhe {height:3.0f} mm</translation>
     </message>
     <message>
+        <source>DOWN</source>
+        <translation>UNTEN</translation>
+    </message>
+    <message>
+        <source>up</source>
+        <translation>oben</translation>
+    </message>
+    <message>
         <source>Move the cursor&apos;s foot into the blue target and spread the thumb.</source>
         <translation>Den Fuß des Zeigers in das blaue Ziel bewegen und den Daumen spreizen.</translation>
     </message>

@@ -89,9 +89,9 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     from PySide6.QtWidgets import QApplication
 
     from rhot_app.ui.common.controller import Controller
-    from rhot_app.ui.common.language import use_language
     from rhot_app.ui.common.settings import Settings
     from rhot_app.ui.common.theme import apply_theme, scheme_named
+    from rhot_app.ui.language import use_language
     from rhot_app.ui.main_window import MainWindow
     from rhot_app.ui.scene.surface import choose_format
 

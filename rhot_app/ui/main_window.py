@@ -24,13 +24,13 @@ from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.guide import page_of
 from rhot_app.ui.common.keys import ActionKeys, bind_space
-from rhot_app.ui.common.language import tr_noop
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import show_overflow
 from rhot_app.ui.common.theme import scheme_named
 from rhot_app.ui.dialogs.dialogs import Dialogs
 from rhot_app.ui.dialogs.next_steps import NEXT_STEPS, NextSteps
 from rhot_app.ui.dialogs.recordings import SHOW_FOLDER, Recordings
+from rhot_app.ui.language import tr_noop
 from rhot_app.ui.models.next_steps import NETWORKS, TRACKER
 from rhot_app.ui.models.notice import Notice, TransientNotices
 from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr, tr_noop
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.words import shipped_motions
 

@@ -13,7 +13,7 @@ from rhot_app.errors import RigError
 from rhot_app.project import Rig, load_rig, parse_rig
 from rhot_app.ui.backend.contract import Asker, TwinPace
 from rhot_app.ui.common.controller import RESTART_ENGINE, RESTART_TWIN, Controller
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
 from rhot_app.ui.models.words import NO_ENGINE, NO_RIG, STARTING, Look, condition_look

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 from rhot_app.project import Rig, parse_rig, with_object
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.controller import Controller
-from rhot_app.ui.common.language import tr, tr_noop
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.notice import Notice
 from rhot_node.files import resource_path
 

@@ -19,8 +19,8 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.ui.backend.contract import TwinChoice
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.theme import app_font
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.words import shipped_motions
 
 _TITLE_PT = 20.0

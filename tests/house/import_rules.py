@@ -69,6 +69,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.export": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.certificate"),
     "rhot_app.api": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.export"),
     "rhot_app.mouse": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.evaluation"),
+    "rhot_app.ui.language": ("rhot_node.files",),
     "rhot_app.ui": (*BELOW_ENGINE, "rhot_app.engine", "rhot_app.evaluation", "rhot_app.export",
                     "rhot_app.certificate", "rhot_app.mouse"),
     "rhot_app.warm": (*BELOW_ENGINE, "rhot_app.engine"),

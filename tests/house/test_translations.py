@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from resources.translations.update import collect, release
-from rhot_app.ui.common.language import LANGUAGES, placeholders
+from rhot_app.ui.language import LANGUAGES, placeholders
 
 ROOT = Path(__file__).parents[2]
 UI = ROOT / "rhot_app" / "ui"
@@ -46,7 +46,7 @@ NOT_TRANSLATED = {
         "in true size", "clouds larger", "clouds of {}", "next steps", "board printed", "fit/anchor sd px",
         "show the recording's folder", "simulated nodes"),
     "terms of `tip`, keys of tables": ("node rate", "fingertip difference", "first {}", "other {}", "left", "right"),
-    "columns of copied tables": ("all p50", "all p99", "time [s]"),
+    "columns of copied tables": ("time [s]", "all p50", "all p99"),
     "reasons in a rig's history, which others may read": (
         "choosing the tracker {}", "hand {} times as large", "{}, fitted to pictures", "hand fitted to pictures",
         "{} what was before the {}"),
@@ -58,7 +58,9 @@ NOT_TRANSLATED = {
 }
 """Texts that stay English, by the reason."""
 
-UNITS = re.compile(r"\b(mm|cm|px|Hz|kHz|ms|sigma|s|Ctrl|Shift|Z|x)\b")
+NO_WORD = re.compile(r"\b(?:sigma|Ctrl|Shift)\b|\*\.\w+|\{\}")
+"""The same in every language; other units and abbreviations have less than three letters."""
+
 LATER = ("rhot_app/ui/wizards/",)
 """Folders that do not pass `tr` yet."""
 
@@ -92,7 +94,7 @@ def texts(tree: ast.AST) -> Iterator[tuple[ast.expr, str, list[ast.AST]]]:
         if isinstance(node, ast.JoinedStr):
             yield node, "".join(part.value if isinstance(part, ast.Constant) else "{}" for part in node.values), stack
         for name, value in ast.iter_fields(node):
-            if name in ("annotation", "returns") or (name, type(node)) == ("keys", ast.Dict):
+            if name in ("annotation", "returns", "format_spec") or (name, type(node)) == ("keys", ast.Dict):
                 continue
             if isinstance(node, (ast.Compare, ast.Subscript)) and name in ("comparators", "slice", "left"):
                 continue
@@ -108,7 +110,7 @@ def unmarked(source: str) -> Iterator[tuple[int, str]]:
     """(line, text) of words that a person reads and that pass no `tr`."""
     for node, text, stack in texts(ast.parse(source)):
         around = list(functions_around(stack))
-        if set(around) & (MARKS | INTERNAL) or not re.search("[A-Za-z]", UNITS.sub("", text.replace("{}", ""))):
+        if set(around) & (MARKS | INTERNAL) or not re.search("[A-Za-z]{3}", NO_WORD.sub("", text)):
             continue
         if re.search(r"\S\s+\S", text) or set(around[:1]) & SHOWING:
             yield node.lineno, text

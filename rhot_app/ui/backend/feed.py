@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker, Listener
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_node.errors import PictureError
 from rhot_node.pictures import decode_picture
 

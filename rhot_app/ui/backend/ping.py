@@ -12,7 +12,7 @@ from rhot_app.progress import Progress
 from rhot_app.project import Rig, RigNode, load_rig
 from rhot_app.sources.discovery import Search, find_nodes
 from rhot_app.sources.pairing import TIMEOUT_S, Introduction, NodeAddress, ask_who, pair
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_node.files import resource_path
 
 

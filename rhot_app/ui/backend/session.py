@@ -32,7 +32,7 @@ from rhot_app.errors import EngineError, RecordingError, RhotError, SimulatorErr
 from rhot_app.project import load_rig, parse_rig, save_rig, with_tracker
 from rhot_app.sources.cameras.camera_set import camera_set_of
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
-from rhot_app.ui.common.language import tr, tr_noop
+from rhot_app.ui.language import tr, tr_noop
 from rhot_node.compiled import WINDOW
 from rhot_node.terminal import before
 

@@ -18,7 +18,7 @@ from typing import Any
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress
 from rhot_app.ui.backend.solver_process import NICENESS
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 
 _COMMAND = (sys.executable, "-m", "rhot_app.ui.backend.solver_process")
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}

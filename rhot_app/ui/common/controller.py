@@ -18,7 +18,7 @@ from rhot_app.project import Rig
 from rhot_app.ui.backend.contract import Asker, Backend, Listener, Opened, TwinChoice, TwinPace
 from rhot_app.ui.backend.live import SILENCE_S, Live
 from rhot_app.ui.common.job import Job, Progress
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 
 # -- The window's client of the engine ---------------------------------------------------------------------------------
 

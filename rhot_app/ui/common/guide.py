@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QImage, QKeySequence, QShortcut, QTextDocument
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QListWidgetItem, QTextBrowser, QVBoxLayout, QWidget
 
-from rhot_app.ui.common.language import language, tr, tr_noop
+from rhot_app.ui.language import language, tr, tr_noop
 
 GUIDE = Path(__file__).resolve().parents[3] / "docs" / "guide"
 

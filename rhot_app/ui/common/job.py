@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 from PySide6.QtCore import QObject, Qt, Signal, SignalInstance
 
 from rhot_app.errors import RhotError
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_node.errors import NodeError
 
 log = logging.getLogger(__name__)

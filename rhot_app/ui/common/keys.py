@@ -9,8 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence, QShortcut
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QPushButton, QToolButton, QWidget
 
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.language import tr, tr_noop
 
 _FIXED: Final = {"Space": tr_noop("Start and Stop"), "Alt+Down": tr_noop("opening menus"),
                  "Alt+M": tr_noop("the list of sentences")}

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt, Signal
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 
 R = TypeVar("R")
 Index = QModelIndex | QPersistentModelIndex

@@ -8,7 +8,7 @@ from typing import Final
 from platformdirs import user_config_path, user_documents_path
 from PySide6.QtCore import QByteArray, QObject, QSettings, Signal
 
-from rhot_app.ui.common.language import tr_noop
+from rhot_app.ui.language import tr_noop
 
 _FILE = "app.ini"
 STARTS: Final = (("page", tr_noop("The first page")), ("last", tr_noop("The rig that was opened last")),

@@ -8,7 +8,7 @@ from PySide6.QtCore import QLineF, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetricsF, QIcon, QPainter, QPen, QPixmap, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QToolBar, QToolButton, QWidget
 
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 
 
 def paint_shape(painter: QPainter, shape: str, box: QRectF, colour: QColor) -> None:

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMessageBox, QWi
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.keys import bind_space
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 
 AS_MAIN: Final = QSize(1280, 800)
 """The size of a window that stands over no other, which it would else be as large as."""

@@ -25,8 +25,8 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.engine.offline.report import package_versions
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.record_table import Column, RecordTable
+from rhot_app.ui.language import tr
 
 _SIZE: Final = (680, 560)
 _ROW_PX: Final = 28

@@ -30,8 +30,8 @@ from rhot_app.sources.cameras.camera_set import NONE_FOUND, CameraSource, Prepar
 from rhot_app.sources.cameras.camera_source import CameraPreview, check_source, source_of
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.picture_view import PictureView
 from rhot_node.capture.v4l2 import Device, Mode, list_devices

@@ -20,7 +20,6 @@ from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.disposal import dispose, release_style
 from rhot_app.ui.common.guide import GuideViewer
 from rhot_app.ui.common.keys import ActionKeys
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.about_dialog import AboutDialog
 from rhot_app.ui.dialogs.cameras_dialog import CamerasDialog
@@ -31,6 +30,7 @@ from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
 from rhot_app.ui.dialogs.rig_dialog import RigDialog
 from rhot_app.ui.dialogs.settings_dialog import SettingsDialog
 from rhot_app.ui.dialogs.tracker_dialog import TrackerDialog
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.mouse.window import MouseWindow
 

@@ -32,10 +32,10 @@ from rhot_app.export.states import HandStates, columns
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import newest_recording
+from rhot_app.ui.language import tr, tr_noop
 
 ROWS = 8
 LOOK_MS = 300  # a choice is looked at when it has stood for a while

@@ -16,9 +16,9 @@ from PySide6.QtWidgets import (
 from rhot_app.progress import Progress
 from rhot_app.sources.discovery import FoundNode, Search
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.language import tr, tr_noop
 from rhot_node.wire.messages import TrustState
 
 Find = Callable[[Progress], Search]

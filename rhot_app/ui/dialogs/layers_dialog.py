@@ -23,9 +23,9 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.tool_window import ToolWindow
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.layers import LayerPicture, LayerPictures
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.picture_painter import fit

@@ -8,8 +8,8 @@ from pathlib import Path
 from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from rhot_app.ui.common.job import Job, Progress
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.language import tr, tr_noop
 from rhot_node.errors import KeypointError
 from rhot_node.landmarks.install import FILES, LICENCE, PACKAGE, install_networks, read_network, user_folder
 

@@ -21,10 +21,10 @@ from PySide6.QtWidgets import (
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import ShapeMark
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.next_steps import BOARD, Answers, Step, Wear, answers_of, next_steps
 from rhot_app.ui.models.palette import Scheme
 from rhot_node.landmarks.install import installed_folder

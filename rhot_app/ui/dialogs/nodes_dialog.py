@@ -26,10 +26,10 @@ from rhot_app.sources.discovery import FoundNode
 from rhot_app.sources.pairing import NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig, look_for_nodes, pair_node
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.dialogs.found_nodes import Find, FoundNodes
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_node.network.pairing import CODE_LENGTH
 from rhot_node.wire.messages import PAIRING_PORT

@@ -21,9 +21,9 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.project import OutputSettings
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import ShapeMark
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.outputs import OutputRow
 from rhot_app.ui.models.palette import Scheme
 

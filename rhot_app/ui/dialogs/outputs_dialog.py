@@ -29,9 +29,9 @@ from rhot_app.outputs.spec import OPENXR_ONLY
 from rhot_app.project import OutputSettings, Rig
 from rhot_app.ui.backend.contract import Asker, Opened
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.output_card import OutputCard
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.outputs import (
     EMPTY,
     JOINT_SETS,

@@ -14,8 +14,8 @@ from PySide6.QtWidgets import QInputDialog, QWidget
 from rhot_app.engine.status import Level
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.disposal import dispose
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
 

@@ -15,8 +15,8 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import FingerAnatomy
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig, RigNode
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.record_table import Column, RecordTable
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.words import HANDS
 from rhot_node.markers import Marker
 

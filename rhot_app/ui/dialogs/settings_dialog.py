@@ -25,11 +25,11 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.ui.common.keys import ActionKeys, title_of
-from rhot_app.ui.common.language import LANGUAGES, language, language_of, tr, tr_noop
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.settings import STARTS, Settings
 from rhot_app.ui.dialogs.next_steps import NEXT_STEPS
+from rhot_app.ui.language import LANGUAGES, language, language_of, tr, tr_noop
 
 _SIZE: Final = (720, 520)
 _KEY_PX: Final = 170

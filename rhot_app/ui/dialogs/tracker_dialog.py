@@ -31,8 +31,8 @@ from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, e
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.proposal import RigChange, progress_text
 from rhot_app.ui.models.words import (
     FLAT_MEANING,

@@ -13,8 +13,8 @@ from rhot_app.hand.anatomy import HandAnatomy, save_hand
 from rhot_app.handfit.session import HandFit
 from rhot_app.handfit.state import FitState
 from rhot_app.ui.common.job import Job, Progress
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.handfit.frame import Kept
+from rhot_app.ui.language import tr
 from rhot_app.ui.wizards.framework.definition import SettingsStore
 
 FOLDER_KEY = "fit/folder"

@@ -12,7 +12,7 @@ from rhot_app.errors import CalibrationError
 from rhot_app.handfit.pictures import files_by_camera, read_picture
 from rhot_app.project import Rig
 from rhot_app.sources.frame_sets import on_one_clock, open_video, overlap
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_node.pictures import VIDEO_SUFFIXES
 
 Image = NDArray[np.uint8]

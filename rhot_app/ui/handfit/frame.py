@@ -21,10 +21,10 @@ from PySide6.QtWidgets import (
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.handfit.session import HandFit
 from rhot_app.handfit.solve import Freedom
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.handfit.number_form import NumberForm
 from rhot_app.ui.handfit.picture import FitPicture
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 
 _RIGHT_PX, _OTHERS_PX = 368, 150  # of the numbers at the right; of the rows above and below the pictures

@@ -14,10 +14,10 @@ from rhot_app.errors import RhotError
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.handfit.state import Image
 from rhot_app.ui.backend.feed import LiveFeed
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.handfit.changes import FOLDER_KEY, Changes
 from rhot_app.ui.handfit.files import in_order, is_video, read_instant
 from rhot_app.ui.handfit.frame import FitFrame
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.definition import SettingsStore
 from rhot_node.pictures import VIDEO_SUFFIXES
 

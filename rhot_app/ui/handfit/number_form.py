@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.handfit.quantities import GROUPS, Number
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 
 STEPS: Final = 2000
 """Of a slider: finer than a pixel of the screen."""

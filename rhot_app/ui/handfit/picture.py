@@ -25,8 +25,8 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from rhot_app.export.overlay import INNER_RGB, SILHOUETTE_RGB
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.handfit.session import Outline
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.shapes import paint_tag
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.picture_painter import FramePlacement, fit
 

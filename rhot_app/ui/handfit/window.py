@@ -13,11 +13,11 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.handfit.quantities import Number
 from rhot_app.handfit.session import HandFit
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.handfit.changes import Changes
 from rhot_app.ui.handfit.frame import FitFrame, Kept
 from rhot_app.ui.handfit.instants import TITLE, Instants, LiveCameras
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import SettingsStore
 

@@ -10,7 +10,7 @@ from rhot_app.calibration.check.camera_calibration import calibration_finding, t
 from rhot_app.calibration.registry import ADAPTED, BONES, COLOURS, LENS, MEASURED, STEREO, TIME
 from rhot_app.hand.anatomy import is_shipped
 from rhot_app.project import Rig
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 
 Wear = Literal["paint", "bare", "landmarks"]
 """What shows the hand: painted or taped markers; a bare hand, by the networks; landmarks or nodes of one's own."""

@@ -14,7 +14,7 @@ from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import OutputError
 from rhot_app.outputs.spec import OPENXR_ONLY, WEB_PORT, OutputStatus, as_run, host_and_port, parse_output, web_settings
 from rhot_app.project import OutputSettings, Rig, parse_rig
-from rhot_app.ui.common.language import tr, tr_noop
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.proposal import Command, set_rig
 from rhot_app.ui.models.words import Look
 

@@ -12,7 +12,7 @@ from rhot_app.calibration.proposal import Change, Command, Proposal
 from rhot_app.engine.compilation import TITLE, compile_part, is_missing, part_of
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 
 
 @dataclass(frozen=True, slots=True)

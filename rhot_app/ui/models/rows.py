@@ -14,7 +14,7 @@ from rhot_app.calibration.check.camera_calibration import (
 )
 from rhot_app.engine.status import NodeStatus
 from rhot_app.state import HandState, Knowledge
-from rhot_app.ui.common.language import tr, tr_noop
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.meters import unused_frames
 from rhot_app.ui.models.words import KNOWLEDGE, NODES, UNKNOWN_STATE, Look, marker_look
 

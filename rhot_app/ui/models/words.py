@@ -18,7 +18,7 @@ from rhot_app.errors import RigError
 from rhot_app.hand.anthropometry import hand_length
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge
-from rhot_app.ui.common.language import tr, tr_noop
+from rhot_app.ui.language import tr, tr_noop
 from rhot_node.files import read_json, resource_path
 from rhot_node.wire.messages import MarkerFlag
 

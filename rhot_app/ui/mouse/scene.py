@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QWidget
 from rhot_app.mouse.pick_scene import PickScene
 from rhot_app.mouse.pointer import GROUND_M, MouseState
 from rhot_app.mouse.target_test import WIDTH_M, TargetTest
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme, rgb_of
 from rhot_app.ui.scene.mesh_item import MeshItem
 from rhot_app.ui.scene.meshes import capsule_template, pose_capsules, repeat_faces

@@ -19,11 +19,11 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Listener
 from rhot_app.ui.backend.live import SILENCE_S
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.common.tool_window import ToolWindow
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import NO_RIG, condition_look
@@ -187,7 +187,8 @@ class MouseWindow(ToolWindow):
                                   right=right, forward=forward, height=height))
         for button in BUTTONS:
             down = state is not None and state.is_pressed(button)
-            self.words[button].setText(f"{tr(_NAMES[button])} {tr('DOWN') if down else tr('up')}")
+            word = tr("DOWN") if down else tr("up")
+            self.words[button].setText(f"{tr(_NAMES[button])} {word}")
             self.shapes[button].setPixmap(shape_pixmap(
                 "disc" if down else "ring", self._scheme.accent if down else self._scheme.neutral, _SHAPE_PX,
                 self.devicePixelRatioF()))

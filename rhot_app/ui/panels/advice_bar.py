@@ -19,8 +19,8 @@ from PySide6.QtWidgets import (
     QWidgetAction,
 )
 
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.shapes import ShapeMark
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.palette import Scheme
 

@@ -15,8 +15,8 @@ from rhot_app.engine.status import Preview
 from rhot_app.project import Rig
 from rhot_app.state import Knowledge, SeenContour
 from rhot_app.ui.backend.live import Live
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.shapes import paint_tag
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.label_layout import place_at_sides
 from rhot_app.ui.models.palette import Scheme, visible_on
 from rhot_app.ui.models.rows import short_name

@@ -22,8 +22,8 @@ from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibra
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.shapes import ShapeMark, shape_icon
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import DASH, angle_text, palm_text
 from rhot_app.ui.models.words import (

@@ -10,8 +10,8 @@ from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibra
 from rhot_app.charts import hex_of
 from rhot_app.project import Rig
 from rhot_app.state import HandState
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.shapes import ShapeMark
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import MarkerRow, marker_rows, short_name
 from rhot_app.ui.models.words import Look, tip

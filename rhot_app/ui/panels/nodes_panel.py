@@ -6,8 +6,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from rhot_app.engine.status import EngineStatus, NodeStatus
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.shapes import ShapeMark
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import NodeRow, node_row
 from rhot_app.ui.models.words import tip

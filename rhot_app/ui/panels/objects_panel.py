@@ -11,7 +11,7 @@ from rhot_app.hand.skeleton import FINGERS
 from rhot_app.objects.state import ObjectState, Validity
 from rhot_app.project import Rig
 from rhot_app.state import HandState
-from rhot_app.ui.common.language import tr, tr_noop
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 
 WORDS = {Validity.SEARCHING: tr_noop("SEARCHING"), Validity.TRACKED: tr_noop("TRACKING"),

@@ -13,7 +13,7 @@ from rhot_app.charts import hex_of
 from rhot_app.latency import STACKED
 from rhot_app.project import Rig
 from rhot_app.ui.backend.live import LATENCY_COLUMNS, LOST
-from rhot_app.ui.common.language import tr, tr_noop
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.meters import BUDGET_S
 from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme, visible_on
 from rhot_app.ui.models.rows import short_name

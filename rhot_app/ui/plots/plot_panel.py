@@ -13,7 +13,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QGuiApplication, QPainter, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QPushButton, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 from rhot_app.ui.common.disposal import plot_widget
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.series import Peak, Series, peaks_above, round_top, to_csv, usual_top
 from rhot_app.ui.models.words import tip

@@ -11,7 +11,7 @@ from rhot_app.project import Rig
 from rhot_app.sources.frame_sets import RecordedFilm
 from rhot_app.sources.recorded_pictures import FilmReader
 from rhot_app.state import HandState
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.camera_panel import CameraPanel, Skeleton
 from rhot_app.ui.replay.run import CODES

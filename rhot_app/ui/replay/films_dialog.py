@@ -31,9 +31,9 @@ from rhot_app.project import Rig, load_rig
 from rhot_app.sources.film_offset import FilmOffset, offsets_of
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import LOG_FILTER
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.replay.run_dialog import FileChoice
 
 ENDINGS = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpg", ".mts", ".webm")

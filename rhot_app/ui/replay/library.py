@@ -22,8 +22,8 @@ from rhot_app.recording.raw_log import CONTINUES, LogReader
 from rhot_app.recording.video import videos_of
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.scene import make_tracker
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.dialogs.recordings import LOG_SUFFIX
+from rhot_app.ui.language import tr
 from rhot_app.ui.replay.run import CODES, LOST, ReadableLog, being_recorded, condition_bins
 from rhot_node.errors import NodeError, printable
 from rhot_node.files import write_document

@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.record_table import Column, RecordTable
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import DASH, bytes_text
 from rhot_app.ui.replay.library import Entry, Summary

@@ -21,9 +21,9 @@ from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import Collected, collect_videos
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.job import Job, Progress
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.tool_window import ToolWindow
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import Remaining
 from rhot_app.ui.panels.empty_state import EmptyState

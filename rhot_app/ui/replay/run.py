@@ -33,7 +33,7 @@ from rhot_app.sources.replay import LogValidator
 from rhot_app.state import Condition, HandState
 from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.smoothing import NOT_SMOOTHED
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.meters import JitterWindow
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
-from rhot_app.ui.common.language import tr, tr_noop
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.words import Remaining
 from rhot_app.ui.replay.run import Run, Tracked, new_run_path, track_log
 from rhot_app.ui.replay.session import Comparison, TrackerChoice

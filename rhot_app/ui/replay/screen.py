@@ -13,10 +13,10 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSpli
 
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.state import Condition, HandState
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.scrolled import scrolled
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import shape_pixmap
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme, visible_on
 from rhot_app.ui.panels.hand_panel import HandPanel

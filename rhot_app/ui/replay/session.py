@@ -16,7 +16,7 @@ from rhot_app.project import Rig, load_rig, with_tracker
 from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.state import HandState
-from rhot_app.ui.common.language import tr, tr_noop
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.series import RecordedSeries
 from rhot_app.ui.replay.run import Codes, Run, Tracked, condition_bins
 

@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_app.ui.replay.library import Entry, Library, Summary, summarise_log
 
 

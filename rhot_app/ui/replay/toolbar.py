@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton,
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark
 from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.dialogs.recordings import BookmarkDialog
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.state_badge import StateBadge
 from rhot_app.ui.replay.session import Replay

@@ -22,11 +22,11 @@ from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.language import tr, tr_noop
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.tool_window import AS_MAIN, WindowTools
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
 from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.notice import Notice, TransientNotices
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import Look, condition_look

@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from rhot_app.project import Rig
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.disposal import dispose
-from rhot_app.ui.common.language import tr
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.recordings import LOG_FILTER, newest_recording
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.replay.films_dialog import FilmsDialog
 from rhot_app.ui.replay.library_window import LibraryWindow

@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QWidget
 
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 
 
 class WorkStrip(QWidget):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rhot_app.geometry.camera import lens_parameters, lens_rays
 from rhot_app.project import CameraPose, Intrinsics
 from rhot_app.state import HandState
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 
 # -- Floor grid and axes -----------------------------------------------------------------------------------------------
 

@@ -14,7 +14,7 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND, Rig
 from rhot_app.state import HandState, Knowledge
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.rows import position_text, sd_text, short_name, total_sd
 from rhot_app.ui.models.words import KNOWLEDGE, each_hand
 from rhot_app.ui.scene.hand_mesh import TIPS

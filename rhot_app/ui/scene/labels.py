@@ -10,7 +10,7 @@ from PySide6.QtCore import QLineF, QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QMatrix4x4, QPainter, QPen, QPixmap
 
 from rhot_app.state import Knowledge
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.label_layout import place_labels
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.words import KNOWLEDGE

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolBar, QToolButton, QVBoxLayout, QWidget
 
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_app.ui.scene.view import SceneView
 
 

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QPushButton, QToolTip, QWidget
 from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, calibration_error
 from rhot_app.project import Rig
 from rhot_app.state import HandState
-from rhot_app.ui.common.language import tr
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import short_name
 from rhot_app.ui.models.words import KINDS, each_hand, hand_names
