@@ -1,0 +1,153 @@
+"""The window in another language: what is translated, what falls back to English, and that German fits the window."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from PySide6.QtCore import QUrl
+from PySide6.QtWidgets import QDialogButtonBox, QLabel
+from screen_pictures import cut_texts
+from test_settings_dialog import choose, select
+
+from resources.translations.update import release
+from rhot_app.ui import language
+from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.language import tr, use_language
+from rhot_app.ui.models.words import CONDITIONS, tip
+
+MESSAGE = """<message{numerus}><source>{source}</source><comment>{comment}</comment>
+<translation>{translation}</translation></message>"""
+
+
+@pytest.fixture(autouse=True)
+def english_again():
+    yield
+    use_language("en")
+
+
+@pytest.fixture
+def german(themed):
+    use_language("de")
+
+
+@pytest.fixture
+def klingon(tmp_path, monkeypatch):
+    """A function that writes a translation file and uses it: (text, comment, forms) for each message."""
+    def use(*messages: tuple[str, str, tuple[str, ...]]) -> None:
+        (tmp_path / "translations").mkdir(exist_ok=True)
+        path = tmp_path / "translations" / "rhot_de.ts"
+        body = "".join(MESSAGE.format(
+            numerus=' numerus="yes"' if len(forms) > 1 else "", source=source, comment=comment,
+            translation="".join(f"<numerusform>{form}</numerusform>" for form in forms) if len(forms) > 1 else forms[0])
+            for source, comment, forms in messages)
+        path.write_text(f'<?xml version="1.0" encoding="utf-8"?><!DOCTYPE TS><TS version="2.1" language="de"><context>'
+                        f"<name></name>{body}</context></TS>")
+        release(path, path.with_suffix(".qm"))
+        monkeypatch.setattr(language, "resource_path", lambda *parts: tmp_path.joinpath(*parts))
+        use_language("de")
+
+    return use
+
+
+def test_a_sentence_takes_its_values_and_its_plural(klingon):
+    klingon(("Saved {path}.", "", ("{path} gespeichert.",)), ("{n} file of {name}", "{n} files of {name}",
+                                                              ("{n} Datei von {name}", "{n} Dateien von {name}")))
+    assert tr("Saved {path}.", path="a.json") == "a.json gespeichert."
+    assert [tr("{n} file of {name}", "{n} files of {name}", n, name="x") for n in (0, 1, 2)] == [
+        "0 Dateien von x", "1 Datei von x", "2 Dateien von x"]
+    use_language("en")
+    assert [tr("{n} file of {name}", "{n} files of {name}", n, name="x") for n in (0, 1, 2)] == [
+        "0 files of x", "1 file of x", "2 files of x"]
+
+
+def test_a_comment_tells_two_meanings_apart(klingon):
+    klingon(("Open", "a button", ("Öffnen",)), ("Open", "a state", ("Offen",)))
+    assert (tr("Open", "a button"), tr("Open", "a state"), tr("Open")) == ("Öffnen", "Offen", "Open")
+
+
+@pytest.mark.parametrize("wrong", ["{weg} gespeichert.", "Gespeichert.", "{path gespeichert.", "{path:d} gespeichert.",
+                                   "{path.__class__} gespeichert.", ""])
+def test_a_translation_that_does_not_fit_is_english(klingon, wrong):
+    klingon(("Saved {path}.", "", (wrong,)))
+    assert tr("Saved {path}.", path="a.json") == "Saved a.json."
+
+
+def test_what_has_no_translation_is_english(german):
+    assert tr("No such sentence {here}.", here=1) == "No such sentence 1."
+    assert tr("") == ""
+
+
+def test_words_that_are_made_at_the_import_follow_the_language():
+    assert tr(CONDITIONS["tracking"].word) == "TRACKING" and tip("rig").startswith("The rig file")
+    use_language("de")
+    assert tr(CONDITIONS["tracking"].word) == "VERFOLGT" and tip("rig").startswith("Die Rig-Datei")
+
+
+@pytest.mark.parametrize(("desktop", "found"), [("de_AT.UTF-8", "de"), ("fr_FR.UTF-8", "en"), ("C", "en"),
+                                                ("en_GB.UTF-8", "en")])
+def test_the_desktop_decides_until_a_language_is_chosen(desktop, found):
+    """In a process of its own: Qt reads the variables once."""
+    code = "from rhot_app.ui.language import language_of as of; print(of('system'), of('en'), of('de'), of('xx'))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
+                          env={"PATH": "", "LC_ALL": desktop, "LANG": desktop, "LANGUAGE": desktop.partition(".")[0]})
+    assert done.stdout.split() == [found, "en", "de", found]
+
+
+def test_the_settings_choose_the_language_of_the_next_start(bench, tmp_path):
+    choose(bench, "rig", bench.window.actions_.settings)
+    bench.until(lambda: bench.window.dialogs.settings is not None and bench.window.dialogs.settings.isVisible())
+    page = bench.window.dialogs.settings.general
+    assert page.language_box.currentText() == "As the desktop" and page.language_note.text() == ""
+    select(bench, page.language_box, 2)
+    assert page.language_box.currentText() == "Deutsch" and "next start" in page.language_note.text()
+    bench.click(bench.window.dialogs.settings.close_button)
+    assert Settings(bench.window.settings.path).language == "de"
+    assert bench.window.toolbar.rig_button.text() == "Rig" and tr("Help") == "Help"
+    select(bench, page.language_box, 1)
+    assert page.language_note.text() == ""
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_the_german_window_is_german_and_nothing_is_cut(german, make_bench, scheme):
+    bench = make_bench(scheme=scheme)
+    window = bench.window
+    window.resize(1280, 800)
+    assert window.toolbar.badge.word == "KEIN RIG" and window.welcome.twin_button.text() == "Simuliertes Rig starten"
+    assert not cut_texts(window)
+    bench.click(window.welcome.twin_button)
+    bench.until(lambda: window.toolbar.badge.word == "VERFOLGT" and bench.said("Alles ist in Ordnung"))
+    assert [dock.windowTitle() for dock in window.docks.docks] == ["Knoten", "Marker", "Kameras", "Hand", "Diagramme"]
+    angles = {cell.text() for cell in window.screen_parts.hand.cells}
+    assert not set(cut_texts(window)) - angles, "an angle has room for a longer one"
+    shown = {label.text() for label in window.findChildren(QLabel) if label.isVisible()}
+    assert {"Zeigefinger", "gemessen", "Handfläche", "Jitter je Marker"} <= shown
+    assert not shown & {"thumb", "index", "measured", "palm", "ok "}
+    assert window.actions_.record.text() == "Aufnehmen" and window.actions_.record.toolTip().endswith("(R).")
+
+
+def test_copied_figures_keep_the_decimal_point(german, make_bench):
+    bench = make_bench()
+    bench.click(bench.window.welcome.twin_button)
+    plot = bench.window.screen_parts.rate
+    bench.until(lambda: len(plot.seconds) > 0)
+    head, row = plot.csv().splitlines()[:2]
+    assert head.startswith("time [s]") and "," in row and all(part == "" or float(part) == float(part)
+                                                            for part in row.split(","))
+
+
+def test_german_questions_have_german_buttons(german):
+    box = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+    assert box.button(QDialogButtonBox.StandardButton.Cancel).text().replace("&", "") == "Abbrechen"
+
+
+def test_the_guide_opens_the_german_page_where_there_is_one(german, make_bench):
+    bench = make_bench()
+    bench.window.open_guide("start")
+    guide = bench.window.dialogs.guide
+    assert guide.browser.toPlainText().startswith("Erste Schritte")
+    guide.browser.anchorClicked.emit(QUrl("start.md"))
+    assert guide.page == "start"
+    bench.window.open_guide("nodes")
+    assert guide.browser.toPlainText().startswith("Nodes")
