@@ -4515,5 +4515,225 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <source>Tracked {text}. Space plays, the arrow keys go from state to state.</source>
         <translation>Verfolgt: {text}. Die Leertaste spielt ab, die Pfeiltasten gehen von Zustand zu Zustand.</translation>
     </message>
+    <message>
+        <source>Set the cameras</source>
+        <translation>Kameras einstellen</translation>
+    </message>
+    <message>
+        <source>Exposure, gains, white balance: what each camera is told, tried out live.</source>
+        <translation>Belichtung, Verstärkung, Weißabgleich: was jeder Kamera gesagt wird, live ausprobiert.</translation>
+    </message>
+    <message>
+        <source>Intrinsics of a camera</source>
+        <translation>Intrinsik einer Kamera</translation>
+    </message>
+    <message>
+        <source>Focal length, centre and distortion of one camera&apos;s lens, from a board that is held all over its picture.</source>
+        <translation>Brennweite, Hauptpunkt und Verzeichnung des Objektivs einer Kamera, aus einem Brett, das überall in ihr Bild gehalten wird.</translation>
+    </message>
+    <message>
+        <source>Stereo calibration</source>
+        <translation>Stereokalibrierung</translation>
+    </message>
+    <message>
+        <source>Where the cameras stand to each other and to the table, from a board that they see at the same time.</source>
+        <translation>Wie die Kameras zueinander und zum Tisch stehen, aus einem Brett, das sie gleichzeitig sehen.</translation>
+    </message>
+    <message>
+        <source>Use refined calibration</source>
+        <translation>Verfeinerte Kalibrierung benutzen</translation>
+    </message>
+    <message>
+        <source>How the cameras stand now, from the hand that moves while it is tracked.</source>
+        <translation>Wie die Kameras jetzt stehen, aus der Hand, die sich bewegt, während sie verfolgt wird.</translation>
+    </message>
+    <message>
+        <source>Colours of the markers</source>
+        <translation>Farben der Marker</translation>
+    </message>
+    <message>
+        <source>Which colour each marker has, and what may be mistaken for it.</source>
+        <translation>Welche Farbe jeder Marker hat und was mit ihm verwechselt werden kann.</translation>
+    </message>
+    <message>
+        <source>Background and skin</source>
+        <translation>Hintergrund und Haut</translation>
+    </message>
+    <message>
+        <source>What the empty scene and your skin look like, so that a bare hand can be tracked.</source>
+        <translation>Wie die leere Szene und die Haut aussehen, damit eine bloße Hand verfolgt werden kann.</translation>
+    </message>
+    <message>
+        <source>Adapt the hand&apos;s shape</source>
+        <translation>Form der Hand anpassen</translation>
+    </message>
+    <message>
+        <source>How long and how thick the fingers are, from a bare hand that moves while it is tracked.</source>
+        <translation>Wie lang und wie dick die Finger sind, aus einer bloßen Hand, die sich bewegt, während sie verfolgt wird.</translation>
+    </message>
+    <message>
+        <source>Use measured bones</source>
+        <translation>Gemessene Knochen benutzen</translation>
+    </message>
+    <message>
+        <source>How long the bones are, from the landmarks of a hand that two cameras see while it is tracked.</source>
+        <translation>Wie lang die Knochen sind, aus den Landmarken einer Hand, die zwei Kameras sehen, während sie verfolgt wird.</translation>
+    </message>
+    <message>
+        <source>Time of the cameras</source>
+        <translation>Zeit der Kameras</translation>
+    </message>
+    <message>
+        <source>When each camera sees, from a hand that waves.</source>
+        <translation>Wann jede Kamera sieht, aus einer Hand, die winkt.</translation>
+    </message>
+    <message>
+        <source>Depth without a board</source>
+        <translation>Tiefe ohne Brett</translation>
+    </message>
+    <message>
+        <source>Distance from disparity, from a marker at measured distances.</source>
+        <translation>Abstand aus Disparität, aus einem Marker in gemessenen Abständen.</translation>
+    </message>
+    <message>
+        <source>Bones of the hand</source>
+        <translation>Knochen der Hand</translation>
+    </message>
+    <message>
+        <source>How long the bones are, from a minute of movement or by a ruler.</source>
+        <translation>Wie lang die Knochen sind, aus einer Minute Bewegung oder mit dem Lineal.</translation>
+    </message>
+    <message>
+        <source>Filters</source>
+        <translation>Filter</translation>
+    </message>
+    <message>
+        <source>How much jitter and how much lag, from a hand held still and one that moves fast.</source>
+        <translation>Wie viel Jitter und wie viel Verzögerung, aus einer ruhig gehaltenen Hand und einer schnellen.</translation>
+    </message>
+    <message>
+        <source>Alignment with another tracker</source>
+        <translation>Ausrichtung an einem anderen Tracker</translation>
+    </message>
+    <message>
+        <source>Where a Vive tracker&apos;s world is in the rig, from a movement of both.</source>
+        <translation>Wo die Welt eines Vive-Trackers im Rig liegt, aus einer gemeinsamen Bewegung.</translation>
+    </message>
+    <message>
+        <source>Certificate</source>
+        <translation>Zertifikat</translation>
+    </message>
+    <message>
+        <source>How good this rig is, measured as the thesis did, with 95 % intervals: five minutes.</source>
+        <translation>Wie gut dieses Rig ist, gemessen wie in der Arbeit, mit 95-%-Intervallen: fünf Minuten.</translation>
+    </message>
+    <message>
+        <source>brisk</source>
+        <translation>flott</translation>
+    </message>
+    <message>
+        <source>The open hand waves briskly in a wide round, 30 cm across and 16 cm high. For filters and the cameras&apos; time.</source>
+        <translation>Die offene Hand winkt flott in einem weiten Bogen, 30 cm breit und 16 cm hoch. Für Filter und die Zeit der Kameras.</translation>
+    </message>
+    <message>
+        <source>cross</source>
+        <translation>kreuzen</translation>
+    </message>
+    <message>
+        <source>Fingers that cross in the pictures: index and middle over each other, little and ring, the thumb across the palm, the hand edge on.</source>
+        <translation>Finger, die sich in den Bildern kreuzen: Zeige- und Mittelfinger, Klein- und Ringfinger, der Daumen über der Handfläche, die Hand hochkant.</translation>
+    </message>
+    <message>
+        <source>fast</source>
+        <translation>schnell</translation>
+    </message>
+    <message>
+        <source>A hurried figure of eight, 2 m/s at its peak.</source>
+        <translation>Eine eilige Acht, in der Spitze 2 m/s.</translation>
+    </message>
+    <message>
+        <source>grasp</source>
+        <translation>greifen</translation>
+    </message>
+    <message>
+        <source>Reaching out, closing the hand round a glass, holding it and letting go.</source>
+        <translation>Ausstrecken, die Hand um ein Glas schließen, halten und loslassen.</translation>
+    </message>
+    <message>
+        <source>mouse</source>
+        <translation>Maus</translation>
+    </message>
+    <message>
+        <source>The hand works the 3-D mouse: it picks three balls and carries them.</source>
+        <translation>Die Hand bedient die 3-D-Maus: Sie greift drei Kugeln und trägt sie.</translation>
+    </message>
+    <message>
+        <source>pinch</source>
+        <translation>Pinzettengriff</translation>
+    </message>
+    <message>
+        <source>Thumb and index meet, twice in a row, the other fingers stay half open.</source>
+        <translation>Daumen und Zeigefinger berühren sich zweimal nacheinander, die anderen Finger bleiben halb offen.</translation>
+    </message>
+    <message>
+        <source>point</source>
+        <translation>zeigen</translation>
+    </message>
+    <message>
+        <source>The index finger points and draws a small circle in the air.</source>
+        <translation>Der Zeigefinger zeigt und zeichnet einen kleinen Kreis in die Luft.</translation>
+    </message>
+    <message>
+        <source>rest</source>
+        <translation>ruhen</translation>
+    </message>
+    <message>
+        <source>A relaxed open hand, held as still as a person can.</source>
+        <translation>Eine entspannte offene Hand, so ruhig gehalten, wie ein Mensch es kann.</translation>
+    </message>
+    <message>
+        <source>roam</source>
+        <translation>umher</translation>
+    </message>
+    <message>
+        <source>The open hand moves and turns about all axes, irregularly. For aligning another tracker.</source>
+        <translation>Die offene Hand bewegt und dreht sich unregelmäßig um alle Achsen. Zum Ausrichten eines anderen Trackers.</translation>
+    </message>
+    <message>
+        <source>The fingers spread wide and close again.</source>
+        <translation>Die Finger spreizen sich weit und schließen sich wieder.</translation>
+    </message>
+    <message>
+        <source>still</source>
+        <translation>starr</translation>
+    </message>
+    <message>
+        <source>An open hand as if cast in plaster: no motion at all.</source>
+        <translation>Eine offene Hand wie aus Gips: ohne jede Bewegung.</translation>
+    </message>
+    <message>
+        <source>sweep</source>
+        <translation>alle Gelenke</translation>
+    </message>
+    <message>
+        <source>Every joint through its range, one after the other and together; the wrist turns. For measuring a hand.</source>
+        <translation>Jedes Gelenk durch seinen Bereich, nacheinander und gemeinsam; das Handgelenk dreht sich. Zum Vermessen einer Hand.</translation>
+    </message>
+    <message>
+        <source>tap</source>
+        <translation>tippen</translation>
+    </message>
+    <message>
+        <source>Fingers tap in turn, the hand spread and held towards the cameras as over a desk; with its back to them (--set facing=back) all nails show.</source>
+        <translation>Finger tippen der Reihe nach, die Hand gespreizt und den Kameras entgegen, wie über einem Tisch; mit dem Handrücken zu ihnen (--set facing=back) sind alle Nägel zu sehen.</translation>
+    </message>
+    <message>
+        <source>wave</source>
+        <translation>winken</translation>
+    </message>
+    <message>
+        <source>A greeting: the hand swings about the forearm and the fingers follow.</source>
+        <translation>Ein Gruß: Die Hand schwingt um den Unterarm, und die Finger folgen.</translation>
+    </message>
 </context>
 </TS>

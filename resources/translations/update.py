@@ -1,25 +1,40 @@
 """Renew the translations: ``python resources/translations/update.py [--new CODE]``.
 
-`pyside6-lupdate` collects the sentences of `rhot_app/ui` into each `rhot_CODE.ts`, which a translator fills as text or
-with Qt Linguist. `pyside6-lrelease` makes the `rhot_CODE.qm` of it that the app loads.
+`pyside6-lupdate` collects the sentences of `rhot_app/ui`, and the titles of calibrations and motions, into a file for
+each language, such as `rhot_de.ts`. A translator fills it as text or with Qt Linguist. `pyside6-lrelease` makes the file
+that the app loads of it, such as `rhot_de.qm`.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).parent
 UI = HERE.parents[1] / "rhot_app" / "ui"
 
 
+def of_other_rooms() -> list[str]:
+    """What records of other rooms are called, which the window shows and translates: calibrations, motions."""
+    from rhot_app.ui.models.words import shipped_motions
+    from rhot_app.ui.wizards.framework.definition import WIZARDS
+
+    return [*(text for wizard in WIZARDS for text in (wizard.title, wizard.meaning)),
+            *(text for motion in shipped_motions() for text in (motion.name, motion.description))]
+
+
 def collect(path: Path) -> None:
     """Bring the sentences of a .ts file up to date; translations stay, those of no sentence go."""
-    _run("lupdate", "-silent", "-no-obsolete", "-locations", "none", "-tr-function-alias", "QT_TR_NOOP+=tr_noop",
-         "-source-language", "en", "-target-language", path.stem.partition("_")[2],
-         *(str(source) for source in sorted(UI.rglob("*.py"))), "-ts", str(path))
+    with tempfile.TemporaryDirectory() as folder:
+        records = Path(folder, "records.py")
+        records.write_text("".join(f"tr_noop({json.dumps(text, ensure_ascii=False)})\n" for text in of_other_rooms()))
+        _run("lupdate", "-silent", "-no-obsolete", "-locations", "none", "-tr-function-alias", "QT_TR_NOOP+=tr_noop",
+             "-source-language", "en", "-target-language", path.stem.partition("_")[2],
+             *(str(source) for source in sorted(UI.rglob("*.py"))), str(records), "-ts", str(path))
 
 
 def release(path: Path, out: Path) -> None:

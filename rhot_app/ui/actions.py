@@ -74,7 +74,7 @@ class Actions(QObject):
         self.quit = self._make(tr("Quit"), "Ctrl+Q", tr("End what the app started and close it."))
         self.next_steps = self._make(tr("What to do next …"), "",
                                      tr("Say what you have, and see the steps that are missing."))
-        self.wizards = [self._make(f"{wizard.title} …", "", wizard.meaning) for wizard in WIZARDS]
+        self.wizards = [self._make(f"{tr(wizard.title)} …", "", tr(wizard.meaning)) for wizard in WIZARDS]
         self.fit = self._make(tr("Fit the hand to pictures …"), "",
                               tr("Drag joints in the cameras' pictures, move sliders, and let edges finish it: the "
                                  "hand's lengths and pose."))

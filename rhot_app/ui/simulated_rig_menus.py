@@ -50,7 +50,7 @@ class TwinShows(QObject):
         self.actions: dict[str, QAction] = {}
         motions = {info.name: info.description for info in shipped_motions()}
         for name, text in FIRST.items():
-            self._make(f"hand:{name}", tr(text), motions.get(name, ""))
+            self._make(f"hand:{name}", tr(text), tr(motions.get(name, "")))
         for key, text, meaning in THINGS:
             self._make(key, tr(text), tr(meaning))
         for distance in DISTANCES_CM:
@@ -59,7 +59,7 @@ class TwinShows(QObject):
                           distance=distance))
         for name, meaning in motions.items():
             if name not in FIRST:
-                self._make(f"hand:{name}", name, meaning)
+                self._make(f"hand:{name}", tr(name), tr(meaning))
         self._fill(menu)
         menu.aboutToShow.connect(self._look)
         controller.rig_changed.connect(lambda: menu.menuAction().setVisible(self._simulated))

@@ -67,8 +67,9 @@ class WelcomePage(QWidget):
         line.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         self.motion_box = QComboBox()
         for info in shipped_motions():
-            self.motion_box.addItem(info.name, info.name)
-            self.motion_box.setItemData(self.motion_box.count() - 1, info.description, Qt.ItemDataRole.ToolTipRole)
+            self.motion_box.addItem(tr(info.name), info.name)
+            self.motion_box.setItemData(self.motion_box.count() - 1, tr(info.description),
+                                        Qt.ItemDataRole.ToolTipRole)
         self.motion_box.setCurrentIndex(max(0, self.motion_box.findData(motion)))
         self.motion_box.setToolTip(tr("What the simulated hand does."))
         self.motion_box.setAccessibleName(tr("Motion of the simulated hand"))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from resources.translations.update import collect, release
+from resources.translations.update import collect, of_other_rooms, release
 from rhot_app.ui.language import LANGUAGES, placeholders
 
 ROOT = Path(__file__).parents[2]
@@ -138,6 +138,13 @@ def translations(path: Path) -> dict[tuple[str, str], list[str]]:
     return found
 
 
+@cache
+def written() -> set[tuple[str, str]]:
+    """All (text, comment) that can be translated."""
+    return {*(key for source in UI.rglob("*.py") for key in marked(source.read_text())),
+            *((text, "") for text in of_other_rooms())}
+
+
 def test_what_a_person_reads_passes_tr() -> None:
     allowed = {text for group in NOT_TRANSLATED.values() for text in group}
     found = [f"{name}:{line}: {text!r}" for path in sorted(UI.rglob("*.py"))
@@ -172,11 +179,11 @@ def test_every_language_has_a_file_and_every_file_a_language() -> None:
 @pytest.mark.parametrize("path", LANGUAGE_FILES, ids=lambda path: path.stem)
 def test_translations_are_renewed_and_complete_where_promised(path: Path, tmp_path: Path) -> None:
     known = translations(path)
-    written = {key for source in UI.rglob("*.py") for key in marked(source.read_text())}
-    assert known.keys() == written, "run resources/translations/update.py"
+    assert known.keys() == written(), "run resources/translations/update.py"
     open_ = [f"{source.relative_to(ROOT)}: {key[0]!r}" for source in sorted(UI.rglob("*.py"))
              if str(source.parent.relative_to(ROOT)) in COMPLETE
              for key in marked(source.read_text()) if not any(known[key])]
+    open_ += [text for text in of_other_rooms() if not any(known[text, ""])]
     assert not open_, f"not in {path.name}:\n" + "\n".join(open_)
 
 
@@ -198,4 +205,4 @@ def test_sentences_are_collected_as_this_file_reads_them(tmp_path: Path) -> None
     """The tool of Qt and the tests here agree about a file that has every form."""
     begun = tmp_path / "rhot_fr.ts"
     collect(begun)
-    assert translations(begun).keys() == {key for source in UI.rglob("*.py") for key in marked(source.read_text())}
+    assert translations(begun).keys() == written()
