@@ -1,8 +1,8 @@
 """Renew the translations: ``python resources/translations/update.py [--new CODE]``.
 
 `pyside6-lupdate` collects the sentences of `rhot_app/ui`, and the titles of calibrations and motions, into a file for
-each language, such as `rhot_de.ts`. A translator fills it as text or with Qt Linguist. `pyside6-lrelease` makes the file
-that the app loads of it, such as `rhot_de.qm`.
+each language, such as `rhot_de.ts`. A translator fills it as text or with Qt Linguist. `pyside6-lrelease` makes the
+file that the app loads of it, such as `rhot_de.qm`.
 """
 
 from __future__ import annotations
