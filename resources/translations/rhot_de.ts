@@ -4735,5 +4735,9 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <source>A greeting: the hand swings about the forearm and the fingers follow.</source>
         <translation>Ein Gruß: Die Hand schwingt um den Unterarm, und die Finger folgen.</translation>
     </message>
+    <message>
+        <source>dd MMM yyyy, HH:mm</source>
+        <translation>dd. MMM yyyy, HH:mm</translation>
+    </message>
 </context>
 </TS>

@@ -7,6 +7,7 @@ A sentence is written as ``tr("The rig was saved to {path}.", path=path)``: a li
 from __future__ import annotations
 
 import string
+from datetime import datetime
 from functools import lru_cache
 from typing import Any, Final
 
@@ -66,6 +67,11 @@ def language_of(choice: str) -> str:
 def language() -> str:
     """The code of the language that is used."""
     return _language[0]
+
+
+def date_text(at: datetime) -> str:
+    """Day and minute, e.g. "01 May 2026, 10:00"."""
+    return QLocale(language()).toString(at, tr("dd MMM yyyy, HH:mm"))
 
 
 def use_language(choice: str) -> None:

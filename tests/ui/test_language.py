@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from datetime import datetime
 
 import pytest
 from PySide6.QtCore import QUrl
-from PySide6.QtWidgets import QDialogButtonBox, QLabel
-from screen_pictures import cut_texts
+from PySide6.QtWidgets import QDialogButtonBox, QDoubleSpinBox, QLabel
+from screen_pictures import SIZE, cut_texts
 from test_settings_dialog import choose, select
 
 from resources.translations.update import release
 from rhot_app.state import Condition
 from rhot_app.ui import language
 from rhot_app.ui.common.settings import Settings
-from rhot_app.ui.language import tr, use_language
+from rhot_app.ui.language import date_text, tr, use_language
 from rhot_app.ui.models.words import CONDITIONS, tip
 
 MESSAGE = """<message{numerus}><source>{source}</source><comment>{comment}</comment>
@@ -114,9 +115,11 @@ def test_the_settings_choose_the_language_of_the_next_start(bench, tmp_path):
 def test_the_german_window_is_german_and_nothing_is_cut(german, make_bench, scheme):
     bench = make_bench(scheme=scheme)
     window = bench.window
-    window.resize(1280, 800)
+    window.resize(SIZE)
     assert window.toolbar.badge.word == "KEIN RIG" and window.welcome.twin_button.text() == "Simuliertes Rig starten"
     assert not cut_texts(window)
+    if scheme == "dark":
+        bench.keep("welcome.de", 20)
     bench.click(window.welcome.twin_button)
     bench.until(lambda: window.toolbar.badge.word == "VERFOLGT" and bench.said("Alles ist in Ordnung"))
     assert [dock.windowTitle() for dock in window.docks.docks] == ["Knoten", "Marker", "Kameras", "Hand", "Diagramme"]
@@ -135,6 +138,13 @@ def test_copied_figures_keep_the_decimal_point(german, make_bench):
     head, row = plot.csv().splitlines()[:2]
     assert head.startswith("time [s]") and "," in row and all(part == "" or float(part) == float(part)
                                                             for part in row.split(","))
+
+
+def test_numbers_keep_the_point_and_dates_have_the_months_of_the_language(german):
+    assert QDoubleSpinBox().textFromValue(1234.5) == "1234.50"
+    assert date_text(datetime(2026, 5, 1, 9, 5)) == "01. Mai 2026, 09:05"
+    use_language("en")
+    assert date_text(datetime(2026, 5, 1, 9, 5)) == "01 May 2026, 09:05"
 
 
 def test_german_questions_have_german_buttons(german):

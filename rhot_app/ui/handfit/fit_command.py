@@ -64,6 +64,7 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.ui.common.theme import apply_theme, scheme_named
     from rhot_app.ui.handfit.frame import Kept
     from rhot_app.ui.handfit.window import REASON, HandFitWindow
+    from rhot_app.ui.language import use_language
 
     def use(found: HandAnatomy) -> None:
         """The hand into the rig file, which keeps what it had; whatever else stands there now stays."""
@@ -76,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
     app = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(app, QApplication)
     app.setApplicationName("RHOT")
+    use_language(settings.language)
     scheme = scheme_named(settings.scheme)
     apply_theme(app, scheme)
     window = HandFitWindow(fit, scheme, settings, Kept(use, args.save))

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from rhot_app.ui.common.record_table import Column, RecordTable
-from rhot_app.ui.language import tr
+from rhot_app.ui.language import date_text, tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.rows import DASH, bytes_text
 from rhot_app.ui.replay.library import Entry, Summary
@@ -91,7 +91,7 @@ class RecordingTable(RecordTable[Line]):
         super().__init__((
             Column(tr("Name"), lambda line: line.entry.path.stem, roles=Line.roles,
                    write=lambda line, name: self.named.emit(line.entry.path, name)),
-            Column(tr("Date"), lambda line: f"{line.entry.created:%d %b %Y, %H:%M}", roles=Line.roles),
+            Column(tr("Date"), lambda line: date_text(line.entry.created), roles=Line.roles),
             Column(tr("Rig"), lambda line: line.entry.rig_name or DASH, roles=Line.roles),
             Column(tr("Length"), lambda line: line.length, number=True, roles=Line.roles),
             Column(tr("Size"), lambda line: bytes_text(line.entry.size), number=True, roles=Line.roles),
