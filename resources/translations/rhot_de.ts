@@ -396,10 +396,6 @@
         <translation>Hauptleiste</translation>
     </message>
     <message>
-        <source>Controls</source>
-        <translation>Bedienelemente</translation>
-    </message>
-    <message>
         <source>Rig</source>
         <translation>Rig</translation>
     </message>
@@ -618,6 +614,10 @@
     <message>
         <source>the list of sentences</source>
         <translation>die Liste der Meldungen</translation>
+    </message>
+    <message>
+        <source>the menu {menu}</source>
+        <translation>das Menü {menu}</translation>
     </message>
     <message>
         <source>{text} is the key of {holder}. Choose another, or take it from there first.</source>

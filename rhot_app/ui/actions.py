@@ -1,11 +1,14 @@
-"""The window's actions with their icons, keys and tooltips, and the toolbar and menus made of them."""
+"""The window's actions with their icons, keys and tooltips, and the toolbar and the menu bar made of them."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QObject, QSize, Qt, QTimer
-from PySide6.QtGui import QAction, QActionGroup, QKeySequence, QPainter
-from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
+from collections.abc import Sequence
 
+from PySide6.QtCore import QObject, QSize, Qt
+from PySide6.QtGui import QAction, QActionGroup, QKeySequence, QPainter
+from PySide6.QtWidgets import QLabel, QMenuBar, QSizePolicy, QToolBar, QToolButton, QWidget
+
+from rhot_app.ui.common.menu import Menu, give_letters
 from rhot_app.ui.common.shapes import shape_icon, show_overflow
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
@@ -21,9 +24,9 @@ CLOUD_KINDS = (
 """Whose uncertainty can be drawn: name in the settings, title, meaning."""
 
 _SOURCE_PX = 220  # of a long file's name no more is shown, so that the window's word stays in sight
+_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _START_WORDS = tr_noop("Start"), tr_noop("Stop")  # idle, at work
 _RECORD_WORDS = tr_noop("Record"), tr_noop("Stop recording")
-_CALM_MS = 100  # the system may report the mouse over the button once more when the menu above it has gone
 
 
 class Actions(QObject):
@@ -39,9 +42,8 @@ class Actions(QObject):
                                    "Recordings fetches them afterwards."), checkable=True)
         self.twin = self._make(tr("Simulated rig"), "",
                                tr("Start two simulated cameras that look at a simulated hand."))
-        self.shows = QMenu(tr("Simulated hand does"), parent)
-        self.caps = QMenu(tr("Cover a simulated camera"), parent)
-        self.caps.setToolTipsVisible(True)
+        self.shows = Menu(tr("Simulated hand does"), parent)
+        self.caps = Menu(tr("Cover a simulated camera"), parent)
         self.open = self._make(tr("Open rig file …"), "Ctrl+O", tr("Open a rig that was set up before."))
         self.own_cameras = self._make(tr("Cameras of this computer …"), "",
                                       tr("Choose webcams, films or network cameras, look at them, and track with "
@@ -64,8 +66,7 @@ class Actions(QObject):
         self.add_object = self._make(tr("Add a tracked object …"), "",
                                      tr("Track an object with tags or colour markers beside the hand: choose its "
                                         "object file."))
-        self.objects = QMenu(tr("Remove a tracked object"), parent)
-        self.objects.setToolTipsVisible(True)
+        self.objects = Menu(tr("Remove a tracked object"), parent)
         self.save_rig = self._make(tr("Save rig"), "Ctrl+S",
                                    tr("Write the rig as it is now to its file; what stood there is kept beside it."))
         self.close_rig = self._make(tr("Close rig"), "Ctrl+W",
@@ -87,8 +88,7 @@ class Actions(QObject):
         self.cameras = self._make(tr("Cameras …"), "", tr("Lenses and positions that the rig file says."))
         self.markers = self._make(tr("Markers …"), "", tr("The marker set that the rig file says."))
         self.hand = self._make(tr("Hand …"), "", tr("The hand's bones that the rig file says."))
-        self.properties = QMenu(tr("Properties"), parent)
-        self.properties.setToolTipsVisible(True)
+        self.properties = Menu(tr("Properties"), parent)
         self.properties.menuAction().setToolTip(tr("What the rig file says, to read."))
         self.properties.addActions([self.cameras, self.markers, self.hand])
         self.files = self._make(tr("How to calibrate"), "", tr("Opens the guide."))
@@ -149,14 +149,13 @@ class Actions(QObject):
         """Every action, so that the window knows their keys."""
         return [child for child in self.children() if isinstance(child, QAction)]
 
-
     def scene_bar(self) -> SceneBar:
         """The scene's own toolbar."""
         return SceneBar(self.clouds, self.cloud_kinds, self.cloud_sizes, [self.names])
 
 
 class _ElidingLabel(QLabel):
-    """One line of text that ends in an ellipsis where the toolbar has no room for all of it."""
+    """One line of text at the right that ends in an ellipsis where the toolbar has no room for all of it."""
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802
         """No width at all: a toolbar hides its last widgets when the others cannot become narrower."""
@@ -166,48 +165,60 @@ class _ElidingLabel(QLabel):
         """The text as far as it fits."""
         text = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, self.width())
         painter = QPainter(self)
-        self.style().drawItemText(painter, self.rect(), Qt.AlignmentFlag.AlignVCenter, self.palette(), self.isEnabled(),
+        self.style().drawItemText(painter, self.rect(), _RIGHT, self.palette(), self.isEnabled(),
                                   text, self.foregroundRole())
         painter.end()
 
 
-class MainToolBar(QToolBar):
-    """Start, Record, Rig, Calibrate, View, Help; at the right the rig's name and the state.
+class MainMenuBar(QMenuBar):
+    """Rig, Calibrate, View, Help: at the top of the screen where the platform has its menus there, else in the toolbar.
 
-    In a narrow window the controls that do not fit stand behind an arrow; the state stays in sight.
+    `panels` are the switches of the panels.
     """
 
-    def __init__(self, actions: Actions, panels: list[QAction], scheme: Scheme, parent: QWidget) -> None:
+    def __init__(self, actions: Actions, panels: Sequence[QAction], parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        a = actions
+        self.rig = self._add(tr("Rig"), [
+            a.twin, a.own_cameras, a.open, a.nodes, None, a.open_recording, a.recordings, a.films, a.video, a.bookmark,
+            a.export, None, a.add_object, a.objects.menuAction(), None,
+            a.outputs, a.mouse, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig,
+            a.close_rig, None, a.settings, a.quit])
+        self.calibrate = self._add(tr("Calibrate"), [
+            a.next_steps, None, *a.wizards, a.fit, None, a.earlier, None, a.tracker, a.networks, None, a.files])
+        self.view = self._add(tr("View"), [
+            *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, a.layers, None,
+            a.dark, a.light, None, a.reset])
+        self.help = self._add(tr("Help"), [a.guide, a.keys, None, a.about])
+        give_letters(self.actions())
+
+    def _add(self, title: str, entries: Sequence[QAction | None]) -> Menu:
+        menu = Menu(title, self)
+        menu.fill(entries)
+        self.addMenu(menu)
+        return menu
+
+
+class MainToolBar(QToolBar):
+    """Start, Record and the menus, which so take no height of their own; at the right the rig's name and the state.
+
+    In a narrow window the menus that do not fit stand behind an arrow; the state stays in sight.
+    """
+
+    def __init__(self, actions: Actions, menus: MainMenuBar, scheme: Scheme, parent: QWidget) -> None:
         super().__init__(tr("Main"), parent)
         self.setObjectName("main toolbar")
         self.setMovable(False)
         self.setFloatable(False)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        self.controls = QToolBar(tr("Controls"), self)
-        self.controls.setObjectName("controls")
-        self.controls.setIconSize(QSize(24, 18))
-        self.controls.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        self.controls.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self.addWidget(self.controls)
-        margins = self.controls.layout()
-        assert margins is not None
-        margins.setContentsMargins(0, 0, 0, 0)  # it took those of a toolbar that stands alone
+        self.setIconSize(QSize(24, 18))
+        self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self._changing = (actions.start, actions.record)
-        for action in self._changing:
-            self.controls.addAction(action)
-        self.controls.addSeparator()
-        a = actions
-        self.rig_button, self.rig_menu = self._add_menu(tr("Rig"), [
-            a.twin, a.own_cameras, a.open, a.nodes, None, a.open_recording, a.recordings, a.films, a.video, a.bookmark,
-            a.export, None, a.add_object, a.objects.menuAction(), None,
-            a.outputs, a.mouse, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig,
-            a.close_rig, None, a.settings, a.quit])
-        self.calibrate_button, self.calibrate_menu = self._add_menu(tr("Calibrate"), [
-            a.next_steps, None, *a.wizards, a.fit, None, a.earlier, None, a.tracker, a.networks, None, a.files])
-        self.view_button, self.view_menu = self._add_menu(tr("View"), [
-            *panels, a.alone, None, a.frame, a.home, a.names, a.clouds, a.now, a.layers, None,
-            a.dark, a.light, None, a.reset])
-        self.help_button, self.help_menu = self._add_menu(tr("Help"), [a.guide, a.keys, None, a.about])
+        self.addActions(self._changing)
+        self.addSeparator()
+        self.menus = menus
+        self.addWidget(menus)
         self.source_label = QToolButton()
         self.source_label.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.source_label.clicked.connect(actions.bookmark.trigger)
@@ -215,28 +226,12 @@ class MainToolBar(QToolBar):
         self._source_place.setVisible(False)
         self.rig_label = _ElidingLabel("")
         self.rig_label.setProperty("muted", True)
+        self.rig_label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self.addWidget(self.rig_label)
         self.show_rig("", "", edited=False)
         self.badge = StateBadge(scheme)
         self.addWidget(self.badge)
         self.set_scheme(actions, scheme, running=False, recording=False)
-
-    def _add_menu(self, title: str, entries: list[QAction | None]) -> tuple[QToolButton, QMenu]:
-        menu = QMenu(title, self)
-        menu.setToolTipsVisible(True)
-        for entry in entries:
-            if entry is None:
-                menu.addSeparator()
-            else:
-                menu.addAction(entry)
-        self.controls.addAction(menu.menuAction())  # an action, not a widget: behind the arrow it becomes a submenu
-        button = self.controls.widgetForAction(menu.menuAction())
-        assert isinstance(button, QToolButton)
-        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
-        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        menu.aboutToHide.connect(lambda: QTimer.singleShot(_CALM_MS, lambda: _calm_down(button)))
-        return button, menu
 
     def show_rig(self, name: str, path: str, *, edited: bool) -> None:
         """Name of the rig, "" for none; `edited` says that its file does not say the same."""
@@ -264,23 +259,17 @@ class MainToolBar(QToolBar):
         actions.start.setIcon(shape_icon("stop" if running else "play", scheme.accent, ratio))
         actions.record.setText(tr(_RECORD_WORDS[recording]))
         actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault, ratio))
-        show_overflow(self.controls, scheme.text)
+        show_overflow(self.menus, scheme.text)
         self.badge.set_scheme(scheme)
         self.source_label.setStyleSheet(f"color: {scheme.accent}; font-weight: 700;")
 
     def _fix_widths(self, scheme: Scheme) -> None:
         """A button whose word changes is as wide as its longest, or the menus would move under the mouse."""
         for action, words in zip(self._changing, (_START_WORDS, _RECORD_WORDS), strict=True):
-            button = self.controls.widgetForAction(action)
+            button = self.widgetForAction(action)
             action.setIcon(shape_icon("stop", scheme.accent, self.devicePixelRatioF()))
             widths = []
             for word in words:
                 action.setText(tr(word))
                 widths.append(button.sizeHint().width())
             button.setFixedWidth(max(widths))
-
-
-def _calm_down(button: QToolButton) -> None:
-    """A closed menu leaves its button lit while the mouse rests on it, as if it were open; the next visit lights it."""
-    button.setAttribute(Qt.WidgetAttribute.WA_UnderMouse, False)
-    button.update()

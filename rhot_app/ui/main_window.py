@@ -1,4 +1,4 @@
-"""The window: toolbar, docks, scene, sentences at the bottom. A timer pulls from the controller and shows."""
+"""The window: menus, toolbar, docks, scene, sentences at the bottom. A timer pulls from the controller and shows."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from rhot_app.errors import RhotError
 from rhot_app.sources.cameras.camera_set import camera_set_of, change_observed
-from rhot_app.ui.actions import Actions, MainToolBar
+from rhot_app.ui.actions import Actions, MainMenuBar, MainToolBar
 from rhot_app.ui.appearance import Appearance, DisplayPrediction
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.solver import Solver
@@ -95,8 +95,9 @@ class MainWindow(QMainWindow):
         self.next_steps = NextSteps(scheme, lambda: controller.rig, self._in_force, settings)
         self.docks = Docks(self)
         self._add_docks()
-        self.keys = ActionKeys([*self.actions_.all(), *self.docks.actions], settings)
-        self.toolbar = MainToolBar(self.actions_, self.docks.actions, scheme, self)
+        self.menus = MainMenuBar(self.actions_, self.docks.actions, self)
+        self.keys = ActionKeys([*self.actions_.all(), *self.docks.actions], settings, self.menus.actions())
+        self.toolbar = MainToolBar(self.actions_, self.menus, scheme, self)
         self.addToolBar(Qt.ToolBarArea.TopToolBarArea, self.toolbar)
         self.addToolBar(Qt.ToolBarArea.BottomToolBarArea, toolbar_of(self.advice, self))
         self._connect_actions()
@@ -185,7 +186,7 @@ class MainWindow(QMainWindow):
             action.triggered.connect(lambda checked=False, wizard=wizard: self.wizards.open(wizard))
         self.actions_.earlier.triggered.connect(self.wizards.open_versions)
         self.actions_.fit.triggered.connect(self.wizards.open_fit)
-        self.toolbar.calibrate_menu.aboutToShow.connect(self._show_ages)
+        self.menus.calibrate.aboutToShow.connect(self._show_ages)
         self.actions_.next_steps.triggered.connect(self.show_next_steps)
         self.next_steps.asked.connect(self._do_step)
         self.next_steps.closed.connect(lambda: self._place_steps(False))

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.menu import Menu, literal
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.words import shipped_motions
@@ -41,7 +42,7 @@ class TwinShows(QObject):
     The keys are those of `Backend.show_in_twin`.
     """
 
-    def __init__(self, controller: Controller, menu: QMenu, tell: Callable[[Notice], None]) -> None:
+    def __init__(self, controller: Controller, menu: Menu, tell: Callable[[Notice], None]) -> None:
         super().__init__(menu)
         self._controller, self._tell = controller, tell
         self._job: Job | None = None
@@ -70,11 +71,11 @@ class TwinShows(QObject):
         opened = self._controller.opened
         return opened is not None and opened.simulated
 
-    def menu(self, parent: QWidget) -> QMenu | None:
+    def menu(self, parent: QWidget) -> Menu | None:
         """A menu of the choices for another window; None without the simulated rig."""
         if not self._simulated:
             return None
-        menu = QMenu(tr(TITLE), parent)
+        menu = Menu(tr(TITLE), parent)
         self._fill(menu)
         menu.aboutToShow.connect(self._look)
         return menu
@@ -88,10 +89,8 @@ class TwinShows(QObject):
         self._group.addAction(action)
         self.actions[key] = action
 
-    def _fill(self, menu: QMenu) -> None:
-        one_marker, others = QMenu(tr("Shows one marker at"), menu), QMenu(tr("Another motion"), menu)
-        for each in (menu, one_marker, others):
-            each.setToolTipsVisible(True)
+    def _fill(self, menu: Menu) -> None:
+        one_marker, others = Menu(tr("Shows one marker at"), menu), Menu(tr("Another motion"), menu)
         for key, action in self.actions.items():
             kind, _, name = key.partition(":")
             where = one_marker if kind == "marker" else others if kind == "hand" and name not in FIRST else menu
@@ -141,7 +140,7 @@ class LensCaps(QObject):
         if names == [cap.data() for cap in self._caps]:
             return
         self._menu.clear()
-        self._caps = [self._menu.addAction(name) for name in names]
+        self._caps = [self._menu.addAction(literal(name)) for name in names]
         for cap, name in zip(self._caps, names, strict=True):
             cap.setData(name)
             cap.setCheckable(True)

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 from rhot_app.project import Rig, parse_rig, with_object
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.controller import Controller
+from rhot_app.ui.common.menu import literal
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.notice import Notice
 from rhot_node.files import resource_path
@@ -56,7 +57,7 @@ class TrackedObjects(QObject):
         names = [] if rig is None else [model.name for model in rig.models]
         self._menu.clear()
         for name in names:
-            entry = self._menu.addAction(name)
+            entry = self._menu.addAction(literal(name))
             entry.setToolTip(tr("Take {name} out of the rig; its file stays.", name=name))
             entry.triggered.connect(lambda checked=False, name=name: self.remove(name))
         self._menu.menuAction().setEnabled(bool(names))

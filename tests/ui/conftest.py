@@ -18,8 +18,8 @@ cap_heap()
 
 from person import Person  # after the OpenGL platform was chosen  # noqa: E402
 from PySide6.QtCore import QCoreApplication, Qt  # noqa: E402
-from PySide6.QtGui import QPalette  # noqa: E402
-from PySide6.QtWidgets import QApplication  # noqa: E402
+from PySide6.QtGui import QAction, QPalette  # noqa: E402
+from PySide6.QtWidgets import QApplication, QMenu  # noqa: E402
 
 QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
 
@@ -61,6 +61,13 @@ class Bench(Person):
 
     def told(self) -> Any:
         return self.window.toolbar.badge.word, self.window.advice.texts
+
+    def choose(self, menu: QMenu, entry: QAction) -> None:
+        """Click a menu in the menu bar, then an entry of it."""
+        bar = self.window.menus
+        self.click(bar, bar.actionGeometry(menu.menuAction()).center())
+        self.until(menu.isVisible)
+        self.click(menu, menu.actionGeometry(entry).center())
 
     def close_rig(self) -> None:
         """Go back to the first page."""

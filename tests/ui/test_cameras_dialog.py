@@ -203,7 +203,7 @@ def test_the_first_page_leads_to_the_cameras_and_opens_them(bench, tmp_path, mon
     bench.click(window.welcome.cameras_button)
     bench.until(lambda: f"open {prepared.rig_path.name}" in bench.backend.calls)
     assert isinstance(bench.backend, FakeBackend)
-    assert window.actions_.own_cameras in window.toolbar.rig_menu.actions()
+    assert window.actions_.own_cameras in window.menus.rig.actions()
 
 
 def test_its_picture_for_the_guide(qtbot, themed, tmp_path):

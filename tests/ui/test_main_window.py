@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 
-from PySide6.QtCore import QPoint, QPointF, Qt, QTimer
-from PySide6.QtGui import QCursor
+from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 
 from rhot_app.engine.status import Advice
@@ -165,30 +164,12 @@ def test_simulated_cameras_that_stopped_can_be_started_again(tracking):
     assert tracking.backend.calls.count("twin grasp") == 1
 
 
-def test_a_menu_that_was_escaped_leaves_no_light_on_its_button(tracking):
-    button = tracking.window.toolbar.rig_button
-    idle = button.grab().toImage()
-    lit = []
-
-    def escape():
-        lit.append(button.grab().toImage() != idle)
-        tracking.press(Qt.Key.Key_Escape, tracking.window.toolbar.rig_menu)
-
-    QCursor.setPos(button.mapToGlobal(button.rect().center()))
-    QTimer.singleShot(100, escape)
-    tracking.click(button)
-    tracking.until(lambda: lit)
-    tracking.until(lambda: button.grab().toImage() == idle)
-    assert lit == [True]
-    QCursor.setPos(tracking.window.mapToGlobal(tracking.window.rect().center()))
-
-
 def test_the_rig_menu_shows_what_the_rig_says(tracking):
     window = tracking.window
     a = window.actions_
     assert [entry.text() for entry in a.properties.actions()] == ["Cameras …", "Markers …", "Hand …"]
-    assert a.properties.menuAction() in window.toolbar.rig_menu.actions()
-    assert not {a.cameras, a.markers, a.hand} & set(window.toolbar.calibrate_menu.actions())
+    assert a.properties.menuAction() in window.menus.rig.actions()
+    assert not {a.cameras, a.markers, a.hand} & set(window.menus.calibrate.actions())
     for action, tab in ((window.actions_.cameras, 0), (window.actions_.markers, 1), (window.actions_.hand, 2)):
         action.trigger()
         dialog = next(w for w in tracking.window.children() if type(w).__name__ == "RigDialog" and w.isVisible())

@@ -6,9 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog
 from screen_pictures import cut_texts, picture_of
 
@@ -16,18 +15,10 @@ from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.dialogs.about_dialog import parts
 
 
-def choose(bench, menu_name, action):
-    """Open a menu of the toolbar and click an entry."""
-    menu = getattr(bench.window.toolbar, f"{menu_name}_menu")
-    QTimer.singleShot(100, lambda: QTest.mouseClick(menu, Qt.MouseButton.LeftButton,
-                                                    pos=menu.actionGeometry(action).center()))
-    bench.click(getattr(bench.window.toolbar, f"{menu_name}_button"))
-
-
 @pytest.fixture
 def page(bench):
     """The settings, opened from the Rig menu."""
-    choose(bench, "rig", bench.window.actions_.settings)
+    bench.choose(bench.window.menus.rig, bench.window.actions_.settings)
     bench.until(lambda: bench.window.dialogs.settings is not None and bench.window.dialogs.settings.isVisible())
     return bench.window.dialogs.settings
 
@@ -160,7 +151,7 @@ def test_every_action_has_a_name_of_its_own(bench):
 
 
 def test_about_says_the_versions_and_copies_them(bench):
-    choose(bench, "help", bench.window.actions_.about)
+    bench.choose(bench.window.menus.help, bench.window.actions_.about)
     bench.until(lambda: bench.window.dialogs.about is not None and bench.window.dialogs.about.isVisible())
     about = bench.window.dialogs.about
     text = about.versions.toPlainText()

@@ -19,7 +19,7 @@ def ticked(bench):
 def test_a_click_has_the_simulated_hand_do_something_else(tracking):
     menu = tracking.window.actions_.shows
     assert menu.menuAction().isVisible() and menu in [
-        entry.menu() for entry in tracking.window.toolbar.rig_menu.actions()]
+        entry.menu() for entry in tracking.window.menus.rig.actions()]
     menu.aboutToShow.emit()
     tracking.until(lambda: ticked(tracking) == ["hand:grasp"])
     waves = next(entry for entry in menu.actions() if entry.text() == "Waves")

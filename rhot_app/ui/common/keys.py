@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence, QShortcut
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QPushButton, QToolButton, QWidget
 
+from rhot_app.ui.common.menu import without_letter
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.language import tr, tr_noop
 
@@ -24,8 +25,11 @@ class ActionKeys:
     """The keys of a window's actions, which are known by their object names: those that they were made with, or those
     that the person chose. An action's tooltip ends with its key."""
 
-    def __init__(self, actions: Iterable[QAction], settings: Settings) -> None:
+    def __init__(self, actions: Iterable[QAction], settings: Settings, menus: Iterable[QAction] = ()) -> None:
+        """`menus` of the menu bar, whose letters no action can have as its key."""
         self._settings = settings
+        self._letters = {QKeySequence.mnemonic(menu.text()).toString(): tr("the menu {menu}", menu=title_of(menu))
+                         for menu in menus}
         self.actions = list(actions)
         self._own = {action.objectName(): action.shortcut() for action in self.actions}
         self._meanings = {action.objectName(): action.toolTip() for action in self.actions}
@@ -48,8 +52,8 @@ class ActionKeys:
     def choose(self, action: QAction, key: QKeySequence) -> str:
         """Give an action another key, or none. The sentence that says why it cannot have it, else ""."""
         text = key.toString()
-        holder = tr(_FIXED.get(text, "")) or next((title_of(one) for one in self.actions
-                                           if one is not action and text and one.shortcut() == key), "")
+        holder = tr(_FIXED.get(text, "")) or self._letters.get(text) or next(
+            (title_of(one) for one in self.actions if one is not action and text and one.shortcut() == key), "")
         if holder:
             return tr("{text} is the key of {holder}. Choose another, or take it from there first.", text=text,
                       holder=holder)
@@ -76,8 +80,8 @@ class ActionKeys:
 
 
 def title_of(action: QAction) -> str:
-    """What an action is called, without the sign of its dialog and what a menu says behind a tab."""
-    return action.text().partition("\t")[0].removesuffix(" …")
+    """What an action is called, without its letter, the sign of its dialog and what a menu says behind a tab."""
+    return without_letter(action.text()).partition("\t")[0].removesuffix(" …")
 
 
 def bind_space(window: QWidget, action: Callable[[], object]) -> None:

@@ -6,7 +6,7 @@ import math
 
 from PySide6.QtCore import QLineF, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetricsF, QIcon, QPainter, QPen, QPixmap, QPolygonF
-from PySide6.QtWidgets import QSizePolicy, QToolBar, QToolButton, QWidget
+from PySide6.QtWidgets import QMenuBar, QSizePolicy, QToolBar, QToolButton, QWidget
 
 from rhot_app.ui.language import tr
 
@@ -133,10 +133,13 @@ def shape_icon(shape: str, colour: str, ratio: float = 1.0) -> QIcon:
     return QIcon(picture)
 
 
-def show_overflow(bar: QToolBar, colour: str) -> None:
-    """Give a toolbar's own arrow, behind which stand the controls that do not fit, a colour that can be seen."""
-    arrow = bar.findChild(QToolButton, "qt_toolbar_ext_button")
-    if isinstance(arrow, QToolButton):
+_ARROWS = ("qt_toolbar_ext_button", "qt_menubar_ext_button")
+
+
+def show_overflow(bar: QToolBar | QMenuBar, colour: str) -> None:
+    """Give a bar's own arrow, behind which stand the controls that do not fit, a colour that can be seen."""
+    arrow = next((part for part in bar.findChildren(QToolButton) if part.objectName() in _ARROWS), None)
+    if arrow is not None:
         ratio = bar.devicePixelRatioF()
         picture = QPixmap(round(10 * ratio), round(16 * ratio))
         picture.setDevicePixelRatio(ratio)

@@ -71,8 +71,11 @@ def style_sheet(s: Scheme) -> str:
     #advicebar {{ border-top: 1px solid {s.border}; border-bottom: none; padding: 1px 0 0 0; }}
     QToolBar {{ background: {s.panel}; border: none; border-bottom: 1px solid {s.border}; padding: 4px 8px;
         spacing: 4px; }}
-    QToolBar #qt_toolbar_ext_button {{ padding: 0; border: none; }}
-    #controls {{ border: none; padding: 0; }}
+    QToolBar #qt_toolbar_ext_button, #qt_menubar_ext_button {{ padding: 0; border: none; }}
+    QMenuBar {{ background: transparent; border: none; }}
+    QMenuBar::item {{ background: transparent; padding: 6px 12px; border: 1px solid transparent; border-radius: 6px; }}
+    QMenuBar::item:selected {{ background: {s.raised}; }}
+    QMenuBar::item:pressed {{ background: {s.raised}; border-color: {s.border}; }}
     QToolBar QToolButton {{ padding: 6px 12px; border: 1px solid transparent; border-radius: 6px; }}
     QToolBar QToolButton:hover {{ background: {s.raised}; }}
     QToolBar QToolButton:pressed, QToolBar QToolButton:checked {{ background: {s.raised}; border-color: {s.border}; }}

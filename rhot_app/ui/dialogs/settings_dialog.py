@@ -93,7 +93,7 @@ class GeneralPage(QWidget):
         self.look_box.setToolTip(tr("Light text on dark ground, or the other way round. The View menu has it, too."))
         self._looks = (actions.named("dark"), actions.named("light"))
         for look in self._looks:
-            self.look_box.addItem(look.text())
+            self.look_box.addItem(title_of(look))
             look.toggled.connect(self._show_look)
         self.look_box.currentIndexChanged.connect(self._choose_look)
         self.language_box.setToolTip(tr("The language of the windows, from the next start on."))
@@ -265,7 +265,7 @@ class KeysPage(QWidget):
 
 def _switch(action: QAction) -> QCheckBox:
     """A box that is a menu's switch."""
-    box = QCheckBox(action.text())
+    box = QCheckBox(title_of(action))
     box.setToolTip(action.toolTip())
     box.setChecked(action.isChecked())
     box.toggled.connect(action.setChecked)

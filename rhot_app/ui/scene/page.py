@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QMenu, QToolBar, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QToolBar, QToolButton, QVBoxLayout, QWidget
 
+from rhot_app.ui.common.menu import Menu
 from rhot_app.ui.language import tr
 from rhot_app.ui.scene.view import SceneView
 
@@ -21,8 +22,7 @@ class SceneBar(QToolBar):
         self.uncertainty_button = QToolButton()
         self.uncertainty_button.setDefaultAction(uncertainty)
         self.uncertainty_button.setPopupMode(QToolButton.ToolButtonPopupMode.MenuButtonPopup)
-        menu = QMenu(self.uncertainty_button)
-        menu.setToolTipsVisible(True)
+        menu = Menu("", self.uncertainty_button)
         menu.addActions(kinds)
         self.uncertainty_button.setMenu(menu)
         self.addWidget(self.uncertainty_button)

@@ -44,7 +44,7 @@ def test_a_step_is_tested_without_a_window():
 def test_a_calibration_by_the_recipe_is_in_the_menu_and_works(bench):
     window = bench.window
     action = window.actions_.wizards[-1]
-    window.toolbar.calibrate_menu.aboutToShow.emit()
+    window.menus.calibrate.aboutToShow.emit()
     assert action.text() == "Toy …\tnot yet"
     action.trigger()
     bench.until(lambda: window.wizards.wizard is not None)
@@ -60,7 +60,7 @@ def test_a_calibration_by_the_recipe_is_in_the_menu_and_works(bench):
     hands.use()
     hands.next()
     bench.until(lambda: window.wizards.wizard is None)
-    window.toolbar.calibrate_menu.aboutToShow.emit()
+    window.menus.calibrate.aboutToShow.emit()
     assert action.text() == "Toy …\ttoday"
     assert load_rig(bench.backend.path).name == f"grey {level:.0f}"
     assert [one.replaced_by for one in rig_history.versions(bench.backend.path)] == [toy_calibration.TOY.reason]

@@ -52,7 +52,7 @@ def bench(make_bench, tmp_path, monkeypatch):
 def test_a_wizard_opens_over_the_window_and_its_age_stands_in_the_menu(bench):
     window = bench.window
     action = window.actions_.wizards[0]
-    window.toolbar.calibrate_menu.aboutToShow.emit()
+    window.menus.calibrate.aboutToShow.emit()
     assert action.text() == "Sample …\tnot yet"
     window.wizards.show_ages(window.actions_.wizards, "")
     assert action.text() == "Sample …", "no rig is open"
@@ -69,7 +69,7 @@ def test_a_wizard_opens_over_the_window_and_its_age_stands_in_the_menu(bench):
     wizard.until(lambda: wizard.window.step.state == "used")
     wizard.next()
     bench.until(lambda: window.wizards.wizard is None)
-    window.toolbar.calibrate_menu.aboutToShow.emit()
+    window.menus.calibrate.aboutToShow.emit()
     assert action.text() == "Sample …\ttoday"
     assert load_rig(bench.backend.path).name == "calibrated"
 
