@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import ctypes
+import logging
 import os
 import signal
 import sys
@@ -23,6 +24,11 @@ from rhot_node.terminal import add_examples, log_to_stderr
 
 if TYPE_CHECKING:
     from rhot_app.ui.common.controller import Controller
+
+log = logging.getLogger(__name__)
+
+LEAVE_S = 15.0
+"""How long the end of the app waits for work that it has cancelled: a question to a node takes ten at most."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -129,7 +135,21 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     left_running = controller.shut_down()
     if left_running:
         print(left_running)
-    return int(code)
+    return leave(int(code))
+
+
+def leave(code: int, timeout_s: float = LEAVE_S) -> int:
+    """End the work under way and give back `code`. Work that cannot be cancelled, such as a compiler's, ends with the
+    process, here: the interpreter's own end would wait for its thread."""
+    from rhot_app.ui.common.job import end_jobs
+
+    stuck = end_jobs(timeout_s)
+    if stuck:
+        log.warning("still at work when the app ended: %s", ", ".join(stuck))
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
 
 
 COMPILATION_MS = 500

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker, Listener
+from rhot_app.ui.backend.reader import END_S, Reader
 from rhot_app.ui.language import tr
 from rhot_node.errors import PictureError
 from rhot_node.pictures import decode_picture
@@ -47,11 +48,12 @@ class Picture:
     received_ns: int
 
 
-class LiveFeed:
-    """Newest pictures of some cameras. `start` and `stop` once each; everything else from any thread."""
+class LiveFeed(Reader):
+    """Newest pictures of some cameras, from any thread."""
 
     def __init__(self, cameras: Mapping[str, int], connect: Callable[[], Asker], rate_hz: float = RATE_HZ) -> None:
         """`cameras` are node ids by name; `connect` makes an asker for each thread."""
+        super().__init__("pictures for a window", runs=[(name,) for name in cameras for _ in range(_IN_FLIGHT)])
         self.cameras = tuple(cameras)
         self._node_ids = dict(cameras)
         self._connect = connect
@@ -60,28 +62,14 @@ class LiveFeed:
         self._pictures: dict[str, deque[Picture]] = {name: deque(maxlen=_KEPT) for name in cameras}
         self._due_s = dict.fromkeys(cameras, 0.0)
         self._problems = dict.fromkeys(cameras, "")
-        self._ending = threading.Event()
         self._resumed = threading.Event()
         self._resumed.set()
-        self._threads: list[threading.Thread] = []
 
-    def start(self) -> LiveFeed:
-        """Begin to ask; returns itself."""
-        for name in self.cameras:
-            for number in range(_IN_FLIGHT):
-                thread = threading.Thread(target=self._run, args=(name,), name=f"pictures of {name} {number}",
-                                          daemon=True)
-                thread.start()
-                self._threads.append(thread)
-        return self
-
-    def stop(self, timeout_s: float = 4.0) -> None:
-        """End the threads; a question under way is waited for, at most `timeout_s` in all."""
+    def stop(self, timeout_s: float = END_S) -> bool:
+        """End for good, from a pause, too."""
         self._ending.set()
         self._resumed.set()
-        end = time.monotonic() + timeout_s
-        for thread in self._threads:
-            thread.join(max(0.0, end - time.monotonic()))
+        return super().stop(timeout_s)
 
     def pause(self, paused: bool) -> None:
         """Ask for nothing while nobody looks."""
@@ -175,28 +163,15 @@ _PERIOD_S = 0.02
 _AGAIN_S = 0.5
 
 
-class StateFeed:
-    """`start` may be called again; `stop` ends it for good. Everything else from any thread."""
+class StateFeed(Reader):
+    """Hears the engine's states and keeps the last ones, for any thread."""
 
     def __init__(self, listen: Callable[[], Listener], clock: Callable[[], float] = time.monotonic) -> None:
         """`listen` makes the client, in the feed's own thread; `clock` gives seconds."""
+        super().__init__("states for a window")
         self._listen, self._clock = listen, clock
         self._states: deque[tuple[float, HandState]] = deque()
         self._lock = threading.Lock()
-        self._ending = threading.Event()
-        self._thread: threading.Thread | None = None
-
-    def start(self) -> None:
-        """Begin to listen, unless it does already."""
-        if self._thread is None and not self._ending.is_set():
-            self._thread = threading.Thread(target=self._run, name="states for a wizard", daemon=True)
-            self._thread.start()
-
-    def stop(self, timeout_s: float = 2.0) -> None:
-        """End the thread."""
-        self._ending.set()
-        if self._thread is not None:
-            self._thread.join(timeout_s)
 
     def recent(self, seconds: float = KEPT_S) -> list[HandState]:
         """The states that came within the last seconds, oldest first."""

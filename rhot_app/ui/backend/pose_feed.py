@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections import deque
@@ -11,11 +12,11 @@ from rhot_app.errors import RhotError
 from rhot_app.objects.pose import Validity
 from rhot_app.sources.poses.open_source import open_source
 from rhot_app.sources.poses.source import ForeignPose, PoseSource
+from rhot_app.ui.backend.reader import Reader
 
 KEPT_NS = 60_000_000_000
 RATE_NS = 2_000_000_000
 _PERIOD_S = 0.004
-_END_S = 4.0
 
 Open = Callable[[str, str], PoseSource]
 
@@ -24,37 +25,34 @@ class PoseFeed:
     """One source at a time; another `open` ends the one before. Everything from any thread."""
 
     def __init__(self, open_: Open = open_source) -> None:
-        self._open = open_
+        self.open_source = open_
         self._lock = threading.Lock()
         self._poses: deque[ForeignPose] = deque()
         self._came_ns: deque[int] = deque()
-        self._ending = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._source: _Source | None = None
         self._name = self._notice = ""
 
     def open(self, name: str, tracker: str) -> None:
         """Begin to listen to a source (`open_source`), returning at once. What is wrong with it becomes the notice."""
-        self._ending.set()
-        before, self._ending = self._thread, threading.Event()
+        before = self._source
+        if before is not None:
+            before.stop(0.0)
         with self._lock:
             self._poses.clear()
             self._came_ns.clear()
             self._name, self._notice = name, ""
-        self._thread = threading.Thread(target=self._run, args=(name, tracker, self._ending, before),
-                                        name="poses for a wizard", daemon=True)
-        self._thread.start()
+        self._source = _Source(self, name, tracker, before).start()
 
     def stop(self) -> None:
         """End the source, which takes some seconds at most."""
-        self._ending.set()
-        if self._thread is not None:
-            self._thread.join(_END_S)
-            self._thread = None
+        if self._source is not None:
+            self._source.stop()
+            self._source = None
 
     @property
     def opened(self) -> bool:
         """Whether a source was opened."""
-        return self._thread is not None
+        return self._source is not None
 
     @property
     def name(self) -> str:
@@ -93,24 +91,35 @@ class PoseFeed:
                 self._poses.popleft()
                 self._came_ns.popleft()
 
-    def _run(self, name: str, tracker: str, ending: threading.Event, before: threading.Thread | None) -> None:
-        if before is not None:
-            before.join(_END_S)  # it may have the port that is opened now
+    def say(self, name: str, notice: str) -> None:
+        """What is listened to, and what is wrong with it."""
+        with self._lock:
+            self._name, self._notice = name, notice
+
+
+class _Source(Reader):
+    """Listens to one source for `feed`, once the one `before` has ended, which may have the same port."""
+
+    def __init__(self, feed: PoseFeed, name: str, tracker: str, before: _Source | None) -> None:
+        super().__init__("poses for a window")
+        self._feed, self._source_name, self._tracker, self._before = feed, name, tracker, before
+
+    def _run(self) -> None:
+        if self._before is not None:
+            self._before.stop()
+            self._before = None
         try:
-            source = self._open(name, tracker)
+            source = self._feed.open_source(self._source_name, self._tracker)
         except RhotError as exc:
-            with self._lock:
-                self._notice = str(exc)
+            if not self._ending.is_set():
+                self._feed.say(self._source_name, str(exc))
             return
-        try:
-            while not ending.wait(_PERIOD_S):
+        with contextlib.closing(source):
+            while not self._ending.wait(_PERIOD_S):
                 poses = source.poll()
-                if ending.is_set():
+                if self._ending.is_set():
                     return
-                self.add(poses)
-                with self._lock:
-                    self._name, self._notice = source.name, source.notice
+                self._feed.add(poses)
+                self._feed.say(source.name, source.notice)
                 if source.ended:
                     return
-        finally:
-            source.close()

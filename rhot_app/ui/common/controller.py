@@ -64,9 +64,10 @@ class EngineLink(QObject):
         self._jobs.append(Job(lambda progress: ask(), done, failed or self._failed, None, self).start())
 
     def wait(self, timeout_s: float) -> None:
-        """Let what is under way come to its end, each at most `timeout_s`."""
+        """Let what is under way come to its end, at most `timeout_s` in all."""
+        end_s = time.monotonic() + timeout_s
         for job in self._jobs:
-            job.wait(timeout_s)
+            job.wait(max(0.0, end_s - time.monotonic()))
 
 
 # -- The controller ----------------------------------------------------------------------------------------------------

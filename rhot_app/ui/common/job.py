@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import itertools
 import logging
-import queue
 import threading
+import time
 from collections.abc import Callable
 from typing import Any, ClassVar
 
-from PySide6.QtCore import QObject, Qt, Signal, SignalInstance
+from PySide6.QtCore import QObject, Qt, QThreadPool, Signal
 
 from rhot_app.errors import RhotError
 from rhot_app.ui.language import tr
@@ -18,36 +19,35 @@ from rhot_node.errors import NodeError
 
 log = logging.getLogger(__name__)
 
+THREADS = 6
+
 
 class CancelledError(RhotError):
     """The job was cancelled by the person at the screen."""
 
 
-class Workers:
-    """A few threads that wait for work. Made before the window gives way (`app.give_way`): on Linux each thread
-    has a niceness of its own and hands it down, and the engine that a job starts must not be as nice as the window."""
-
-    def __init__(self, count: int = 6) -> None:
-        self._waiting: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-        for number in range(count):
-            threading.Thread(target=self._run, name=f"worker {number}", daemon=True).start()
-
-    def submit(self, work: Callable[[], None]) -> None:
-        """Have the next free thread do `work`."""
-        self._waiting.put(work)
-
-    def _run(self) -> None:
-        while True:
-            try:
-                self._waiting.get()()
-            except Exception:
-                log.exception("a job failed")
-
-
 @functools.cache
-def workers() -> Workers:
-    """The app's own threads, made at the first call."""
-    return Workers()
+def workers() -> QThreadPool:
+    """The app's own threads, made at the first call, before the window gives way (`app.give_way`): on Linux each thread
+    has a niceness of its own and hands it down, and the engine that a job starts must not be as nice as the window."""
+    pool = QThreadPool()
+    pool.setMaxThreadCount(THREADS)
+    pool.setExpiryTimeout(-1)
+    together = threading.Barrier(THREADS + 1)
+    for _ in range(THREADS):
+        pool.start(together.wait)
+    together.wait()
+    return pool
+
+
+def end_jobs(timeout_s: float) -> list[str]:
+    """Cancel everything under way and wait for it, at most `timeout_s` in all; what has not ended, by its work's name.
+    Nothing is heard of any of it."""
+    jobs = Job.under_way()
+    for job in jobs:
+        job.cancel()
+    end_s = time.monotonic() + timeout_s
+    return [job.name for job in jobs if not job.wait(max(0.0, end_s - time.monotonic()))]
 
 
 class Progress:
@@ -73,36 +73,52 @@ class Progress:
         self._cancelled.set()
 
 
-class Job(QObject):
+class _Post(QObject):
+    """Brings what workers say to the window's thread. It outlives every job, so no worker speaks to what is deleted."""
+
+    said = Signal(int, str, object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.said.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
+
+    def _deliver(self, number: int, event: str, value: Any) -> None:
+        job = Job._jobs.get(number)
+        if job is not None:
+            job._hear(event, value)
+
+
+class Job:
     """Runs `op(progress)` in a worker's thread; `done(result)` or `failed(sentence)` follow in the window's thread.
 
-    Exactly one of the two is called, except after `cancel`: then neither is. An error that is not one of ours is
-    shown as a sentence too, with its kind, and logged whole.
+    Exactly one of the two is called, except after `cancel` or the end of `parent`, which cancels: then neither is. An
+    error that is not one of ours is shown as a sentence too, with its kind, and logged whole.
     """
 
-    _reported = Signal(str, float)
-    _finished = Signal(object)
-    _broke = Signal(str)
-    _stopped = Signal()
-    _under_way: ClassVar[dict[int, Job]] = {}  # a job lives until its last word has been heard, or its parent ends
+    _jobs: ClassVar[dict[int, Job]] = {}  # a job lives until its last word has been heard
+    _numbers = itertools.count()
 
     def __init__(self, op: Callable[[Progress], Any], done: Callable[[Any], None], failed: Callable[[str], None],
                  progress: Callable[[str, float], None] | None = None, parent: QObject | None = None) -> None:
-        super().__init__(parent)
         self._op, self._done, self._failed, self._show = op, done, failed, progress
-        self.progress = Progress(lambda text, fraction: _emit(self._reported, text, fraction))
-        queued = Qt.ConnectionType.QueuedConnection
-        self._finished.connect(self._on_done, queued)
-        self._broke.connect(self._on_failed, queued)
-        self._reported.connect(self._on_progress, queued)
-        self._stopped.connect(self._on_stopped, queued)
-        self.destroyed.connect(functools.partial(_forget, id(self)))
+        self._number = next(Job._numbers)
+        self._guard = None if parent is None else QObject(parent)  # is deleted with the parent
         self._ended = threading.Event()
+        self.name = getattr(op, "__qualname__", repr(op))
+        self.progress = Progress(lambda text, fraction: self._say("progress", (text, fraction)))
+
+    @classmethod
+    def under_way(cls) -> list[Job]:
+        """What has not ended yet, or was not heard of yet."""
+        return list(cls._jobs.values())
 
     def start(self) -> Job:
         """Begin; returns itself."""
-        Job._under_way[id(self)] = self
-        workers().submit(self._run)
+        _post()  # made in the window's thread
+        Job._jobs[self._number] = self
+        if self._guard is not None:
+            self._guard.destroyed.connect(functools.partial(_abandon, self._number))
+        workers().start(self._run)
         return self
 
     def cancel(self) -> None:
@@ -119,44 +135,54 @@ class Job(QObject):
         return not self._ended.is_set()
 
     def _run(self) -> None:
+        event, value = "cancelled", None
         try:
-            result = self._op(self.progress)
+            if not self.progress.cancelled:  # it may have waited for a free thread
+                event, value = "done", self._op(self.progress)
         except CancelledError:
-            return
+            pass
         except (RhotError, NodeError, OSError) as exc:
-            _emit(self._broke, str(exc))
-        except Exception as exc:
-            _emit(self._broke,
-                  tr("The program made a mistake ({name}: {exc}). Please report it.", name=type(exc).__name__, exc=exc))
-            raise
-        else:
-            _emit(self._finished, result)
+            event, value = "failed", str(exc)
+        except BaseException as exc:  # also what asks a program to end: it would end a thread of the pool, unheard
+            log.exception("a job failed")
+            event, value = "failed", tr("The program made a mistake ({name}: {exc}). Please report it.",
+                                        name=type(exc).__name__, exc=exc)
         finally:
             self._ended.set()
-            _emit(self._stopped)
+            self._say(event, value)
 
-    def _on_stopped(self) -> None:
-        _forget(id(self))
-        self.deleteLater()  # or its parent would keep every job that it ever had
+    def _say(self, event: str, value: object) -> None:
+        with contextlib.suppress(RuntimeError):  # Qt itself has ended
+            _post().said.emit(self._number, event, value)
 
-    def _on_done(self, result: Any) -> None:
-        if not self.progress.cancelled:
-            self._done(result)
+    def _hear(self, event: str, value: Any) -> None:
+        """In the window's thread."""
+        if event != "progress":
+            Job._jobs.pop(self._number, None)
+            if self._guard is not None:
+                self._guard.deleteLater()
+        if self.progress.cancelled or event == "cancelled":
+            return
+        if event == "done":
+            self._done(value)
+        elif event == "failed":
+            self._failed(value)
+        elif self._show is not None:
+            self._show(*value)
 
-    def _on_failed(self, sentence: str) -> None:
-        if not self.progress.cancelled:
-            self._failed(sentence)
 
-    def _on_progress(self, text: str, fraction: float) -> None:
-        if self._show is not None and not self.progress.cancelled:
-            self._show(text, fraction)
+@functools.cache
+def _post() -> _Post:
+    return _Post()
 
 
-def _forget(number: int, _deleted: QObject | None = None) -> None:
-    Job._under_way.pop(number, None)
+def _abandon(number: int, _deleted: QObject | None = None) -> None:
+    """The owner has ended: nothing of it is kept, and `op` is asked to stop."""
+    job = Job._jobs.pop(number, None)
+    if job is not None:
+        job.cancel()
+        job._done = job._failed = job._show = _nothing
 
 
-def _emit(signal: SignalInstance, *values: object) -> None:
-    """Tell the window's thread, unless the window is gone and Qt has deleted the job with it."""
-    with contextlib.suppress(RuntimeError):
-        signal.emit(*values)
+def _nothing(*_: object) -> None:
+    """Instead of what belonged to a window that is gone."""

@@ -4,7 +4,6 @@ wizards of what else the engine finds while it tracks are made of the same parts
 from __future__ import annotations
 
 import contextlib
-import threading
 import time
 from collections.abc import Callable
 
@@ -14,6 +13,7 @@ from rhot_app.calibration.tracked_results import Answer, propose_poses, verdict_
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
 from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.reader import Reader
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
 from rhot_app.ui.wizards.framework.page import Page
 from rhot_app.ui.wizards.models.step import Step, StepView
@@ -53,27 +53,14 @@ class MovePage(Page):
         self._feed.start()
 
 
-class EngineFeed:
-    """Asks the engine one `command` again and again. A thread; `start` may be called again, `stop` ends it for good."""
+class EngineFeed(Reader):
+    """Asks the engine one `command` again and again."""
 
     def __init__(self, connect: Callable[[], Asker], command: str, period_s: float = ASK_S) -> None:
+        super().__init__(f"asking for {command}")
         self._connect, self._command, self._period_s = connect, command, period_s
-        self._ending = threading.Event()
-        self._thread: threading.Thread | None = None
         self.answer: Answer = {"known": False}
         self.problem = ""
-
-    def start(self) -> None:
-        """Begin to ask, unless it does already."""
-        if self._thread is None and not self._ending.is_set():
-            self._thread = threading.Thread(target=self._run, name=f"asking for {self._command}", daemon=True)
-            self._thread.start()
-
-    def stop(self, timeout_s: float = 2.0) -> None:
-        """End the thread."""
-        self._ending.set()
-        if self._thread is not None:
-            self._thread.join(timeout_s)
 
     def step(self, asker: Asker) -> None:
         """Ask once; a failure becomes the problem."""

@@ -17,7 +17,8 @@ from wizard_rig import FakeRigAsker
 
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.app import NICENESS as WINDOW_NICENESS
-from rhot_app.ui.backend.feed import LiveFeed
+from rhot_app.ui.backend.feed import LiveFeed, StateFeed
+from rhot_app.ui.backend.reader import Reader
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.backend.solver_process import NICENESS as SOLVER_NICENESS
 from rhot_app.ui.wizards.framework.work import PictureWorker
@@ -108,6 +109,47 @@ def test_a_stopped_feed_closes_its_connections(asker):
     eventually(lambda: feed.newest("left") is not None)
     feed.stop()
     assert asker.closed == 2
+
+
+class Stubborn(Reader):
+    """Reads from what does not answer."""
+
+    def __init__(self) -> None:
+        super().__init__("stubborn", runs=[(1,), (2,), (3,)])
+        self.begun: list[int] = []
+        self.answer = threading.Event()
+
+    def _run(self, number: int) -> None:
+        self.begun.append(number)
+        self.answer.wait(60.0)
+
+
+def test_the_end_of_a_reader_is_bounded_and_final():
+    reader = Stubborn()
+    assert reader.start() is reader.start()
+    eventually(lambda: sorted(reader.begun) == [1, 2, 3])
+    begin = time.monotonic()
+    assert not reader.stop(0.2)
+    assert time.monotonic() - begin < 20.0, "the three share the time"
+    reader.answer.set()
+    assert reader.stop()
+    reader.start()
+    assert settled(lambda: len(reader.begun) == 3, 0.1)
+
+
+def test_a_paused_feed_ends_at_once(feed):
+    feed.pause(True)
+    assert feed.stop()
+
+
+def test_a_mistake_in_a_reader_is_logged(caplog):
+    def connect():
+        raise ValueError("no context")
+
+    feed = StateFeed(connect).start()
+    eventually(lambda: "no context" in caplog.text)
+    assert "states for a window" in caplog.text and feed.recent() == []
+    assert feed.stop()
 
 
 def test_the_worker_gives_each_finding_once_and_only_to_its_step(feed):

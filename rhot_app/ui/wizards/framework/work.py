@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, Signal
 
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.backend.feed import LiveFeed, Picture
+from rhot_app.ui.backend.reader import Reader
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
 from rhot_app.ui.models.words import Remaining
@@ -124,29 +125,17 @@ log = logging.getLogger(__name__)
 _IDLE_S = 0.01
 
 
-class PictureWorker:
+class PictureWorker(Reader):
     """Looks for one step at a time; `found` gives each finding once. Every look has a new picture of every camera: who
     judges whether something moved must not see the same picture twice."""
 
     def __init__(self, feed: LiveFeed) -> None:
+        super().__init__("looking at pictures")
         self._feed = feed
         self._lock = threading.Lock()
         self._step: Step | None = None
         self._found: tuple[Step, Any] | None = None
         self._looked_at: dict[str, Picture] = {}
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="wizard pictures", daemon=True)
-
-    def start(self) -> PictureWorker:
-        """Begin; returns itself."""
-        self._thread.start()
-        return self
-
-    def stop(self, timeout_s: float = 4.0) -> None:
-        """End the thread after the look at hand."""
-        self._ending.set()
-        if self._thread.is_alive():
-            self._thread.join(timeout_s)
 
     def watch(self, step: Step | None) -> None:
         """Look for `step` from now on; None rests. What was found for another step is forgotten."""
