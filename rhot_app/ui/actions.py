@@ -23,6 +23,7 @@ CLOUD_KINDS = (
     ("markers", tr_noop("of markers"), tr_noop("Of the markers, as far as they are not the fingertips drawn already.")))
 """Whose uncertainty can be drawn: name in the settings, title, meaning."""
 
+_ICON_PX = 24  # wide, with some air between the sign and the word
 _SOURCE_PX = 220  # of a long file's name no more is shown, so that the window's word stays in sight
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _START_WORDS = tr_noop("Start"), tr_noop("Stop")  # idle, at work
@@ -212,7 +213,7 @@ class MainToolBar(QToolBar):
         self.setMovable(False)
         self.setFloatable(False)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        self.setIconSize(QSize(24, 18))
+        self.setIconSize(QSize(_ICON_PX, 18))
         self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self._changing = (actions.start, actions.record)
         self.addActions(self._changing)
@@ -253,12 +254,11 @@ class MainToolBar(QToolBar):
 
     def set_scheme(self, actions: Actions, scheme: Scheme, *, running: bool, recording: bool) -> None:
         """Words and icons of the two buttons that change."""
-        ratio = self.devicePixelRatioF()
         self._fix_widths(scheme)
         actions.start.setText(tr(_START_WORDS[running]))
-        actions.start.setIcon(shape_icon("stop" if running else "play", scheme.accent, ratio))
+        actions.start.setIcon(shape_icon("stop" if running else "play", scheme.accent, width=_ICON_PX))
         actions.record.setText(tr(_RECORD_WORDS[recording]))
-        actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault, ratio))
+        actions.record.setIcon(shape_icon("stop" if recording else "disc", scheme.fault, width=_ICON_PX))
         show_overflow(self.menus, scheme.text)
         self.badge.set_scheme(scheme)
         self.source_label.setStyleSheet(f"color: {scheme.accent}; font-weight: 700;")
@@ -267,7 +267,7 @@ class MainToolBar(QToolBar):
         """A button whose word changes is as wide as its longest, or the menus would move under the mouse."""
         for action, words in zip(self._changing, (_START_WORDS, _RECORD_WORDS), strict=True):
             button = self.widgetForAction(action)
-            action.setIcon(shape_icon("stop", scheme.accent, self.devicePixelRatioF()))
+            action.setIcon(shape_icon("stop", scheme.accent, width=_ICON_PX))
             widths = []
             for word in words:
                 action.setText(tr(word))

@@ -137,7 +137,7 @@ def style_sheet(s: Scheme) -> str:
     QCheckBox::indicator, QListView::indicator {{ width: 12px; height: 12px; border: 2px solid {s.muted};
         border-radius: 3px; background: {s.panel}; }}
     QCheckBox::indicator:checked, QListView::indicator:checked {{ border-color: {s.text};
-        image: url("{resource_path('icons', 'tick.svg').as_posix()}"); }}
+        image: url("{resource_path('icons', 'checked.svg').as_posix()}"); }}
     QCheckBox::indicator:disabled {{ border-color: {s.border}; }}
     QProgressBar {{ border: 1px solid {s.border}; border-radius: 4px; background: {s.panel}; height: 8px; }}
     QProgressBar::chunk {{ background: {s.accent}; border-radius: 3px; }}

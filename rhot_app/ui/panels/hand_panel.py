@@ -261,7 +261,7 @@ class HandChoice(QWidget):
             look = condition_look((hands[k].condition if k < len(hands) else Condition.IDLE).value)
             if look != self._looks[k]:
                 self._looks[k] = look
-                button.setIcon(shape_icon(look.shape, self._scheme.tone(look.tone), self.devicePixelRatioF()))
+                button.setIcon(shape_icon(look.shape, self._scheme.tone(look.tone)))
                 button.setToolTip(tr("Show the {hand}'s angles. It is {word}.", hand=button.text(), word=tr(look.word)))
 
     def chosen(self, state: HandState | None) -> HandState | None:

@@ -8,14 +8,13 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSplitter, QVBoxLayout, QWidget
 
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.state import Condition, HandState
 from rhot_app.ui.common.scrolled import scrolled
 from rhot_app.ui.common.settings import Settings
-from rhot_app.ui.common.shapes import shape_pixmap
+from rhot_app.ui.common.shapes import shape_icon
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme, visible_on
@@ -286,9 +285,8 @@ class Transport(QWidget):
     def set_scheme(self, scheme: Scheme) -> None:
         """Change colours."""
         self._scheme = scheme
-        ratio = self.devicePixelRatioF()
         for button, shape in self._signs:
-            button.setIcon(QIcon(shape_pixmap(shape, scheme.text, _ICON_PX, ratio)))
+            button.setIcon(shape_icon(shape, scheme.text, _ICON_PX))
         self._playing = None
 
     @property
@@ -303,5 +301,4 @@ class Transport(QWidget):
         self.loop_clear_button.setEnabled(player.loop is not None)
         if player.playing != self._playing:
             self._playing = player.playing
-            self.play_button.setIcon(QIcon(shape_pixmap("pause" if player.playing else "play", self._scheme.text,
-                                                        _ICON_PX, self.devicePixelRatioF())))
+            self.play_button.setIcon(shape_icon("pause" if player.playing else "play", self._scheme.text, _ICON_PX))

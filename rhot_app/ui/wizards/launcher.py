@@ -78,11 +78,11 @@ class Launcher(QObject):
                 action.setText(f"{wizard.title} …")
             return
         when = self.in_force(path)
-        scheme, ratio = self._scheme(), self._window.devicePixelRatioF()
+        scheme = self._scheme()
         for action, wizard in zip(actions, WIZARDS, strict=True):
             done = max((at for reason, at in when.items() if reason.startswith(wizard.reason)), default=None)
             shape, tone = ("tick", scheme.good) if done is not None else ("ring", scheme.neutral)
-            action.setIcon(shape_icon(shape, tone, ratio))
+            action.setIcon(shape_icon(shape, tone))
             action.setText(f"{wizard.title} …\t{age_text(done) if done is not None else 'not yet'}")
 
     def in_force(self, path: str) -> dict[str, datetime]:
