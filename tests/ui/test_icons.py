@@ -1,4 +1,4 @@
-"""The drawings of the icons: there are no others, they have the colours of the scheme, and are sharp on every screen."""
+"""The drawings of the icons: all there are, in the colours of the scheme, and sharp on every screen."""
 
 from __future__ import annotations
 

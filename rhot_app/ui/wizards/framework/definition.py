@@ -61,7 +61,7 @@ class Definition:
     pages: tuple[Page, ...]
     guide: str = "calibration"
     solver: str = ""
-    put_back: Callable[[], None] | None = None
+    put_back: Callable[[], object] | None = None
 
 
 def accept_page(context: WizardContext, propose: Callable[[], Proposal | None],
