@@ -53,7 +53,7 @@ class LiveFeed(Reader):
 
     def __init__(self, cameras: Mapping[str, int], connect: Callable[[], Asker], rate_hz: float = RATE_HZ) -> None:
         """`cameras` are node ids by name; `connect` makes an asker for each thread."""
-        super().__init__("pictures for a window", runs=[(name,) for name in cameras for _ in range(_IN_FLIGHT)])
+        super().__init__([(name,) for name in cameras for _ in range(_IN_FLIGHT)])
         self.cameras = tuple(cameras)
         self._node_ids = dict(cameras)
         self._connect = connect
@@ -168,7 +168,7 @@ class StateFeed(Reader):
 
     def __init__(self, listen: Callable[[], Listener], clock: Callable[[], float] = time.monotonic) -> None:
         """`listen` makes the client, in the feed's own thread; `clock` gives seconds."""
-        super().__init__("states for a window")
+        super().__init__()
         self._listen, self._clock = listen, clock
         self._states: deque[tuple[float, HandState]] = deque()
         self._lock = threading.Lock()

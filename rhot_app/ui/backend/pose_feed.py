@@ -101,7 +101,7 @@ class _Source(Reader):
     """Listens to one source for `feed`, once the one `before` has ended, which may have the same port."""
 
     def __init__(self, feed: PoseFeed, name: str, tracker: str, before: _Source | None) -> None:
-        super().__init__("poses for a window")
+        super().__init__()
         self._feed, self._source_name, self._tracker, self._before = feed, name, tracker, before
 
     def _run(self) -> None:

@@ -19,16 +19,16 @@ END_S = 4.0
 class Reader:
     """A subclass has `_run`, which returns soon once `_ending` is set. A mistake in it ends it and is logged."""
 
-    def __init__(self, name: str, *, runs: Sequence[tuple[Any, ...]] = ((),)) -> None:
+    def __init__(self, runs: Sequence[tuple[Any, ...]] = ((),)) -> None:
         """`runs`: the arguments of `_run` for each thread."""
-        self._name, self._runs = name, runs
+        self._runs = runs
         self._ending = threading.Event()
         self._threads: list[threading.Thread] = []
 
     def start(self) -> Self:
         """Begin, unless it has begun or was stopped; returns itself."""
         if not self._threads and not self._ending.is_set():
-            self._threads = [threading.Thread(target=self._guarded, args=one, name=self._name, daemon=True)
+            self._threads = [threading.Thread(target=self._guarded, args=one, name=type(self).__name__, daemon=True)
                              for one in self._runs]
             for thread in self._threads:
                 thread.start()
@@ -49,4 +49,4 @@ class Reader:
         try:
             self._run(*args)
         except Exception:
-            log.exception("%s: the thread ended", self._name)
+            log.exception("%s: the thread ended", type(self).__name__)

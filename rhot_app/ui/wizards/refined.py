@@ -57,7 +57,7 @@ class EngineFeed(Reader):
     """Asks the engine one `command` again and again."""
 
     def __init__(self, connect: Callable[[], Asker], command: str, period_s: float = ASK_S) -> None:
-        super().__init__(f"asking for {command}")
+        super().__init__()
         self._connect, self._command, self._period_s = connect, command, period_s
         self.answer: Answer = {"known": False}
         self.problem = ""

@@ -115,7 +115,7 @@ class Stubborn(Reader):
     """Reads from what does not answer."""
 
     def __init__(self) -> None:
-        super().__init__("stubborn", runs=[(1,), (2,), (3,)])
+        super().__init__([(1,), (2,), (3,)])
         self.begun: list[int] = []
         self.answer = threading.Event()
 
@@ -148,7 +148,7 @@ def test_a_mistake_in_a_reader_is_logged(caplog):
 
     feed = StateFeed(connect).start()
     eventually(lambda: "no context" in caplog.text)
-    assert "states for a window" in caplog.text and feed.recent() == []
+    assert "StateFeed" in caplog.text and feed.recent() == []
     assert feed.stop()
 
 

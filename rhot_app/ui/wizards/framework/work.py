@@ -130,7 +130,7 @@ class PictureWorker(Reader):
     judges whether something moved must not see the same picture twice."""
 
     def __init__(self, feed: LiveFeed) -> None:
-        super().__init__("looking at pictures")
+        super().__init__()
         self._feed = feed
         self._lock = threading.Lock()
         self._step: Step | None = None
