@@ -100,7 +100,8 @@ class GeneralPage(QWidget):
         for code, name in (("system", tr("As the desktop")), *LANGUAGES.items()):
             self.language_box.addItem(name, code)
         self.language_box.currentIndexChanged.connect(self._choose_language)
-        self.language_note = QLabel()
+        self.language_note = QLabel(tr("From the next start on."))
+        self.language_note.hide()
         speaks = QHBoxLayout()
         speaks.addWidget(self.language_box, 1)
         speaks.addWidget(self.language_note)
@@ -149,8 +150,7 @@ class GeneralPage(QWidget):
 
     def _choose_language(self) -> None:
         self._settings.language = self.language_box.currentData()
-        changes = language_of(self._settings.language) != language()
-        self.language_note.setText(tr("From the next start on.") if changes else "")
+        self.language_note.setVisible(language_of(self._settings.language) != language())
 
     def _choose_start(self) -> None:
         self._settings.start = self.start_box.currentData()
