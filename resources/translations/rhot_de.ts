@@ -4739,5 +4739,265 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <source>dd MMM yyyy, HH:mm</source>
         <translation>dd. MMM yyyy, HH:mm</translation>
     </message>
+    <message>
+        <source>Node {name} uses another marker set than the rig; give both the same marker file.</source>
+        <translation>Knoten {name} benutzt einen anderen Markersatz als das Rig; beiden dieselbe Markerdatei geben.</translation>
+    </message>
+    <message>
+        <source>Node {name} sends landmarks of a hand, but no marker of the rig is one. Give the rig the marker set landmarks21, or the node another detector.</source>
+        <translation>Knoten {name} sendet Landmarken einer Hand, aber kein Marker des Rigs ist eine. Dem Rig den Markersatz landmarks21 geben oder dem Knoten einen anderen Detektor.</translation>
+    </message>
+    <message>
+        <source>Node {name} sends images of {size} px, but the rig&apos;s intrinsics are for {expected} px; set the node&apos;s camera or calibrate it for this size.</source>
+        <translation>Knoten {name} sendet Bilder von {size} px, aber die Intrinsik des Rigs gilt für {expected} px; die Kamera des Knotens einstellen oder sie für diese Größe kalibrieren.</translation>
+    </message>
+    <message>
+        <source>Node {name} sends frames with impossible times; its clock may have been set. If this does not end, restart the node.</source>
+        <translation>Knoten {name} sendet Bilder mit unmöglichen Zeiten; vielleicht wurde seine Uhr gestellt. Hört das nicht auf, den Knoten neu starten.</translation>
+    </message>
+    <message>
+        <source>Another node sends to the port of {name}; check the node ids and data ports.</source>
+        <translation>Ein anderer Knoten sendet an den Port von {name}; Knoten-IDs und Datenports prüfen.</translation>
+    </message>
+    <message>
+        <source>Node {name} speaks another version of the wire; install the same version here and there.</source>
+        <translation>Knoten {name} spricht eine andere Version des Protokolls; hier und dort dieselbe Version installieren.</translation>
+    </message>
+    <message>
+        <source>Datagrams that are not tagged with the key of node {name} are refused at its port: somebody sends in its place.</source>
+        <translation>Datagramme ohne den Schlüssel des Knotens {name} werden an seinem Port abgelehnt: Jemand sendet an seiner Stelle.</translation>
+    </message>
+    <message>
+        <source>Datagrams without a tag are refused at the port of node {name}: somebody sends in its place, or the node was made open after it was paired.</source>
+        <translation>Datagramme ohne Signatur werden am Port des Knotens {name} abgelehnt: Jemand sendet an seiner Stelle, oder der Knoten wurde nach dem Koppeln geöffnet.</translation>
+    </message>
+    <message>
+        <source>An observation kind failed over datagrams of node {name}. The log has its exception; remove the plug-in that adds it, or report this.</source>
+        <translation>Eine Beobachtungsart scheiterte an Datagrammen des Knotens {name}. Das Protokoll enthält ihre Ausnahme; das Plug-in entfernen, das sie hinzufügt, oder dies melden.</translation>
+    </message>
+    <message>
+        <source>Node {name} jumped in its sequence numbers; if this does not end, restart the node.</source>
+        <translation>Knoten {name} sprang in seinen Folgenummern; hört das nicht auf, den Knoten neu starten.</translation>
+    </message>
+    <message>
+        <source>The kernel drops datagrams of node {name}: this computer is too busy to read them. Close other programs, or allow a larger buffer with `sudo sysctl -w net.core.rmem_max=8388608`.</source>
+        <translation>Der Kernel verwirft Datagramme des Knotens {name}: Dieser Rechner ist zu ausgelastet, um sie zu lesen. Andere Programme schließen oder mit `sudo sysctl -w net.core.rmem_max=8388608` einen größeren Puffer erlauben.</translation>
+    </message>
+    <message>
+        <source>Frames of node {name} on this computer come too late to be used. {busy}</source>
+        <translation>Bilder des Knotens {name} auf diesem Rechner kommen zu spät, um genutzt zu werden. {busy}</translation>
+    </message>
+    <message>
+        <source>This computer is too busy: close other programs, or lower the frame rate.</source>
+        <translation>Dieser Rechner ist zu ausgelastet: andere Programme schließen oder weniger Bilder pro Sekunde aufnehmen.</translation>
+    </message>
+    <message>
+        <source>Use a cable instead of wireless.</source>
+        <translation>Ein Kabel statt Funk benutzen.</translation>
+    </message>
+    <message>
+        <source>The disk of {folder} will be full in less than a minute at the rate of this recording, which then ends. Make room, or stop the recording.</source>
+        <translation>Die Platte von {folder} ist beim Tempo dieser Aufnahme in weniger als einer Minute voll; dann endet die Aufnahme. Platz schaffen oder die Aufnahme beenden.</translation>
+    </message>
+    <message>
+        <source>No hand is followed. Take the pose that the pictures show in white, and hold it.</source>
+        <translation>Keine Hand wird verfolgt. Die Pose einnehmen, die die Bilder in Weiß zeigen, und halten.</translation>
+    </message>
+    <message>
+        <source>The classic tracker follows the first hand only and takes the markers of the other one for free points. Choose the estimator for two hands at once.</source>
+        <translation>Der klassische Tracker verfolgt nur die erste Hand und hält die Marker der anderen für freie Punkte. Für zwei Hände zugleich den Schätzer wählen.</translation>
+    </message>
+    <message>
+        <source>Node {name}: text datagrams arrive, but tracking is not started: press Start.</source>
+        <translation>Knoten {name}: Text-Datagramme kommen an, aber die Verfolgung ist nicht gestartet: Start drücken.</translation>
+    </message>
+    <message>
+        <source>Node {name}: no text datagrams come in; send them to its data port.</source>
+        <translation>Knoten {name}: Es kommen keine Text-Datagramme an; sie an seinen Datenport senden.</translation>
+    </message>
+    <message>
+        <source>Node {name} at {address} does not know this computer: it was reset or made open, or never paired with it. Pair it: `rhot-node pair` on the node, `rhot pair {name} --rig FILE` here.</source>
+        <translation>Knoten {name} unter {address} kennt diesen Rechner nicht: Er wurde zurückgesetzt, geöffnet oder nie mit ihm gekoppelt. Koppeln: `rhot-node pair` auf dem Knoten, `rhot pair {name} --rig FILE` hier.</translation>
+    </message>
+    <message>
+        <source>Node {name} does not answer. {message}</source>
+        <translation>Knoten {name} antwortet nicht. {message}</translation>
+    </message>
+    <message>
+        <source>Node {name} does not answer at {address}:{port}. Is it switched on, is rhot-node running there, and on the same network? It is looked for by its id.{unpaired}</source>
+        <translation>Knoten {name} antwortet nicht unter {address}:{port}. Ist er eingeschaltet, läuft rhot-node dort, und im selben Netz? Er wird an seiner ID gesucht.{unpaired}</translation>
+    </message>
+    <message>
+        <source>Node {name}: {message}</source>
+        <translation>Knoten {name}: {message}</translation>
+    </message>
+    <message>
+        <source>Node {name} sends text datagrams: untrusted, without times, so fast movements are less exact.</source>
+        <translation>Knoten {name} sendet Text-Datagramme: nicht vertrauenswürdig und ohne Zeiten, daher sind schnelle Bewegungen ungenauer.</translation>
+    </message>
+    <message>
+        <source>Node {name} is open, and what it says is untrusted: anybody on the network may steer it or speak in its place. To change that, set its &quot;trust&quot; to &quot;paired&quot; and pair it.</source>
+        <translation>Knoten {name} ist offen und nicht vertrauenswürdig: Jeder im Netz kann ihn steuern oder sich für ihn ausgeben. Um das zu ändern, sein &quot;trust&quot; auf &quot;paired&quot; setzen und ihn koppeln.</translation>
+    </message>
+    <message>
+        <source>Node {name}: waiting for its clock.</source>
+        <translation>Knoten {name}: wartet auf seine Uhr.</translation>
+    </message>
+    <message>
+        <source>The times of {names} against {first} are not known: cameras that are not synchronised may be up to half a frame apart{most}. Calibrate the times with a waving hand.</source>
+        <translation>Die Zeiten von {names} gegenüber {first} sind nicht bekannt: Nicht synchronisierte Kameras können bis zu einem halben Bild auseinanderliegen{most}. Die Zeiten mit einer winkenden Hand kalibrieren.</translation>
+    </message>
+    <message>
+        <source>{by} alone does not find a hand by painted markers. Put {names} together with it, or track a bare hand.</source>
+        <translation>{by} allein findet keine Hand mit bemalten Markern. {names} mit ihr zusammensetzen oder eine bloße Hand verfolgen.</translation>
+    </message>
+    <message>
+        <source>{by} alone does not find a hand by painted markers. Add a second camera, or track a bare hand.</source>
+        <translation>{by} allein findet keine Hand mit bemalten Markern. Eine zweite Kamera hinzufügen oder eine bloße Hand verfolgen.</translation>
+    </message>
+    <message>
+        <source>{by} alone tracks the hand.{guess}</source>
+        <translation>{by} allein verfolgt die Hand.{guess}</translation>
+    </message>
+    <message>
+        <source>{by} alone tracks the hand until {names} is put together with it.{guess}</source>
+        <translation>{by} allein verfolgt die Hand, bis {names} mit ihr zusammengesetzt ist.{guess}</translation>
+    </message>
+    <message>
+        <source>{by} alone tracks the hand until {names} are put together with it.{guess}</source>
+        <translation>{by} allein verfolgt die Hand, bis {names} mit ihr zusammengesetzt sind.{guess}</translation>
+    </message>
+    <message>
+        <source>The disk of {folder} will be full in about a minute at the rate of this recording, which then ends. Make room, or stop the recording.</source>
+        <translation>Die Platte von {folder} ist beim Tempo dieser Aufnahme in etwa einer Minute voll; dann endet die Aufnahme. Platz schaffen oder die Aufnahme beenden.</translation>
+    </message>
+    <message>
+        <source>The disk of {folder} will be full in {minutes} minutes at the rate of this recording, which then ends. Make room, or stop the recording.</source>
+        <translation>Die Platte von {folder} ist beim Tempo dieser Aufnahme in {minutes} Minuten voll; dann endet die Aufnahme. Platz schaffen oder die Aufnahme beenden.</translation>
+    </message>
+    <message>
+        <source>No camera has seen a {hand} for {seconds:.0f} s. Hold it into the pictures. Each node needs the hand networks (`rhot-node landmarks install`) and &quot;detector&quot;: &quot;landmarks&quot; in its settings.</source>
+        <translation>Seit {seconds:.0f} s hat keine Kamera eine Hand gesehen ({hand}). Sie in die Bilder halten. Jeder Knoten braucht die Hand-Netze (`rhot-node landmarks install`) und &quot;detector&quot;: &quot;landmarks&quot; in seinen Einstellungen.</translation>
+    </message>
+    <message>
+        <source>No camera has seen a marker for {seconds:.0f} s. Hold the hand into both pictures; if the markers are visible there, calibrate their colours.</source>
+        <translation>Seit {seconds:.0f} s hat keine Kamera einen Marker gesehen. Die Hand in beide Bilder halten; sind die Marker dort zu sehen, ihre Farben kalibrieren.</translation>
+    </message>
+    <message>
+        <source>Node {name} has moved from {before} to {address} and is used there. Save the rig, so that it is looked for there the next time.</source>
+        <translation>Knoten {name} ist von {before} nach {address} umgezogen und wird dort benutzt. Das Rig speichern, damit er das nächste Mal dort gesucht wird.</translation>
+    </message>
+    <message>
+        <source> The rig has no key for it: if it waits to be paired, run `rhot-node pair` there and `rhot pair` here.</source>
+        <translation> Das Rig hat keinen Schlüssel für ihn: Wartet er auf das Koppeln, dort `rhot-node pair` und hier `rhot pair` ausführen.</translation>
+    </message>
+    <message>
+        <source>it reports a fault; look at its log.</source>
+        <translation>er meldet einen Fehler; in sein Protokoll sehen.</translation>
+    </message>
+    <message>
+        <source>Node {name} is ready but does not follow the start; press Stop and Start. If that does not help, restart the node.</source>
+        <translation>Knoten {name} ist bereit, folgt aber dem Start nicht; Stopp und Start drücken. Hilft das nicht, den Knoten neu starten.</translation>
+    </message>
+    <message>
+        <source>Node {name} streams for another master; stop that one, or press Stop and Start here to take the node back.</source>
+        <translation>Knoten {name} sendet an einen anderen Master; diesen anhalten oder hier Stopp und Start drücken, um den Knoten zurückzuholen.</translation>
+    </message>
+    <message>
+        <source>Node {name}: the system grants a receive buffer of {granted} KiB only, so a busy moment may lose datagrams. Run `sudo sysctl -w net.core.rmem_max={wanted}` and start again.</source>
+        <translation>Knoten {name}: Das System gewährt nur {granted} KiB Empfangspuffer, daher können bei Auslastung Datagramme verloren gehen. `sudo sysctl -w net.core.rmem_max={wanted}` ausführen und neu starten.</translation>
+    </message>
+    <message>
+        <source>another size</source>
+        <translation>anderer Größe</translation>
+    </message>
+    <message>
+        <source>they are not &quot;x,y;x,y;...&quot; with one pair per marker</source>
+        <translation>sie sind nicht &quot;x,y;x,y;...&quot; mit einem Paar je Marker</translation>
+    </message>
+    <message>
+        <source>if an original RHOT node sends text, set text_datagrams for it in the rig</source>
+        <translation>sendet ein ursprünglicher RHOT-Knoten Text, für ihn im Rig text_datagrams setzen</translation>
+    </message>
+    <message>
+        <source>Node {name}: {rate:.0f} datagrams/s are not of this protocol and are ignored; {hint}.</source>
+        <translation>Knoten {name}: {rate:.0f} Datagramme/s gehören nicht zu diesem Protokoll und werden ignoriert; {hint}.</translation>
+    </message>
+    <message>
+        <source>Node {name}: {percent:.0f} % of the datagrams are lost. {remedy}</source>
+        <translation>Knoten {name}: {percent:.0f} % der Datagramme gehen verloren. {remedy}</translation>
+    </message>
+    <message>
+        <source>Use a cable instead of wireless, or a lower frame rate.</source>
+        <translation>Ein Kabel statt Funk benutzen oder weniger Bilder pro Sekunde aufnehmen.</translation>
+    </message>
+    <message>
+        <source>Node {name} floods this computer with {rate:.0f} datagrams/s; only the newest are tracked. Lower its frame rate.</source>
+        <translation>Knoten {name} überflutet diesen Rechner mit {rate:.0f} Datagrammen/s; nur die neuesten werden verfolgt. Weniger Bilder pro Sekunde aufnehmen.</translation>
+    </message>
+    <message>
+        <source>{count} frames of node {name} were not tracked within two seconds. {busy}</source>
+        <translation>{count} Bilder des Knotens {name} wurden in zwei Sekunden nicht verfolgt. {busy}</translation>
+    </message>
+    <message>
+        <source>Node {name}: its clock is known to ±{bound:.1f} ms only, so fast movements blur. {remedy}</source>
+        <translation>Knoten {name}: Seine Uhr ist nur auf ±{bound:.1f} ms bekannt, daher verschwimmen schnelle Bewegungen. {remedy}</translation>
+    </message>
+    <message>
+        <source> The distance is a guess, by the hand&apos;s size and an assumed lens (60 degrees).</source>
+        <translation> Der Abstand ist geraten, aus der Größe der Hand und einem angenommenen Objektiv (60 Grad).</translation>
+    </message>
+    <message>
+        <source> The distance is a guess, by the hand&apos;s size.</source>
+        <translation> Der Abstand ist geraten, aus der Größe der Hand.</translation>
+    </message>
+    <message>
+        <source>{name} is black: is the lens covered?</source>
+        <translation>{name} ist schwarz: Ist das Objektiv abgedeckt?</translation>
+    </message>
+    <message>
+        <source>Camera {name} has seen no marker for {seconds:.0f} s: hold the hand into its picture, or calibrate the colours.</source>
+        <translation>Kamera {name} hat seit {seconds:.0f} s keinen Marker gesehen: die Hand in ihr Bild halten oder die Farben kalibrieren.</translation>
+    </message>
+    <message>
+        <source>Camera {name} has not seen {names} and others for {seconds:.0f} s: hidden, outside its picture, or the light has changed. Turn the hand, or calibrate the colours.</source>
+        <translation>Kamera {name} hat {names} und andere seit {seconds:.0f} s nicht gesehen: verdeckt, außerhalb ihres Bildes, oder das Licht hat sich geändert. Die Hand drehen oder die Farben kalibrieren.</translation>
+    </message>
+    <message>
+        <source>Camera {name} has not seen {names} for {seconds:.0f} s: hidden, outside its picture, or the light has changed. Turn the hand, or calibrate the colours.</source>
+        <translation>Kamera {name} hat {names} seit {seconds:.0f} s nicht gesehen: verdeckt, außerhalb ihres Bildes, oder das Licht hat sich geändert. Die Hand drehen oder die Farben kalibrieren.</translation>
+    </message>
+    <message>
+        <source>Node {name} cannot be told to record its video: its control channel does not answer.</source>
+        <translation>Knoten {name} lässt sich nicht zur Videoaufnahme bringen: Sein Steuerkanal antwortet nicht.</translation>
+    </message>
+    <message>
+        <source>Node {name} drops frames of its video, {dropped} so far: its processor or disk is too slow. Detection goes first.</source>
+        <translation>Knoten {name} lässt Bilder seines Videos aus, bisher {dropped}: Sein Prozessor oder seine Platte ist zu langsam. Die Erkennung geht vor.</translation>
+    </message>
+    <message>
+        <source>Node {name} cannot search for a bare hand. Does rhot-node have the version of this program there?</source>
+        <translation>Knoten {name} kann nicht nach einer bloßen Hand suchen. Hat rhot-node dort die Version dieses Programms?</translation>
+    </message>
+    <message>
+        <source>Node {name} learns the background: keep the hand out of its picture.</source>
+        <translation>Knoten {name} lernt den Hintergrund: die Hand aus seinem Bild halten.</translation>
+    </message>
+    <message>
+        <source>Node {name} has learnt neither background nor skin, so no bare hand can be tracked by its contours. Use Calibrate, Background and skin.</source>
+        <translation>Knoten {name} hat weder Hintergrund noch Haut gelernt, daher lässt sich keine bloße Hand über ihre Konturen verfolgen. Kalibrieren, Hintergrund und Haut benutzen.</translation>
+    </message>
+    <message>
+        <source>The new rig is being prepared; the one before is tracked until then.</source>
+        <translation>Das neue Rig wird vorbereitet; bis dahin gilt bei der Verfolgung das bisherige.</translation>
+    </message>
+    <message>
+        <source>The bare hand has shown how long and how thick its fingers are: its file can be adapted to it.</source>
+        <translation>Die bloße Hand hat gezeigt, wie lang und wie dick ihre Finger sind: Ihre Datei kann daran angepasst werden.</translation>
+    </message>
+    <message>
+        <source>The landmarks show bones that differ from the rig&apos;s hand by {apart:.0f} mm (rms). With them the joints are more accurate.</source>
+        <translation>Die Landmarken zeigen Knochen, die von der Hand des Rigs um {apart:.0f} mm (rms) abweichen. Mit ihnen sind die Gelenke genauer.</translation>
+    </message>
 </context>
 </TS>

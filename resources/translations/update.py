@@ -1,8 +1,8 @@
 """Renew the translations: ``python resources/translations/update.py [--new CODE]``.
 
-`pyside6-lupdate` collects the sentences of `rhot_app/ui`, and the titles of calibrations and motions, into a file for
-each language, such as `rhot_de.ts`. A translator fills it as text or with Qt Linguist. `pyside6-lrelease` makes the
-file that the app loads of it, such as `rhot_de.qm`.
+`pyside6-lupdate` collects the sentences of `rhot_app/ui`, the engine's advice, and the titles of calibrations and
+motions into a file for each language, such as `rhot_de.ts`. A translator fills it as text or with Qt Linguist.
+`pyside6-lrelease` makes the file that the app loads of it, such as `rhot_de.qm`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).parent
-UI = HERE.parents[1] / "rhot_app" / "ui"
+SOURCES = [HERE.parents[1] / "rhot_app" / name for name in ("ui", "engine")]
 
 
 def of_other_rooms() -> list[str]:
@@ -32,9 +32,11 @@ def collect(path: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         records = Path(folder, "records.py")
         records.write_text("".join(f"tr_noop({json.dumps(text, ensure_ascii=False)})\n" for text in of_other_rooms()))
-        _run("lupdate", "-silent", "-no-obsolete", "-locations", "none", "-tr-function-alias", "QT_TR_NOOP+=tr_noop",
-             "-source-language", "en", "-target-language", path.stem.partition("_")[2],
-             *(str(source) for source in sorted(UI.rglob("*.py"))), str(records), "-ts", str(path))
+        _run("lupdate", "-silent", "-no-obsolete", "-locations", "none", "-tr-function-alias",
+             "QT_TR_NOOP+=tr_noop,QT_TR_NOOP+=words,tr+=advise", "-source-language", "en", "-target-language",
+             path.stem.partition("_")[2],
+             *(str(source) for folder in SOURCES for source in sorted(folder.rglob("*.py"))), str(records),
+             "-ts", str(path))
 
 
 def release(path: Path, out: Path) -> None:

@@ -22,7 +22,7 @@ from rhot_app.engine.advice import disk_advice, hands_advice, moved_advice
 from rhot_app.engine.observer import NodeBlack, NodeMessage, Observer
 from rhot_app.engine.output_process import OutputProcess
 from rhot_app.engine.pipeline import AfterState, Pipeline, PublishState, Work, warm_up
-from rhot_app.engine.status import Advice, EngineStatus, Preview
+from rhot_app.engine.status import Advice, EngineStatus, Preview, advise
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.project import Rig, is_rig_file
 from rhot_app.recording.bookmarks import Bookmark, bookmark_record
@@ -254,8 +254,8 @@ class Engine:
             extra += moved_advice(self.rig, self._moved) + hands_advice(self.rig)
             since_s = self._preparing_s
             if since_s is not None and time.monotonic() - since_s > PREPARING_S:
-                extra.append(Advice("info", "The new rig is being prepared; the one before is tracked until then.",
-                                    subject="information"))
+                extra.append(advise("The new rig is being prepared; the one before is tracked until then.",
+                                    level="info", subject="information"))
             extra += [Advice("error", f"{text} {_REPORT}", subject="tracking") for text in complaints()]
             outputs = self._outputs
             extra += [] if outputs is None else [Advice("warning", text) for text in outputs.complaints()]

@@ -16,7 +16,7 @@ import zmq
 
 from rhot_app.engine.commands import Answer, Arguments, refusal
 from rhot_app.engine.node_meter import foreground_advice, health_advice, sees_black
-from rhot_app.engine.status import Advice, EngineStatus, Preview
+from rhot_app.engine.status import Advice, EngineStatus, Preview, advise
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, RigNode
 from rhot_node.errors import NodeError, printable
@@ -146,9 +146,9 @@ class NodeControl:
             for asked in [asked for asked in peer.asked.values() if now_s > asked.deadline_s]:
                 del peer.asked[asked.number]
                 if asked.command == "video":
-                    peer.video_advice = (Advice(
-                        "warning", f"Node {peer.node.name} cannot be told to record its video: its control channel "
-                        "does not answer.", subject="recording"),) if peer.video else ()
+                    peer.video_advice = (advise(
+                        "Node {name} cannot be told to record its video: its control channel does not answer.",
+                        subject="recording", name=peer.node.name),) if peer.video else ()
                 elif asked.client is not None:
                     error = EngineError(f"node {peer.node.name} does not answer on its control channel "
                                         f"{_endpoints(peer.node)[0]}; is rhot-node running "
@@ -292,8 +292,9 @@ def _take_video_answer(peer: _Peer, answer: Answer) -> None:
     if message:
         peer.video_advice = (Advice("warning", f"The video of node {name} has ended. {message}", subject="recording"),)
     elif isinstance(dropped, int) and dropped > peer.video_dropped:
-        peer.video_advice = (Advice("warning", f"Node {name} drops frames of its video, {dropped} so far: its "
-                                    "processor or disk is too slow. Detection goes first.", subject="recording"),)
+        peer.video_advice = (advise("Node {name} drops frames of its video, {dropped} so far: its processor or disk is "
+                                    "too slow. Detection goes first.", subject="recording", name=name,
+                                    dropped=dropped),)
     if isinstance(dropped, int):
         peer.video_dropped = dropped
 

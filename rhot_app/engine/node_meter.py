@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from rhot_app.engine.status import Advice, NodeStatus, NodeWord
+from rhot_app.engine.status import Advice, NodeStatus, NodeWord, advise
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import NodeReceiver
 from rhot_node.errors import printable
@@ -139,18 +139,18 @@ def foreground_advice(name: str, state: Mapping[str, Any]) -> tuple[Advice, ...]
     """What node `name` lacks to show a bare hand, by the `foreground` of its answer to a state request."""
     known = state.get("foreground")
     if not isinstance(known, Mapping):
-        return (Advice("error", f"Node {name} cannot search for a bare hand. Does rhot-node have the version of this "
-                                "program there?", subject="tracking"),)
+        return (advise("Node {name} cannot search for a bare hand. Does rhot-node have the version of this program "
+                       "there?", level="error", subject="tracking", name=name),)
     if known.get("problem"):
         return (Advice("warning", f"Node {name}: {printable(str(known['problem']))[:SENTENCE_MAX]}", "foreground",
                        subject="tracking"),)
     if known.get("learning_s"):
-        return (Advice("info", f"Node {name} learns the background: keep the hand out of its picture.",
-                       subject="sight"),)
+        return (advise("Node {name} learns the background: keep the hand out of its picture.", level="info",
+                       subject="sight", name=name),)
     if not known.get("background") and known.get("skin") == "none":
-        return (Advice("warning", f"Node {name} has learnt neither background nor skin, so no bare hand can be tracked "
-                                  "by its contours. Use Calibrate, Background and skin.", "foreground",
-                       subject="tracking"),)
+        return (advise("Node {name} has learnt neither background nor skin, so no bare hand can be tracked by its "
+                       "contours. Use Calibrate, Background and skin.", mender="foreground", subject="tracking",
+                       name=name),)
     return ()
 
 

@@ -19,7 +19,7 @@ from rhot_app.barehand.key_frames import KeyFrame
 from rhot_app.calibration.hand.bones_report import BonesReport
 from rhot_app.calibration.hand.landmark_bones import measure_bones, spreads_apart
 from rhot_app.calibration.hand.marker_places import tracks_of
-from rhot_app.engine.status import Advice
+from rhot_app.engine.status import Advice, advise
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.places import LANDMARK_ROLES
@@ -139,8 +139,8 @@ class HandWatch:
         if now_ns - self._judged_ns >= JUDGE_NS:
             self._judged_ns = now_ns
             self._enough = _radii_sd(self._rig.hand) is None and bool(_kept(tracker))
-        sentence = "The bare hand has shown how long and how thick its fingers are: its file can be adapted to it."
-        return [Advice("info", sentence, HAND_MENDER, subject="information")] if self._enough else []
+        return [advise("The bare hand has shown how long and how thick its fingers are: its file can be adapted to it.",
+                       level="info", mender=HAND_MENDER, subject="information")] if self._enough else []
 
     def wait(self, timeout_s: float | None = None) -> None:
         """Until what is being solved is solved."""
@@ -216,9 +216,9 @@ class BonesWatch:
         elif self._offer is None and all(spreads_apart(found, hand) > 1.0 for hand in (self._rig.hand, self._shown)
                                          if hand is not None):
             apart_mm = _apart_mm(found, self._rig.hand)
-            self._offer = Advice("info", f"The landmarks show bones that differ from the rig's hand by {apart_mm:.0f} "
-                                 "mm (rms). With them the joints are more accurate.", BONES_MENDER,
-                                 subject="information")
+            self._offer = advise("The landmarks show bones that differ from the rig's hand by {apart:.0f} mm (rms). "
+                                 "With them the joints are more accurate.", level="info", mender=BONES_MENDER,
+                                 subject="information", apart=apart_mm)
 
     def measured(self) -> dict[str, Any]:
         """The answer to the command `measured`, and from now on shown: `known`, whether the bones could be measured;

@@ -49,13 +49,28 @@ class NodeStatus:
 class Advice:
     """One sentence for the operator: what is wrong, where, and what to do. `mender` names the calibration that
     mends it, as the app's wizards are named; empty for none. `lasting`: it stays until the rig is calibrated, so it is
-    shown apart from the others."""
+    shown apart from the others. `pattern` and `values`: what `text` is made of, for clients that speak another
+    language; empty where the sentence comes from elsewhere."""
 
     level: Level
     text: str
     mender: str = ""
     lasting: bool = False
     subject: Subject = "equipment"
+    pattern: str = field(default="", compare=False)
+    values: dict[str, str | int | float] = field(default_factory=dict, compare=False)
+
+
+def advise(pattern: str, /, *, level: Level = "warning", mender: str = "", lasting: bool = False,
+           subject: Subject = "equipment", **values: str | int | float) -> Advice:
+    """A sentence: a literal with named placeholders, as `str.format` has them, and their `values`. Words among these
+    are marked by `words`."""
+    return Advice(level, pattern.format(**values), mender, lasting, subject, pattern, values)
+
+
+def words(text: str) -> str:
+    """Mark a literal that is a value of `advise`, so that it is translated, too."""
+    return text
 
 
 class _Ranked(Protocol):

@@ -11,7 +11,7 @@ from datetime import datetime
 from functools import lru_cache
 from typing import Any, Final
 
-from PySide6.QtCore import QCoreApplication, QLibraryInfo, QLocale, QTranslator
+from PySide6.QtCore import QCoreApplication, QDateTime, QLibraryInfo, QLocale, QTranslator
 
 from rhot_node.files import resource_path
 
@@ -71,7 +71,8 @@ def language() -> str:
 
 def date_text(at: datetime) -> str:
     """Day and minute, e.g. "01 May 2026, 10:00"."""
-    return QLocale(language()).toString(at, tr("dd MMM yyyy, HH:mm"))
+    return QLocale(language()).toString(QDateTime.fromSecsSinceEpoch(round(at.timestamp())),
+                                        tr("dd MMM yyyy, HH:mm"))
 
 
 def use_language(choice: str) -> None:

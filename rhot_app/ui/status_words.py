@@ -80,10 +80,14 @@ def label_of(controller: Controller) -> tuple[str, str]:
 def _advice_notice(advice: Advice) -> Notice:
     """The engine's sentence, with the wizard that mends it as a button."""
     wizard = wizard_named(advice.mender)
+    text = advice.text
+    if advice.pattern:
+        text = tr(advice.pattern, **{name: tr(value) if isinstance(value, str) and " " in value else value
+                                     for name, value in advice.values.items()})  # a name is no word
     if wizard is None:
-        return Notice(advice.level, advice.text, lasting=advice.lasting, subject=advice.subject)
+        return Notice(advice.level, text, lasting=advice.lasting, subject=advice.subject)
     action = tr("Calibrate …") if advice.lasting else f"{tr(wizard.title)} …"
-    return Notice(advice.level, advice.text, action, f"{OPEN_WIZARD}{wizard.name}", advice.lasting,
+    return Notice(advice.level, text, action, f"{OPEN_WIZARD}{wizard.name}", advice.lasting,
                   advice.subject)
 
 

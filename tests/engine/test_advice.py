@@ -30,6 +30,15 @@ def texts(facts: NodeFacts, running: bool = True) -> list[str]:
     return [advice.text for advice in node_advice(facts, IDS, running)]
 
 
+def test_a_sentence_keeps_what_it_is_made_of_for_other_languages() -> None:
+    """And survives the way to a client."""
+    silent = replace(WELL, status=replace(STATUS, state="silent", paired=False))
+    advice, = (one for one in node_advice(silent, IDS, running=True) if "does not answer" in one.text)
+    again = msgspec.msgpack.decode(msgspec.msgpack.encode(advice), type=Advice)
+    assert again.pattern.format(**again.values) == again.text == advice.text
+    assert again.values["name"] == "left" and again.values["port"] == 47800
+
+
 def test_a_well_node_needs_no_words() -> None:
     assert texts(WELL) == []
     assert no_marker_advice([WELL], running=True) == []

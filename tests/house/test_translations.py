@@ -20,7 +20,11 @@ UI = ROOT / "rhot_app" / "ui"
 TRANSLATIONS = ROOT / "resources" / "translations"
 LANGUAGE_FILES = sorted(TRANSLATIONS.glob("rhot_*.ts"))
 
+ENGINE = ROOT / "rhot_app" / "engine"
 MARKS = {"tr", "tr_noop"}
+ADVICE = {"advise", "words"}
+"""What marks the engine's sentences, which the window translates."""
+
 SHOWING = {
     "setText", "setToolTip", "setWindowTitle", "setTitle", "setAccessibleName", "setPlaceholderText", "setLabelText",
     "setSpecialValueText", "setHorizontalHeaderLabels", "addItem", "addTab", "addRow", "addMenu", "drawText",
@@ -116,10 +120,10 @@ def unmarked(source: str) -> Iterator[tuple[int, str]]:
             yield node.lineno, text
 
 
-def marked(source: str) -> Iterator[tuple[str, str]]:
+def marked(source: str, marks: set[str] = MARKS) -> Iterator[tuple[str, str]]:
     """(text, comment or plural) of the literals that pass `tr`."""
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in MARKS:
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in marks:
             words = [part.value for part in node.args[:2] if isinstance(part, ast.Constant)]
             if words and isinstance(words[0], str):
                 yield words[0], words[1] if len(words) > 1 and isinstance(words[1], str) else ""
@@ -142,6 +146,7 @@ def translations(path: Path) -> dict[tuple[str, str], list[str]]:
 def written() -> set[tuple[str, str]]:
     """All (text, comment) that can be translated."""
     return {*(key for source in UI.rglob("*.py") for key in marked(source.read_text())),
+            *((text, "") for source in ENGINE.rglob("*.py") for text, _ in marked(source.read_text(), ADVICE)),
             *((text, "") for text in of_other_rooms())}
 
 

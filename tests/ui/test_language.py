@@ -13,6 +13,7 @@ from screen_pictures import SIZE, cut_texts
 from test_settings_dialog import choose, select
 
 from resources.translations.update import release
+from rhot_app.engine.status import Advice, advise, words
 from rhot_app.state import Condition
 from rhot_app.ui import language
 from rhot_app.ui.common.settings import Settings
@@ -128,6 +129,20 @@ def test_the_german_window_is_german_and_nothing_is_cut(german, make_bench, sche
     assert {"Zeigefinger", "gemessen", "Handfläche", "Jitter je Marker"} <= shown
     assert not shown & {"thumb", "index", "measured", "palm", "ok "}
     assert window.actions_.record.text() == "Aufnehmen" and window.actions_.record.toolTip().endswith("(R).")
+
+
+def test_the_engines_advice_is_said_in_the_language_of_the_window(german, make_bench):
+    """Its words as well; what comes without a pattern stays as it is."""
+    bench = make_bench()
+    bench.click(bench.window.welcome.twin_button)
+    bench.until(lambda: bench.window.toolbar.badge.word == "VERFOLGT")
+    bench.backend.engine.advice = (
+        advise("Node {name}: {message}", level="error", subject="tracking", name="left",
+               message=words("it reports a fault; look at its log.")),
+        Advice("warning", "The cameras' rays miss each other."))
+    bench.until(lambda: bench.said("Knoten left: er meldet einen Fehler; in sein Protokoll sehen."))
+    assert bench.backend.engine.advice[0].text == "Node left: it reports a fault; look at its log."
+    bench.until(lambda: bench.said("The cameras' rays miss each other."))
 
 
 def test_copied_figures_keep_the_decimal_point(german, make_bench):
