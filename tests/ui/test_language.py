@@ -7,10 +7,10 @@ import sys
 from datetime import datetime
 
 import pytest
-from PySide6.QtCore import QUrl
+from PySide6.QtCore import Qt, QUrl
 from PySide6.QtWidgets import QDialogButtonBox, QDoubleSpinBox, QLabel
 from screen_pictures import SIZE, cut_texts
-from test_settings_dialog import choose, select
+from test_settings_dialog import select
 
 from resources.translations.update import release
 from rhot_app.engine.status import Advice, advise, words
@@ -99,7 +99,7 @@ def test_the_desktop_decides_until_a_language_is_chosen(desktop, found):
 
 
 def test_the_settings_choose_the_language_of_the_next_start(bench, tmp_path):
-    choose(bench, "rig", bench.window.actions_.settings)
+    bench.choose(bench.window.menus.rig, bench.window.actions_.settings)
     bench.until(lambda: bench.window.dialogs.settings is not None and bench.window.dialogs.settings.isVisible())
     page = bench.window.dialogs.settings.general
     assert page.language_box.currentText() == "As the desktop" and page.language_note.isHidden()
@@ -107,7 +107,7 @@ def test_the_settings_choose_the_language_of_the_next_start(bench, tmp_path):
     assert page.language_box.currentText() == "Deutsch" and page.language_note.isVisible()
     bench.click(bench.window.dialogs.settings.close_button)
     assert Settings(bench.window.settings.path).language == "de"
-    assert bench.window.toolbar.rig_button.text() == "Rig" and tr("Help") == "Help"
+    assert tr("Help") == "Help", "this window stays as it is"
     select(bench, page.language_box, 1)
     assert page.language_note.isHidden()
 
@@ -129,6 +129,17 @@ def test_the_german_window_is_german_and_nothing_is_cut(german, make_bench, sche
     assert {"Zeigefinger", "gemessen", "Handfläche", "Jitter je Marker"} <= shown
     assert not shown & {"thumb", "index", "measured", "palm", "ok "}
     assert window.actions_.record.text() == "Aufnehmen" and window.actions_.record.toolTip().endswith("(R).")
+
+
+@pytest.mark.parametrize("key, name", [(Qt.Key.Key_R, "rig"), (Qt.Key.Key_K, "calibrate"), (Qt.Key.Key_A, "view"),
+                                       (Qt.Key.Key_H, "help")])
+def test_german_menus_are_opened_by_german_letters(german, make_bench, key, name):
+    bench = make_bench()
+    bench.press(key, modifier=Qt.KeyboardModifier.AltModifier)
+    menu = getattr(bench.window.menus, name)
+    bench.until(menu.isVisible)
+    assert any("&" in entry.text() for entry in menu.actions())
+    bench.press(Qt.Key.Key_Escape, menu)
 
 
 def test_the_engines_advice_is_said_in_the_language_of_the_window(german, make_bench):
