@@ -129,6 +129,7 @@ def test_the_german_window_is_german_and_nothing_is_cut(german, make_bench, sche
     assert {"Zeigefinger", "gemessen", "Handfläche", "Jitter je Marker"} <= shown
     assert not shown & {"thumb", "index", "measured", "palm", "ok "}
     assert window.actions_.record.text() == "Aufnehmen" and window.actions_.record.toolTip().endswith("(R).")
+    assert window.actions_.start.toolTip().endswith("(Leertaste).")
 
 
 @pytest.mark.parametrize("key, name", [(Qt.Key.Key_R, "rig"), (Qt.Key.Key_K, "calibrate"), (Qt.Key.Key_A, "view"),

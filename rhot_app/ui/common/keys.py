@@ -55,8 +55,8 @@ class ActionKeys:
         holder = tr(_FIXED.get(text, "")) or self._letters.get(text) or next(
             (title_of(one) for one in self.actions if one is not action and text and one.shortcut() == key), "")
         if holder:
-            return tr("{text} is the key of {holder}. Choose another, or take it from there first.", text=text,
-                      holder=holder)
+            return tr("{text} is the key of {holder}. Choose another, or take it from there first.",
+                      text=_shown(key), holder=holder)
         own = key == self._own[action.objectName()]
         self._settings.set_key(action.objectName(), None if own else text)
         self._set(action, key)
@@ -74,9 +74,14 @@ class ActionKeys:
 
     def _set(self, action: QAction, key: QKeySequence) -> None:
         action.setShortcut(key)
-        meaning, text = self._meanings[action.objectName()], key.toString(QKeySequence.SequenceFormat.NativeText)
-        keys = ", ".join(filter(None, (_ALWAYS.get(action.objectName()), text)))
+        meaning, always = self._meanings[action.objectName()], QKeySequence(_ALWAYS.get(action.objectName(), ""))
+        keys = ", ".join(filter(None, (_shown(always), _shown(key))))
         action.setToolTip(f"{meaning.removesuffix('.')} ({keys})." if keys else meaning)
+
+
+def _shown(key: QKeySequence) -> str:
+    """A key as the keyboards of the language have it."""
+    return key.toString(QKeySequence.SequenceFormat.NativeText)
 
 
 def title_of(action: QAction) -> str:
