@@ -31,6 +31,12 @@ def add_seed_argument(parser: argparse._ActionsContainer, what: str, default: in
     parser.add_argument("--seed", type=count, default=default, metavar="N", help=f"seed of {what} (default 1)")
 
 
+def add_scene_argument(parser: argparse._ActionsContainer) -> None:
+    """``--scene FILE``, of what is simulated."""
+    parser.add_argument("--scene", type=Path, metavar="FILE",
+                        help="a scene file, or the shot.json of a recording; what is given beside it wins over it")
+
+
 def add_seconds_argument(parser: argparse._ActionsContainer, what: str, default: float | None) -> None:
     """``--seconds S``; `what` may name the default, a number's is named for it."""
     parser.add_argument("--seconds", type=positive_number, default=default, metavar="S",

@@ -84,6 +84,26 @@
         <translation>Simulierte Kamera abdecken</translation>
     </message>
     <message>
+        <source>Scene of the simulated rig</source>
+        <translation>Szene des simulierten Rigs</translation>
+    </message>
+    <message>
+        <source>Open a scene …</source>
+        <translation>Szene öffnen …</translation>
+    </message>
+    <message>
+        <source>Start the simulated rig on a scene file: its light, its cameras, and what stands before them.</source>
+        <translation>Das simulierte Rig mit einer Szenendatei starten: ihr Licht, ihre Kameras und was vor ihnen steht.</translation>
+    </message>
+    <message>
+        <source>Save the scene …</source>
+        <translation>Szene speichern …</translation>
+    </message>
+    <message>
+        <source>Write what the simulated rig is and shows to a file. Commands that simulate read it with --scene.</source>
+        <translation>In eine Datei schreiben, was das simulierte Rig ist und zeigt. Befehle, die simulieren, lesen sie mit --scene.</translation>
+    </message>
+    <message>
         <source>Open rig file …</source>
         <translation>Rig-Datei öffnen …</translation>
     </message>
@@ -2876,6 +2896,10 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Ein Papierlineal mit zwei Kreuzen im Abstand von 200 mm.</translation>
     </message>
     <message>
+        <source>Scenes (*.json);;All files (*)</source>
+        <translation>Szenen (*.json);;Alle Dateien (*)</translation>
+    </message>
+    <message>
         <source>One painted ball, {distance} cm from the cameras, before the middle between them.</source>
         <translation>Eine bemalte Kugel, {distance} cm von den Kameras entfernt, mittig vor ihnen.</translation>
     </message>
@@ -2890,6 +2914,18 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     <message>
         <source>A cap on the lens of the camera {name}: it sees nothing until it is taken off.</source>
         <translation>Eine Kappe auf dem Objektiv der Kamera {name}: Sie sieht nichts, bis sie abgenommen wird.</translation>
+    </message>
+    <message>
+        <source>Open a scene</source>
+        <translation>Szene öffnen</translation>
+    </message>
+    <message>
+        <source>Save the scene</source>
+        <translation>Szene speichern</translation>
+    </message>
+    <message>
+        <source>The scene was saved to {path}.</source>
+        <translation>Die Szene wurde in {path} gespeichert.</translation>
     </message>
     <message>
         <source>The simulated cameras have stopped.</source>

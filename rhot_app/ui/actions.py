@@ -45,6 +45,14 @@ class Actions(QObject):
                                tr("Start two simulated cameras that look at a simulated hand."))
         self.shows = Menu(tr("Simulated hand does"), parent)
         self.caps = Menu(tr("Cover a simulated camera"), parent)
+        self.scene = Menu(tr("Scene of the simulated rig"), parent)
+        self.open_scene = self._make(tr("Open a scene …"), "",
+                                     tr("Start the simulated rig on a scene file: its light, its cameras, and what "
+                                        "stands before them."))
+        self.save_scene = self._make(tr("Save the scene …"), "",
+                                     tr("Write what the simulated rig is and shows to a file. Commands that simulate "
+                                        "read it with --scene."))
+        self.scene.addActions([self.open_scene, self.save_scene])
         self.open = self._make(tr("Open rig file …"), "Ctrl+O", tr("Open a rig that was set up before."))
         self.own_cameras = self._make(tr("Cameras of this computer …"), "",
                                       tr("Choose webcams, films or network cameras, look at them, and track with "
@@ -184,8 +192,8 @@ class MainMenuBar(QMenuBar):
         self.rig = self._add(tr("Rig"), [
             a.twin, a.own_cameras, a.open, a.nodes, None, a.open_recording, a.recordings, a.films, a.video, a.bookmark,
             a.export, None, a.add_object, a.objects.menuAction(), None,
-            a.outputs, a.mouse, a.shows.menuAction(), a.caps.menuAction(), a.properties.menuAction(), a.save_rig,
-            a.close_rig, None, a.settings, a.quit])
+            a.outputs, a.mouse, a.shows.menuAction(), a.caps.menuAction(), a.scene.menuAction(),
+            a.properties.menuAction(), a.save_rig, a.close_rig, None, a.settings, a.quit])
         self.calibrate = self._add(tr("Calibrate"), [
             a.next_steps, None, *a.wizards, a.fit, None, a.earlier, None, a.tracker, a.networks, None, a.files])
         self.view = self._add(tr("View"), [

@@ -37,7 +37,7 @@ from rhot_app.ui.panels.advice_bar import AdviceBar, toolbar_of
 from rhot_app.ui.replay.windows import ReplayWindows
 from rhot_app.ui.scene.page import ScenePage
 from rhot_app.ui.screen import BOTTOM_PX, Docks, Screen
-from rhot_app.ui.simulated_rig_menus import LensCaps, TwinShows
+from rhot_app.ui.simulated_rig_menus import LensCaps, SceneFiles, TwinShows
 from rhot_app.ui.status_words import RigFileWatch, label_of, look_of, notices_of
 from rhot_app.ui.tracked_objects import TrackedObjects
 from rhot_app.ui.welcome import WelcomePage
@@ -89,6 +89,7 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(self.pages)
         self.lens_caps = LensCaps(controller, self.actions_.caps, self.tell)
         self.twin_shows = TwinShows(controller, self.actions_.shows, self.tell)
+        self.scene_files = SceneFiles(controller, self.actions_.open_scene, self.actions_.save_scene, self.tell, self)
         self.wizards.twin_menu = self.twin_shows.menu
         self.tracked_objects = TrackedObjects(controller, self.actions_.add_object, self.actions_.objects, self.tell,
                                               self.rig_watch.look_soon, self)
@@ -221,7 +222,7 @@ class MainWindow(QMainWindow):
 
     def open_twin(self, choice: TwinChoice) -> None:
         """Start the simulated rig and the tracking."""
-        if self.welcome.motion_box.findData(choice.motion) >= 0:
+        if choice.motion is not None and self.welcome.motion_box.findData(choice.motion) >= 0:
             self.settings.motion = choice.motion
         self.controller.open_twin(choice)
 

@@ -1,14 +1,16 @@
-"""What the simulated rig does: what its hand shows, and which of its cameras are covered, each chosen from a menu."""
+"""The menus of the simulated rig: what its hand shows, which of its cameras are covered, and its scene as a file."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QObject
 from PySide6.QtGui import QAction, QActionGroup
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
+from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.menu import Menu, literal
@@ -33,6 +35,7 @@ THINGS = (("held:wave", tr_noop("Holds a tagged cube"),
            tr_noop("A chessboard of 9 x 6 corners, 25 mm squares, moved about with pauses.")),
           ("table", tr_noop("Lays the board on the table"), tr_noop("The same board, lying on the table.")),
           ("ruler", tr_noop("Shows a ruler"), tr_noop("A paper ruler with two crosses, 200 mm apart.")))
+_SCENES = tr_noop("Scenes (*.json);;All files (*)")
 DISTANCES_CM = (20, 25, 30, 40, 50, 65, 80, 100)
 
 
@@ -168,4 +171,46 @@ class LensCaps(QObject):
 
     def _fail(self, sentence: str) -> None:
         self._show(())
+        self._tell(Notice("error", sentence))
+
+
+# -- Menu: the scene as a file -----------------------------------------------------------------------------------------
+
+class SceneFiles(QObject):
+    """`opening` starts the simulated rig on a scene file; `saving`, which needs that rig, writes one."""
+
+    def __init__(self, controller: Controller, opening: QAction, saving: QAction, tell: Callable[[Notice], None],
+                 window: QWidget) -> None:
+        super().__init__(window)
+        self._controller, self._saving, self._tell = controller, saving, tell
+        self._window = window
+        self._job: Job | None = None
+        opening.triggered.connect(self._open)
+        saving.triggered.connect(self._save)
+        controller.rig_changed.connect(self._follow)
+        self._follow()
+
+    def _follow(self) -> None:
+        opened = self._controller.opened
+        self._saving.setEnabled(opened is not None and opened.simulated)
+
+    def _open(self) -> None:
+        name, _ = QFileDialog.getOpenFileName(self._window, tr("Open a scene"), "", tr(_SCENES))
+        if name:
+            tracker = self._controller.twin_choice.tracker
+            self._controller.open_twin(TwinChoice(None, None, None, tracker, Path(name)))
+
+    def _save(self) -> None:
+        name, _ = QFileDialog.getSaveFileName(self._window, tr("Save the scene"), "scene.json", tr(_SCENES))
+        if name and self._job is None:
+            path = Path(name)
+            self._job = Job(lambda progress: self._controller.backend.save_scene(path), lambda _: self._saved(path),
+                            self._fail, parent=self).start()
+
+    def _saved(self, path: Path) -> None:
+        self._job = None
+        self._tell(Notice("info", tr("The scene was saved to {path}.", path=path)))
+
+    def _fail(self, sentence: str) -> None:
+        self._job = None
         self._tell(Notice("error", sentence))

@@ -12,6 +12,7 @@ from fake_engine import FakeClient, FakeEngine
 
 from rhot_app.errors import CalibrationError, RhotError, RigError, SimulatorError
 from rhot_app.progress import Progress
+from rhot_app.simulator.scene.scene_file import SceneFields, write_scene
 from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
 from rhot_app.ui.backend.solver import Solver, StoppedError
 
@@ -91,7 +92,7 @@ class FakeBackend:
         return self._opened(str(path), simulated=False)
 
     def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
-        self.calls.append(f"twin {choice.motion}")
+        self.calls.append(f"twin {choice.motion if choice.scene is None else choice.scene.name}")
         self._work(report)
         return self._opened("", simulated=True)
 
@@ -125,6 +126,11 @@ class FakeBackend:
             raise SimulatorError(self.refuse)
         self.shown = what
         return what
+
+    def save_scene(self, path: Path) -> None:
+        if self.refuse:
+            raise SimulatorError(self.refuse)
+        write_scene(path, SceneFields({"lamp": {"kelvin": 3000.0}}, {"show": "hand", "motion": "wave"}, 7))
 
     def give_up(self) -> None:
         self.calls.append("give up")

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from rhot_app.__main__ import main
+from rhot_app.simulator.scene.scene_file import SceneFields, write_scene
 from rhot_app.ui import app, demo_command
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_node.files import resource_path
@@ -41,6 +42,34 @@ def test_the_demo_takes_a_motion_file(opened, tmp_path):
     path.write_text("{}")
     assert main(["demo", "--motion", str(path)]) == 0
     assert opened[0][1].motion == str(path)
+
+
+def test_the_demo_takes_a_scene_and_what_is_given_beside_it(opened, tmp_path):
+    path = tmp_path / "lamp.json"
+    write_scene(path, SceneFields({"lamp": {"kelvin": 3000.0}}, {"show": "hand", "motion": "wave"}, 7))
+    assert main(["demo", "--scene", str(path)]) == 0
+    assert main(["demo", "--scene", str(path), "--motion", "pinch", "--seed", "2"]) == 0
+    assert opened == [(None, TwinChoice(None, None, None, "classic", path)),
+                      (None, TwinChoice("pinch", 2, None, "classic", path))]
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    (None, "no such file"), ("{", "lamp.json"), ('{"format": "rhot-rig", "version": 1}', "rhot-rig"),
+    ('{"format": "rhot-scene", "version": 1, "settings": {"lamp": {"kelvin": "warm"}}}', "lamp.kelvin"),
+    ('{"format": "rhot-scene", "version": 1, "show": {"show": "board", "square_mm": -1}}', "square_mm")])
+def test_a_scene_that_cannot_be_opens_no_window(opened, tmp_path, capsys, text, said):
+    path = tmp_path / "lamp.json"
+    if text is not None:
+        path.write_text(text)
+    assert main(["demo", "--scene", str(path)]) == 2
+    assert said in capsys.readouterr().err and opened == []
+
+
+def test_a_motion_beside_a_scene_without_a_hand_is_refused(opened, tmp_path, capsys):
+    path = tmp_path / "board.json"
+    write_scene(path, SceneFields({}, {"show": "board"}))
+    assert main(["demo", "--scene", str(path), "--motion", "wave"]) == 2
+    assert "--motion wave" in capsys.readouterr().err and opened == []
 
 
 def test_a_motion_that_is_not_there_is_named(opened, capsys):

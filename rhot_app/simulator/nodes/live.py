@@ -26,10 +26,11 @@ from rhot_app.project import save_rig
 from rhot_app.simulator.film.scene_objects import with_start_pose, write_held
 from rhot_app.simulator.nodes.live_cameras import FrameSocket, LiveCameras, Pace
 from rhot_app.simulator.nodes.live_scene import LiveScene
-from rhot_app.simulator.nodes.remote import SERVER_NAME, Request, decode_request, refusal, server_address
+from rhot_app.simulator.nodes.remote import SCENE_NAME, SERVER_NAME, Request, decode_request, refusal, server_address
 from rhot_app.simulator.scene.scene import Scene, build_rig, node_settings
-from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_argument, scene_of, show_of
+from rhot_app.simulator.scene.scene_arguments import add_scene_arguments, add_show_argument, fields_of
 from rhot_app.simulator.scene.scene_description import Show
+from rhot_app.simulator.scene.scene_file import write_scene
 from rhot_app.sources.local_nodes import NodeSupervisor, add_serve_arguments, serve
 from rhot_node.errors import NodeError
 from rhot_node.network.context import Context
@@ -140,8 +141,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     args = parser.parse_args(arguments)
     with contextlib.suppress(OSError):
         os.nice(_NICE)
-    return serve(lambda over: run(scene_of(args), show_of(args), args.directory.absolute(), args.rig.absolute(), over),
-                 args.while_locked)
+
+    def start(over: Callable[[], bool]) -> None:
+        directory, fields = args.directory.absolute(), fields_of(args)
+        directory.mkdir(parents=True, exist_ok=True)
+        write_scene(directory / SCENE_NAME, fields)
+        run(fields.scene(), fields.shown(), directory, args.rig.absolute(), over)
+
+    return serve(start, args.while_locked)
 
 
 if __name__ == "__main__":

@@ -38,6 +38,9 @@ from rhot_node.network.context import Context
 
 SERVER_NAME: Final = "twin.ipc"
 
+SCENE_NAME: Final = "twin.scene.json"
+"""The scene that the twin was started with, in its directory."""
+
 
 def server_address(directory: Path) -> str:
     """ZeroMQ endpoint of the twin whose directory this is (the client asks with REQ)."""

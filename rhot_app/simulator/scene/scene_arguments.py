@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.errors import positive_number
-from rhot_app.options import add_seed_argument
+from rhot_app.options import add_scene_argument, add_seed_argument
 
 if TYPE_CHECKING:
     from rhot_app.simulator.scene.scene import Scene
@@ -31,8 +30,7 @@ def add_scene_arguments(parser: argparse.ArgumentParser, *, motion: bool = True)
                                  "sweep, cross, roam, mouse), a motion file (.json), or a recording (Qualisys .tsv, "
                                  f"Leap Motion .csv); default {MOTION}")
     add_seed_argument(parser, "all that is random", default=None)
-    parser.add_argument("--scene", type=Path, metavar="FILE",
-                        help="a scene file, or the shot.json of a recording; what is given beside it wins over it")
+    add_scene_argument(parser)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE",
                         help="one field of the scene, as lamp.kelvin=3000, background=clutter, facing=back or "
                              "show.on_table=true; repeatable (docs/twin.md lists them)")

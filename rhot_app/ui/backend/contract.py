@@ -32,12 +32,13 @@ class Opened:
 
 @dataclass(frozen=True, slots=True)
 class TwinChoice:
-    """What the simulated hand does."""
+    """What the simulated rig is. Where there is a `scene` file, None leaves to the file what it says."""
 
-    motion: str = "grasp"
-    seed: int = 1
-    preset: str = "wide"
+    motion: str | None = "grasp"
+    seed: int | None = 1
+    preset: str | None = "wide"
     tracker: Literal["classic", "estimator"] = "classic"
+    scene: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +129,10 @@ class Backend(Protocol):
         """Show something else, from its beginning; returns what is shown. `what`: ``hand:MOTION``, ``bare:MOTION``
         (without markers), ``board``, ``table`` (the board lies on it), ``ruler``, ``marker:METRES``, or ``empty``.
         Raises SimulatorError."""
+        ...
+
+    def save_scene(self, path: Path) -> None:
+        """Write the scene of the simulated rig with what it shows now. Raises SimulatorError, OSError."""
         ...
 
     def give_up(self) -> None:

@@ -117,6 +117,10 @@ class Session:
 
     def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
         """Start the simulated nodes, then an engine on the rig that they write; raises SimulatorError, EngineError."""
+        if choice.scene is not None:
+            from rhot_app.simulator.scene.scene_file import read_scene
+
+            read_scene(choice.scene).scene()  # what cannot be is said while the other rig still runs
         self._clear(report)
         self._compile(WINDOW, report)
         report(tr("Starting two simulated cameras …"), 0.15)
@@ -166,6 +170,20 @@ class Session:
         show = show_named(what)
         with self._twin() as twin:
             return key_of(twin.show(show).show)
+
+    def save_scene(self, path: Path) -> None:
+        """The scene that the twin was started with, with what it shows now and its lamp, as a file. Raises
+        SimulatorError, OSError."""
+        from rhot_app.simulator.nodes.remote import SCENE_NAME
+        from rhot_app.simulator.scene.scene_file import read_scene, write_scene
+
+        with self._twin() as twin:
+            now = twin.state()
+        fields = read_scene(self._place.path / SCENE_NAME)
+        fields.show = msgspec.to_builtins(now.show)
+        if now.lamp != fields.scene().settings.lamp:
+            fields.settings["lamp"] = msgspec.to_builtins(now.lamp)
+        write_scene(path, fields)
 
     def give_up(self) -> None:
         """End everything that the app started; what waits for it then fails and is forgotten."""
@@ -233,8 +251,9 @@ class Session:
         """Start the twin in the background."""
         rig_path, output = self._place.path / TWIN_RIG, self._place.path / TWIN_OUTPUT
         errors = self._place.twin_log_file
-        command = [*TWIN_COMMAND, "--motion", choice.motion,
-                   "--seed", str(choice.seed), "--preset", choice.preset,
+        chosen = {"--scene": choice.scene, "--motion": choice.motion, "--seed": choice.seed, "--preset": choice.preset}
+        command = [*TWIN_COMMAND, *(text for name, value in chosen.items() if value is not None
+                                    for text in (name, str(value))),
                    "--directory", str(self._place.path), "--rig", str(rig_path),
                    "--while-locked", str(self._place.lock_file)]
         self._start_nodes(command, TWIN_ROLE, output, errors, _Words(tr_noop("simulated cameras"), 2, SimulatorError),

@@ -87,7 +87,7 @@ def style_sheet(s: Scheme) -> str:
     QDockWidget::title {{ background: {s.panel}; padding: 6px 8px; }}
     QDockWidget > QWidget, QWidget[panel="true"] {{ background: {s.panel}; }}
     QMenu {{ background: {s.raised}; border: 1px solid {s.border}; padding: 4px; }}
-    QMenu::item {{ padding: 6px 24px 6px 24px; border-radius: 4px; }}
+    QMenu::item {{ padding: 5px 24px; border-radius: 4px; }}
     QMenu::item:selected {{ background: {s.accent}; color: {s.on_accent}; }}
     QMenu::separator {{ height: 1px; background: {s.border}; margin: 4px 8px; }}
     QPushButton {{ background: {s.raised}; border: 1px solid {s.border}; border-radius: 6px; padding: 6px 16px; }}
