@@ -301,7 +301,7 @@
     </message>
     <message>
         <source>Frame the hand</source>
-        <translation>Auf die Hand zoomen</translation>
+        <translation>Hand ins Bild holen</translation>
     </message>
     <message>
         <source>Bring the hand into the middle of the scene.</source>
@@ -669,7 +669,7 @@
     </message>
     <message>
         <source>Low-cost hand and object tracking with cheap cameras. RHOT itself has the MIT licence.</source>
-        <translation>Günstige Verfolgung von Hand und Objekten mit billigen Kameras. RHOT selbst steht unter der MIT-Lizenz.</translation>
+        <translation>Verfolgung von Hand und Objekten mit günstigen Kameras. RHOT selbst steht unter der MIT-Lizenz.</translation>
     </message>
     <message>
         <source>Put this into a report of a fault. `rhot report` collects more.</source>
