@@ -1,7 +1,7 @@
 """How hard joint limits are, and how the joints of a relaxed human hand move together.
 
-The limits themselves are of the hand file: `model.HandModel.limits`. They are enforced by `motion.null_space` for
-markers and landmarks, and by `barehand.contour_residual.JointLimits` for contours.
+The limits themselves are of the hand file: `model.HandModel.limits`. They are enforced by `motion.null_space` in the
+estimator, by `solvers` in the classic tracker, and by `barehand.contour_residual.JointLimits` for contours.
 
 The pose prior is a Gaussian on the 21 angles, for joints that no marker observes. Its couplings are soft, because
 people can break all of them; the standard deviations say how readily.

@@ -217,3 +217,12 @@ def test_a_fault_in_a_kind_costs_its_datagrams_only(caplog: pytest.LogCaptureFix
     assert frames[:2] == [None, None] and isinstance(frames[2], HandFrame)
     assert door.dropped == {"failed": 2} and door.frames.total() == 1 and door.received == 3
     assert [record.exc_info[0] for record in caplog.records if record.exc_info] == [KeyError]
+
+
+def test_a_kind_without_a_name_is_refused() -> None:
+    class Nameless(Kind):
+        messages = (Fiducials,)
+
+    with pytest.raises(TypeError, match="name"):
+        registry.register(Nameless)
+    assert Nameless not in registry.KINDS

@@ -114,7 +114,7 @@ HEADER_FAULTS: list[Fault] = [
     (0, "<4s", (b"rhot",), "magic"),
     (4, "<B", (3,), "version"),
     (5, "<B", (0,), "type"),
-    (5, "<B", (13,), "type"),
+    (5, "<B", (255,), "type"),
     (6, "<H", (1,), "tag"),
     (6, "<H", (2,), "flags"),
     (6, "<H", (0x8001,), "flags"),

@@ -12,5 +12,10 @@ KINDS: list[type[Kind]] = [MarkerKind, LandmarkKind, EdgeKind, TagKind]
 
 
 def register(kind: type[Kind]) -> None:
-    """Add a kind of another package. Validators that are made from now on ask it before those that are there."""
+    """Add a kind of another package. Validators that are made from now on ask it before those that are there.
+
+    Raises TypeError when it does not say its name or its messages."""
+    for told in ("name", "messages"):
+        if not getattr(kind, told, None):
+            raise TypeError(f"{kind.__qualname__}: a kind of observations needs `{told}`.")
     KINDS.append(kind)
