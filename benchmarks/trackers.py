@@ -6,9 +6,9 @@
 Trials: `blind` and `silent` (one camera, for a second), `hidden` and `hidden-apart` (each marker 30 % of the time, from
 all cameras at once or from each by itself), `mixed` (index and middle taken for each other 30 % of the time), `cross`
 (fingers crossing for ten minutes), `wrist` (only the wrist's marker left), `still`, `ramp` and `fast` (spread and lag),
-`curve` (jitter against lag for several filters), `scale` (a hand file 10 % wrong, the size floating), `start` (from
-nothing) and `compute` (time per datagram, memory over ten minutes). Logs are kept and found again, as by
-`rhot evaluate compare`.
+`turned` (a still hand, one camera turned otherwise than the rig says), `curve` (jitter against lag for several
+filters), `scale` (a hand file 10 % wrong, the size floating), `start` (from nothing) and `compute` (time per datagram,
+memory over ten minutes). Logs are kept and found again, as by `rhot evaluate compare`.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from rhot_app.errors import RhotError
+from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation, rotation_from_quaternion
 from rhot_app.evaluation import scenarios
 from rhot_app.evaluation.accuracy import Figures
 from rhot_app.evaluation.compare import TRACKERS, Results, legend, run_table
@@ -38,16 +40,20 @@ from rhot_app.progress import ProgressLine
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, TrackerSettings
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
 
+Array = NDArray[np.float64]
+
 RAMP = str(Path(__file__).parent / "motions" / "ramp.json")
 CROSS_S, STILL_S, START_EVERY_S, SCALE_S = 60.0, 12.0, 1.0, 40.0
 LEAST_S = scenarios.BLIND_FROM_S + scenarios.BLIND_S
 WRONG_SCALES = (1.1, 0.9)
+TURNS_DEG = (0.0, 0.06, 0.2)
 BETAS = (0.1, 0.4, 1.5, 8.0, 40.0)
 POSITION_PER_PIXEL_BETA = 500.0  # the defaults' own proportion
 
 OWN_TAKES: dict[str, tuple[str | None, float | None]] = {
-    "cross": ("cross", CROSS_S), "still": ("still", STILL_S), "ramp": ("ramp", None), "fast": ("fast", None),
-    "curve": ("still, ramp and fast", None), "scale": (None, SCALE_S), "start": ("rest, grasp and wave", None)}
+    "cross": ("cross", CROSS_S), "still": ("still", STILL_S), "turned": ("still", STILL_S), "ramp": ("ramp", None),
+    "fast": ("fast", None), "curve": ("still, ramp and fast", None), "scale": (None, SCALE_S),
+    "start": ("rest, grasp and wave", None)}
 """Motion and seconds of trials that have their own; None: what is asked for."""
 
 
@@ -149,6 +155,28 @@ def scale(bench: Bench) -> Results:
     return results
 
 
+def turned(bench: Bench) -> Results:
+    """A still hand, when the rig is mistaken about how its second camera is turned: up or down, towards the first one,
+    about its line of sight."""
+    results: Results = {}
+    for axis, name in enumerate(("tilt", "yaw", "roll")):
+        for turn_deg in TURNS_DEG[axis > 0:]:
+            trial = partial(_mistaken, turn=np.radians(turn_deg) * np.eye(3)[axis])
+            for tracker, figures in bench.each(bench.takes("still", STILL_S), trial).items():
+                results[f"{tracker}, {name} {turn_deg:g} deg" if turn_deg else f"{tracker}, exact"] = figures
+    return results
+
+
+def _mistaken(take: DataSet, rig: Rig, turn: Array) -> Figures:
+    """Spread and errors with the second camera turned by a rotation vector (3,) rad about its own axes."""
+    pose = rig.nodes[1].pose
+    quaternion = quaternion_from_rotation(exp_so3(turn) @ rotation_from_quaternion(pose.rotation_wxyz))
+    other = msgspec.structs.replace(pose, rotation_wxyz=tuple(quaternion.tolist()))
+    second = msgspec.structs.replace(rig.nodes[1], pose=other)
+    mistaken = msgspec.structs.replace(rig, nodes=(rig.nodes[0], second, *rig.nodes[2:]))
+    return scenarios.standing_still(take, mistaken) | scenarios.plain(take, mistaken)
+
+
 def start(bench: Bench) -> Results:
     """Datagrams that begin in the middle of a movement."""
     starts: list[float] = np.arange(0.0, bench.seconds - 1.0, START_EVERY_S).tolist()
@@ -177,7 +205,7 @@ TRIALS: dict[str, Callable[[Bench], Results]] = {
     "still": lambda bench: bench.each(bench.takes("still", STILL_S), scenarios.standing_still),
     "ramp": lambda bench: bench.each(bench.takes(RAMP), partial(scenarios.lagging, speeding_up=True)),
     "fast": lambda bench: bench.each(bench.takes("fast"), partial(scenarios.lagging, speeding_up=False)),
-    "curve": curve, "scale": scale, "start": start, "compute": compute,
+    "turned": turned, "curve": curve, "scale": scale, "start": start, "compute": compute,
 }
 
 

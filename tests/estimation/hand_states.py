@@ -26,12 +26,12 @@ def make_process(bodies=False, slowest=SLOWEST, fastest=FASTEST):
     model = markers(bodies)
     prior = model.pose_prior
     return HandProcess(model.dh, model.limits, prior.mean, np.linalg.inv(prior.information), SPREAD, slowest,
-                       fastest, np.tile(1e-6 * np.eye(3), (len(model.finger), 1, 1)), BIAS_S)
+                       fastest, np.tile(1e-6 * np.eye(3), (len(model.lasting_s), 1, 1)), BIAS_S)
 
 
 def natural_state(rng, distance_m=0.6):
     """A hand at rest in a natural pose, turned any way."""
-    prior, state = markers().pose_prior, np.zeros(STATE.motion.stop + 3 * len(markers().finger))
+    prior, state = markers().pose_prior, np.zeros(STATE.motion.stop + 3 * len(markers().lasting_s))
     world = np.eye(4)
     world[:3, :3] = Rotation.random(random_state=rng).as_matrix()
     world[:3, 3] = rng.normal([0.03, 0.0, distance_m], 0.02)

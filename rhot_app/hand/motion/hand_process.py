@@ -1,8 +1,8 @@
 """How a hand moves: a Gauss-Markov process on the palm's pose and the 21 joint angles.
 
 Angles are a Matérn 5/2 process about the natural pose, with its covariance. The palm's velocity is a Matérn 3/2 process
-without a preferred place. Paint biases are a first-order process. The rates of the processes follow the hand: the
-faster it is estimated to move, the shorter is the correlation time.
+without a preferred place. Errors that last, of paint and of cameras, are a first-order process. The rates of the
+processes follow the hand: the faster it is estimated to move, the shorter is the correlation time.
 
 Before every prediction, the part of pose, velocity and acceleration that the markers do not observe is reset to the
 pose prior (`null_space`).

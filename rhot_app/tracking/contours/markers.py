@@ -18,8 +18,7 @@ from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.estimation.residual import Rows
 from rhot_app.estimation.track import TrackFilter
 from rhot_app.hand.dh import DhArrays
-from rhot_app.hand.landmarks import LASTING_S
-from rhot_app.hand.motion.hand_process import BIAS_S, FASTEST, PALM_SPREAD, HandProcess
+from rhot_app.hand.motion.hand_process import FASTEST, PALM_SPREAD, HandProcess
 from rhot_app.hand.motion.hand_state import MOTION, POSE, SHAPE, STATE, TANGENT
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
@@ -45,11 +44,10 @@ class MarkersOfHand:
         RigError when a marker has no position on the hand."""
         arrays, self._markers = compile_rig(rig), compile_markers(rig)
         self._starter, self._association = Starter(arrays, self._markers), MarkerAssociation(arrays)
-        count, prior, self._shape = len(self._markers.finger), hand.model.pose_prior, hand.shape_covariance
-        lasting = np.where(self._markers.landmark, LASTING_S, BIAS_S)
+        prior, self._shape, lasting = hand.model.pose_prior, hand.shape_covariance, self._markers.lasting_s
         self._process = HandProcess(
             hand.surface.dh, hand.model.limits, prior.mean, np.asarray(np.linalg.inv(prior.information)),
-            PALM_SPREAD, hand.slowest, FASTEST, np.concatenate([self._shape, np.zeros((count, 3, 3))]),
+            PALM_SPREAD, hand.slowest, FASTEST, np.concatenate([self._shape, np.zeros((len(lasting), 3, 3))]),
             np.concatenate([hand.shape_s, lasting]))
         hand.process, hand.filter = self._process, TrackFilter(self._process)
         self._hand = hand
@@ -116,7 +114,7 @@ class SizedMarkerResidual:
         """See `Residual`."""
         self.frame.markers = sized(self._markers, self._bone, state)
         rows = self.frame.linearise(without_shape(state))
-        by_place = rows.jacobian[:, MOTION:]  # a lasting error moves its marker directly
+        by_place = rows.jacobian[:, MOTION:MOTION + 3 * len(self._markers.finger)]  # a lasting error moves its marker
         jacobian = np.insert(rows.jacobian, [MOTION] * SHAPE, 0.0, axis=1)
         jacobian[:, MOTION + LENGTHS] = by_place @ lengths_jacobian(self._markers.dh, self._bone, state)
         return replace(rows, jacobian=jacobian)
@@ -138,7 +136,7 @@ def without_shape_covariance(covariance: Array, lengths: Array) -> Array:
     size = len(covariance)
     to = np.zeros((size - SHAPE, size))
     to[:MOTION, :MOTION], to[MOTION:, MOTION + SHAPE:] = np.eye(MOTION), np.eye(size - SHAPE - MOTION)
-    to[MOTION:, MOTION + LENGTHS] = lengths
+    to[MOTION:MOTION + len(lengths), MOTION + LENGTHS] = lengths
     return np.asarray(to @ covariance @ to.T)
 
 

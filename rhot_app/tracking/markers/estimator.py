@@ -23,7 +23,7 @@ from rhot_app.geometry.camera import undistort_points
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.landmarks import LASTING_S
 from rhot_app.hand.motion.hand_process import HandProcess
-from rhot_app.hand.motion.hand_state import STATE, TANGENT
+from rhot_app.hand.motion.hand_state import MOTION, STATE, TANGENT
 from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.skeleton import ANGLE_SLICES, HandPose
 from rhot_app.project import Rig
@@ -253,6 +253,9 @@ class Estimator(Tracker):
             inflated = self._filter.newest.covariance.copy()
             for part, factor in wrong:
                 self._process.inflate(inflated, part, factor)
+            if 2 * len(wrong) >= candidates:  # a camera that contradicts most of the hand may have been knocked
+                turns = slice(MOTION + 3 * len(frame.seen), None)
+                inflated[turns, turns] += self._process.stationary[turns, turns]
             self._filter.restart(inflated)
         accepted = int(np.count_nonzero(inliers))
         self._life.observe(frame.t_ns, accepted=accepted > 0, plausible=bool(2 * accepted >= candidates))

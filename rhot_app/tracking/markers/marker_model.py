@@ -36,6 +36,15 @@ landmark see `hand.landmarks`."""
 LASTING_PX = 0.01
 """px: standard deviation of the error of one camera's centroids that lasts (`python benchmarks/marker_errors.py`)."""
 
+TURN_SD_RAD, TURN_S = 1e-3, 3600.0
+"""rad, s: by how much a camera may be turned against the first one, beside what its calibration says: half a pixel of a
+lens of 530 px; and how long that lasts. If cameras are believed exactly, a hand at rest follows now the one, now
+the other, and shakes (`python benchmarks/trackers.py --only turned`)."""
+
+VERGENCE_SD_RAD = 2e-5
+"""rad: the same about the normal of the plane of both cameras and the hand, which is LASTING_PX. Such a turn moves the
+hand along the lines of sight and contradicts nothing: bones alone would decide it, and they are not known better."""
+
 _COUPLED_SD_RAD = math.radians(0.02)  # as good as exact
 
 
@@ -100,7 +109,12 @@ class MarkerModel:
         """How the hand moves, with the rates of recorded hands; paint biases are 0 until `set_bias`."""
         covariance = np.asarray(np.linalg.inv(self.pose_prior.information), dtype=np.float64)
         return HandProcess(self.dh, self.limits, self.pose_prior.mean, covariance, PALM_SPREAD, SLOWEST, FASTEST,
-                           np.zeros((len(self.finger), 3, 3)), np.where(self.landmark, LASTING_S, BIAS_S))
+                           np.zeros((len(self.lasting_s), 3, 3)), self.lasting_s)
+
+    @property
+    def lasting_s(self) -> Array:
+        """(M + C - 1,) s: correlation times of the errors that last, of the markers and of the cameras' turns."""
+        return np.concatenate([np.where(self.landmark, LASTING_S, BIAS_S), np.full(len(self.poses) - 1, TURN_S)])
 
     def marker_of(self, role: str) -> int:
         """The index of the marker with a role, -1 without."""

@@ -1,4 +1,8 @@
-"""Residuals of a hand: marker centroids and apparent sizes in one camera's frame."""
+"""Residuals of a hand: marker centroids and apparent sizes in one camera's frame.
+
+After the motion, a state has the errors that last: a displacement of each of M markers, m along the world's axes, and a
+turn of each of C cameras but the first, rad about its own axes.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +17,13 @@ from numpy.typing import NDArray
 
 from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.residual import UNIT, Rows, student
-from rhot_app.geometry.camera import is_wide, pixels_per_metre, project_with_slope
+from rhot_app.estimation.se3 import exponential
+from rhot_app.geometry.camera import camera_coordinates, is_wide, pixels_per_metre, project_with_slope
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, point_jacobian
 from rhot_app.hand.landmarks import NOISE_M
 from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE
 from rhot_app.tracking.association import GATE, assign, list_candidates, squared_distances
-from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, project_marker
+from rhot_app.tracking.markers.marker_model import LASTING_PX, TURN_SD_RAD, VERGENCE_SD_RAD, MarkerModel, project_marker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 
@@ -158,6 +163,18 @@ def place_points(state, dh):
 
 
 @njit(cache=True)
+def turned_camera(state, markers, camera):
+    """camera_from_world (3, 4) of a camera with its turn in `state` about its own axes, rad, and the turn's left
+    Jacobian (3, 3); the first camera has none."""
+    turn, rotation, left = np.zeros(3), np.empty((3, 3)), np.empty((3, 3))
+    if camera > 0:
+        first = 3 * (markers.half_axes.shape[0] + camera - 1)
+        turn[:] = state[STATE.lasting][first:first + 3]
+    exponential(turn[0], turn[1], turn[2], rotation, left)
+    return np.dot(rotation, markers.poses[camera]), left
+
+
+@njit(cache=True)
 def fill_centre(state, m, late, point, jacobian, centre):
     """x + b + J (v t + a t^2 / 2): fill `centre` (3,) m, where marker m's is seen `late` s t after the state's instant.
     `point` (3,) x and `jacobian` (3, 27) J: of its place."""
@@ -173,11 +190,14 @@ def fill_centre(state, m, late, point, jacobian, centre):
 @njit(cache=True)
 def project_markers(state, markers, camera, late_s):
     """Pixels (M, 2), NaN behind the camera, where the markers are seen `late_s` (M,) s after the state's instant, their
-    Jacobian (M, 2, n), and the scale (M,) px/m of the image at their places."""
-    count = late_s.shape[0]
-    pixels, jacobian, scale = np.empty((count, 2)), np.zeros((count, 2, MOTION + 3 * count)), np.empty(count)
+    Jacobian (M, 2, n), and the scale (M,) px/m of the image at their places. A turn d moves the camera's coordinates p
+    by d x p, and so a pixel with the slope s, px/m, by d . (p x s)."""
+    count, cameras = late_s.shape[0], markers.poses.shape[0]
+    pixels, scale = np.empty((count, 2)), np.empty(count)
+    jacobian = np.zeros((count, 2, MOTION + 3 * (count + cameras - 1)))
     world, _, points, by_pose = place_points(state, markers.dh)
-    pose, intrinsics, centre = markers.poses[camera], markers.intrinsics[camera], np.empty(3)
+    (pose, left), intrinsics, centre = turned_camera(state, markers, camera), markers.intrinsics[camera], np.empty(3)
+    own, axis, ray, turning = MOTION + 3 * (count + camera - 1), np.empty(3), np.empty(3), np.empty(3)
     slope, at_joint, joint_pixel = np.empty((2, 3)), np.empty((2, 3)), np.empty(2)
     for m in range(late_s.shape[0]):
         late = late_s[m]
@@ -198,6 +218,14 @@ def project_markers(state, markers, camera, late_s):
                 jacobian[m, r, 2 * POSE + j] = 0.5 * late * late * along
             for k in range(3):
                 jacobian[m, r, MOTION + 3 * m + k] = slope[r, k]
+            if camera == 0 or markers.landmark[m]:  # landmarks' errors last, and would turn the cameras
+                continue
+            for k in range(3):
+                axis[k] = pose[k, 0] * slope[r, 0] + pose[k, 1] * slope[r, 1] + pose[k, 2] * slope[r, 2]
+            ray[0], ray[1], ray[2] = camera_coordinates(pose, centre[0], centre[1], centre[2])
+            fill_cross(ray, axis, turning)
+            for k in range(3):
+                jacobian[m, r, own + k] = turning[0] * left[0, k] + turning[1] * left[1, k] + turning[2] * left[2, k]
     return pixels, jacobian, scale
 
 
@@ -317,14 +345,15 @@ def _size_change(point, pose, intrinsics, line, distance, change):
 
 @njit(cache=True)
 def lasting_covariances(state, markers):
-    """(M, 3, 3) m^2 of the errors that last: of a marker's triangulated centre by the cameras' LASTING_PX and by its
-    paint."""
-    dh, world, count = markers.dh, pose_matrix(state), markers.half_axes.shape[0]
-    points, pixel, slope, out = np.empty((count, 3)), np.empty(2), np.empty((2, 3)), np.empty((count, 3, 3))
+    """(M + C - 1, 3, 3) of the errors that last: of a marker's triangulated centre, m^2, by the cameras' LASTING_PX and
+    by its paint; then of the turns of all cameras but the first, rad^2."""
+    dh, world, count, cameras = markers.dh, pose_matrix(state), markers.half_axes.shape[0], markers.poses.shape[0]
+    points, pixel, slope = np.empty((count, 3)), np.empty(2), np.empty((2, 3))
+    out = np.zeros((count + cameras - 1, 3, 3))
     forward_arrays(dh, world, state[STATE.angles], np.empty((dh.parent.shape[0], 3, 4)), points)
     for m in range(count):
         information = 1e4 * np.eye(3)  # of 10 mm, where the cameras do not tell the distance
-        for camera in range(markers.poses.shape[0]):
+        for camera in range(cameras):
             if project_marker(points[m], world, markers.half_axes[m], markers.poses[camera], markers.intrinsics[camera],
                               pixel, slope):
                 for i in range(3):
@@ -333,4 +362,19 @@ def lasting_covariances(state, markers):
         out[m] = np.linalg.inv(information)
         for i in range(3):
             out[m, i, i] += markers.paint_variance[m]
+    first, hand, across = -np.dot(markers.poses[0, :, :3].T, markers.poses[0, :, 3]), world[:3, 3], np.empty(3)
+    for camera in range(1, cameras):
+        pose, own = markers.poses[camera], out[count + camera - 1]
+        fill_cross(np.dot(pose[:, :3], first) + pose[:, 3], np.dot(pose[:, :3], hand) + pose[:, 3], across)
+        across /= max(math.sqrt(np.dot(across, across)), 1e-12)
+        for i in range(3):
+            own[i, i] = TURN_SD_RAD**2
+            for j in range(3):
+                own[i, j] += (VERGENCE_SD_RAD**2 - TURN_SD_RAD**2) * across[i] * across[j]
     return out
+
+
+@njit(cache=True)
+def fill_cross(a, b, out):
+    """a x b."""
+    out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

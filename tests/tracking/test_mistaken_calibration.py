@@ -1,0 +1,57 @@
+"""The estimator where the rig is mistaken about how a camera is turned, from the start or after a knock."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+from knocked_rig import moved
+from modelled_hand import after_s, deviations, model_rig, moving, observations_of, states_of
+
+from rhot_app.state import Knowledge
+
+RIG = model_rig()
+SECONDS = 3.0
+KNOCK_S = 1.5
+
+
+def mistaken(turn):
+    """The rig, with another turn (3,) rad of its second camera."""
+    first, second = RIG.nodes
+    return msgspec.structs.replace(RIG, nodes=(first, msgspec.structs.replace(
+        second, pose=moved(second.pose, np.array([*turn, 0.0, 0.0, 0.0])))))
+
+
+def knocked(frames, down_px):
+    """The frames, where the second camera sees everything `down_px` lower after KNOCK_S."""
+    begin = frames[0].t_row0_master_ns + 1e9 * KNOCK_S
+    return [replace(one, pixels=one.pixels + [0.0, down_px]) if one.camera == 1 and one.t_row0_master_ns > begin
+            else one for one in frames]
+
+
+def shake_mm(states):
+    """Third differences of the joints: motion is left out, root mean square."""
+    joints = np.array([state.joint_positions for state in states])
+    return 1e3 * np.sqrt(np.mean(np.sum(np.diff(joints, 3, axis=0)**2, axis=2)) / 20.0)
+
+
+def share_measured(states):
+    return np.mean([state.marker_knowledge == Knowledge.MEASURED for state in states])
+
+
+@pytest.mark.parametrize("turn", [(1e-3, 0.0, 0.0), (-3.5e-3, 0.0, 0.0), (0.0, 0.0, 3.5e-3)], ids=str)
+def test_cameras_that_contradict_each_other_do_not_shake_the_hand(turn):
+    frames, truth = observations_of(RIG, moving("rest"), SECONDS), moving("rest")
+    exact, states = (after_s(states_of(rig, frames), 1.0) for rig in (RIG, mistaken(turn)))
+    assert shake_mm(states) < 1.25 * shake_mm(exact)
+    assert share_measured(states) > 0.95
+    assert deviations(states, truth).rms_mm < deviations(exact, truth).rms_mm + 2.0
+
+
+@pytest.mark.parametrize("down_px", [0.5, 2.0, 6.0])
+def test_a_camera_that_is_knocked_is_turned_back(down_px):
+    states = states_of(RIG, knocked(observations_of(RIG, moving("rest"), SECONDS), down_px))
+    before, after = after_s(states, 0.5, KNOCK_S), after_s(states, KNOCK_S + 1.0)
+    assert share_measured(after) > 0.9
+    assert shake_mm(after) < 1.5 * shake_mm(before)
+    assert deviations(after, moving("rest")).rms_mm < deviations(before, moving("rest")).rms_mm + 1.5
