@@ -112,16 +112,19 @@ def test_one_blind_camera_does_not_end_the_tracking():
 @pytest.mark.parametrize(("motion", "camera"), [
     ("rest", 0), ("rest", 1), ("grasp", 0), ("grasp", 1)])
 def test_half_a_second_before_one_camera_is_bridged_and_not_called_measured(motion, camera):
-    states = states_of(RIG, altered(observations_of(RIG, moving(motion), 2.0), hidden(slice(None), 1.0, 1.5, camera)))
-    dark = after_s(states, 1.0, 1.5)
-    found = deviations(dark, moving(motion))
-    assert found.rms_mm < 25.0
-    assert all(state.condition in HERE for state in after_s(states, 0.5))
-    late = after_s(dark, 1.15)
-    assert len(late) > 10
-    assert not any((state.marker_knowledge == Knowledge.MEASURED).any() for state in late)
-    assert not any(state.palm_knowledge == Knowledge.MEASURED for state in late)
-    assert deviations(after_s(states, 1.7), moving(motion)).rms_mm < 3.0
+    """From four moments on: how far the depth goes astray from one of them is chance."""
+    frames, off_mm = observations_of(RIG, moving(motion), 2.8), []
+    for begin in (0.9, 1.2, 1.5, 2.1):
+        states = states_of(RIG, altered(frames, hidden(slice(None), begin, begin + 0.5, camera)))
+        dark = after_s(states, begin, begin + 0.5)
+        off_mm.append(deviations(dark, moving(motion)).rms_mm)
+        assert all(state.condition in HERE for state in after_s(states, 0.5))
+        late = after_s(dark, begin + 0.15)
+        assert len(late) > 10
+        assert not any((state.marker_knowledge == Knowledge.MEASURED).any() for state in late)
+        assert not any(state.palm_knowledge == Knowledge.MEASURED for state in late)
+        assert deviations(after_s(states, begin + 0.65), moving(motion)).rms_mm < 3.0
+    assert np.sqrt(np.mean(np.square(off_mm))) < 25.0
 
 
 @pytest.mark.parametrize("motion", ["rest", "grasp"])
