@@ -111,7 +111,7 @@ def test_markers_lie_on_a_hand_of_the_states_shape_with_its_jacobian(markers: st
         resource_path("markers", f"{markers}.json")))
     hand, pose, factor = BareHandTracker(rig, known_size=False), poses("grasp", (0.5,))[0], 1.1
     MarkersOfHand(rig, hand)
-    state = np.zeros(STATE.shape.stop + 3 * len(rig.markers.ids))
+    state = np.zeros(STATE.shape.stop + 3 * (len(rig.markers.ids) + len(rig.nodes) - 1))
     state[:STATE.shape.stop] = state_of(pose)
     state[STATE.shape][HAND_SIZE] = np.log(factor)
     model = compile_markers(rig)
@@ -133,7 +133,7 @@ def pixels_of(rig: Rig, pose: HandPose, factor: float) -> np.ndarray:
     large = msgspec.structs.replace(rig, hand=scaled_hand(rig.hand, factor))
     model = compile_markers(large)
     blank = MarkerFrame(model, observations(np.zeros((len(model.finger), 2))))
-    return blank.expected(np.concatenate([state_of(pose)[STATE.motion], np.zeros(3 * len(model.finger))]))
+    return blank.expected(np.concatenate([state_of(pose)[STATE.motion], np.zeros(3 * len(model.lasting_s))]))
 
 
 def observations(pixels: np.ndarray) -> CameraObservations:
