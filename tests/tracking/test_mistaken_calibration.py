@@ -24,9 +24,9 @@ def mistaken(turn):
 
 def knocked(frames, down_px):
     """The frames, where the second camera sees everything `down_px` lower after KNOCK_S."""
-    begin = frames[0].t_row0_master_ns + 1e9 * KNOCK_S
-    return [replace(one, pixels=one.pixels + np.array([0.0, down_px])) if one.camera == 1 and one.t_row0_master_ns > begin
-            else one for one in frames]
+    begin, down = frames[0].t_row0_master_ns + 1e9 * KNOCK_S, np.array([0.0, down_px])
+    return [replace(one, pixels=one.pixels + down) if one.camera == 1 and one.t_row0_master_ns > begin else one
+            for one in frames]
 
 
 def shake_mm(states):
