@@ -4,6 +4,7 @@ and replayed."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -19,8 +20,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QProgressBar,
     QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -31,6 +30,7 @@ from rhot_app.project import Rig, load_rig
 from rhot_app.sources.film_offset import FilmOffset, offsets_of
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
+from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import LOG_FILTER
 from rhot_app.ui.language import tr, tr_noop
@@ -44,6 +44,20 @@ _LATEST_S = 3600.0
 _MEANING = tr_noop("Films of a bare hand by one camera, or by several at the same time. The hand networks find its "
                    "landmarks; the tracked hand is then shown beside the pictures. Several films need the rig file "
                    "that says where their cameras stand; one film is tracked without, at a distance that is a guess.")
+
+
+@dataclass(eq=False)
+class FilmRow:
+    """A film on the list: what was found of it, which is `wrong` when it is none, and what the person chose."""
+
+    path: Path
+    camera: str = ""
+    later_s: float = 0.0
+    about: str = "…"
+    wrong: bool = False
+
+
+_CAMERA, _LATER = 0, 3  # columns of fields
 
 
 class FilmsDialog(QDialog):
@@ -67,12 +81,14 @@ class FilmsDialog(QDialog):
         meaning.setProperty("muted", True)
         self.rig_choice = FileChoice(tr("The rig of the films' cameras"), tr("none: one film, its lens assumed"),
                                      tr("No rig"))
-        self.table = QTableWidget(0, 4)
-        self.table.setHorizontalHeaderLabels([tr("Camera"), tr("Film"), "", tr("Begins later by")])
+        tip = Qt.ItemDataRole.ToolTipRole
+        self.table: RecordTable[FilmRow] = RecordTable((
+            Column(tr("Camera"), lambda row: ""),
+            Column(tr("Film"), lambda row: row.path.name, roles=lambda row: {tip: str(row.path)}),
+            Column("", lambda row: tr("no film") if row.wrong else row.about, roles=lambda row: {tip: row.about}),
+            Column(tr("Begins later by"), lambda row: "")))
         self.table.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
-        self.table.setSelectionBehavior(QTableWidget.SelectionBehavior.SelectRows)
-        self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
-        self.table.verticalHeader().hide()
+        self.table.setSelectionMode(RecordTable.SelectionMode.ExtendedSelection)
         self.table.setMinimumHeight(_TABLE_PX)
         self.add_button, self.folder_button = QPushButton(tr("Add films …")), QPushButton(tr("Add a folder …"))
         self.folder_button.setToolTip(tr("All films in a folder, in the order of their names."))
@@ -95,7 +111,7 @@ class FilmsDialog(QDialog):
         self.remove_button.clicked.connect(self.remove)
         self.sound_button.clicked.connect(lambda: self.align("sound"))
         self.flash_button.clicked.connect(lambda: self.align("flash"))
-        self.table.itemSelectionChanged.connect(self._show_state)
+        self.table.chosen_changed.connect(self._show_state)
         self.rig_choice.changed.connect(self._take_rig)
         self.track_button.clicked.connect(self._track_or_cancel)
         self.close_button.clicked.connect(self.reject)
@@ -130,51 +146,49 @@ class FilmsDialog(QDialog):
     @property
     def films(self) -> list[ChosenFilm]:
         """The films on the list."""
-        found = []
-        for row in range(self.table.rowCount()):
-            camera, later = self.table.cellWidget(row, 0), self.table.cellWidget(row, 3)
-            assert isinstance(camera, QComboBox) and isinstance(later, QDoubleSpinBox)
-            found.append(ChosenFilm(camera.currentText(), self._path(row), later.value()))
-        return found
-
-    def _path(self, row: int) -> Path:
-        item = self.table.item(row, 1)
-        assert item is not None
-        return Path(item.data(Qt.ItemDataRole.UserRole))
+        return [ChosenFilm(row.camera, row.path, row.later_s) for row in self.table.records]
 
     def add(self, paths: list[Path]) -> None:
         """Put films on the list; each takes the next camera of the rig."""
-        known = {film.path for film in self.films}
-        for path in paths:
-            if path in known:
-                continue
-            known.add(path)
-            row = self.table.rowCount()
-            with QSignalBlocker(self.table):  # a row without its parts is not looked at
-                self.table.insertRow(row)
-                name, what, later = QTableWidgetItem(path.name), QTableWidgetItem("…"), QDoubleSpinBox()
-                name.setData(Qt.ItemDataRole.UserRole, str(path))
-                name.setToolTip(str(path))
-                later.setRange(-_LATEST_S, _LATEST_S)
-                later.setDecimals(4)
-                later.setSuffix(" s")
-                later.setToolTip(tr("By how much this film began after the others."))
-                self.table.setCellWidget(row, 0, QComboBox())
-                self.table.setItem(row, 1, name)
-                self.table.setItem(row, 2, what)
-                self.table.setCellWidget(row, 3, later)
-            self.table.resizeColumnToContents(3)
-            self._name_cameras()
+        known = {row.path for row in self.table.records}
+        new = [path for path in dict.fromkeys(paths) if path not in known]
+        self._show_rows([*self.table.records, *map(FilmRow, new)])
+        for path in new:
             self._looks.append(Job(partial(_describe, path), partial(self._show_what, path, wrong=False),
                                    partial(self._show_what, path, wrong=True), None, self).start())
-        self._show_state()
 
     def remove(self) -> None:
         """Take the chosen films off the list."""
-        with QSignalBlocker(self.table):
-            for row in sorted({index.row() for index in self.table.selectedIndexes()}, reverse=True):
-                self.table.removeRow(row)
+        chosen = self.table.chosen_rows
+        self._show_rows([row for k, row in enumerate(self.table.records) if k not in chosen])
+
+    def _show_rows(self, rows: list[FilmRow]) -> None:
+        self.table.show_records(rows)
+        for k, row in enumerate(rows):
+            later = QDoubleSpinBox()
+            later.setRange(-_LATEST_S, _LATEST_S)
+            later.setDecimals(4)
+            later.setSuffix(" s")
+            later.setToolTip(tr("By how much this film began after the others."))
+            later.setValue(row.later_s)
+            later.valueChanged.connect(partial(setattr, row, "later_s"))
+            camera = QComboBox()
+            camera.currentTextChanged.connect(partial(self._choose_camera, row))
+            for column, field in ((_CAMERA, camera), (_LATER, later)):
+                self.table.setIndexWidget(self.table.records_model.index(k, column), field)
+        self._name_cameras()
+        self._fit_columns()
         self._show_state()
+
+    def _fit_columns(self) -> None:
+        for column in (_CAMERA, 2, _LATER):
+            self.table.resizeColumnToContents(column)
+
+    def field(self, row: int, column: int) -> QComboBox | QDoubleSpinBox:
+        """The field in a cell."""
+        found = self.table.indexWidget(self.table.records_model.index(row, column))
+        assert isinstance(found, QComboBox | QDoubleSpinBox)
+        return found
 
     def _choose_films(self) -> None:
         names, _ = QFileDialog.getOpenFileNames(
@@ -191,7 +205,7 @@ class FilmsDialog(QDialog):
                 self.sentence.setText(tr("{name} holds no films ({names}).", name=name, names=", ".join(ENDINGS)))
 
     def _folder(self) -> Path:
-        return self.films[-1].path.parent if self.table.rowCount() else Path.home()
+        return self.films[-1].path.parent if self.films else Path.home()
 
     def _take_rig(self) -> None:
         self._rig, self.problem = None, ""
@@ -206,24 +220,28 @@ class FilmsDialog(QDialog):
     def _name_cameras(self) -> None:
         """Offer the rig's cameras; a film whose name begins with a camera's gets that one."""
         names = [node.name for node in self._rig.nodes] if self._rig is not None else ["camera"]
-        for row in range(self.table.rowCount()):
-            box = self.table.cellWidget(row, 0)
+        for k, row in enumerate(self.table.records):
+            box = self.field(k, _CAMERA)
             assert isinstance(box, QComboBox)
-            if [box.itemText(k) for k in range(box.count())] != names:
-                alike = [k for k, name in enumerate(names) if self._path(row).stem.lower().startswith(name.lower())]
-                box.clear()
-                box.addItems(names)
-                box.setCurrentIndex(alike[0] if alike else min(row, len(names) - 1))
-                box.currentIndexChanged.connect(self._show_state)
+            if [box.itemText(n) for n in range(box.count())] != names:
+                alike = [name for name in names if row.path.stem.lower().startswith(name.lower())]
+                if row.camera not in names:
+                    row.camera = alike[0] if alike else names[min(k, len(names) - 1)]
+                with QSignalBlocker(box):
+                    box.clear()
+                    box.addItems(names)
+                    box.setCurrentText(row.camera)
+
+    def _choose_camera(self, row: FilmRow, name: str) -> None:
+        row.camera = name
+        self._show_state()
 
     def _show_what(self, path: Path, text: str, *, wrong: bool) -> None:
-        for row in range(self.table.rowCount()):
-            item = self.table.item(row, 2)
-            if item is not None and self._path(row) == path:
-                item.setText(tr("no film") if wrong else text)
-                item.setToolTip(text)
-                item.setData(Qt.ItemDataRole.UserRole, wrong)
-        self.table.resizeColumnToContents(2)
+        for row in self.table.records:
+            if row.path == path:
+                row.about, row.wrong = text, wrong
+        self.table.records_model.refresh()
+        self._fit_columns()
         self._show_state()
 
     def _wanting(self) -> str:
@@ -233,10 +251,9 @@ class FilmsDialog(QDialog):
             return self.problem
         if not films:
             return tr("Add the film of a hand, or those of several cameras.")
-        for row in range(len(films)):
-            item = self.table.item(row, 2)
-            if item is not None and item.data(Qt.ItemDataRole.UserRole):
-                return item.toolTip()
+        for row in self.table.records:
+            if row.wrong:
+                return row.about
         if self._rig is None and len(films) > 1:
             return tr("Several films need the rig of their cameras: choose its file, or remove all films but one.")
         cameras = [film.camera for film in films]
@@ -247,7 +264,7 @@ class FilmsDialog(QDialog):
         busy, wanting = self._job is not None, self._wanting()
         for part in (self.add_button, self.folder_button, self.rig_choice, self.table):
             part.setEnabled(not busy)
-        self.remove_button.setEnabled(not busy and bool(self.table.selectedIndexes()))
+        self.remove_button.setEnabled(not busy and bool(self.table.chosen_rows))
         for button in (self.sound_button, self.flash_button):
             button.setEnabled(not busy and len(self.films) > 1)
         self.track_button.setText(tr("Cancel") if busy else tr("Track …"))
@@ -306,10 +323,10 @@ class FilmsDialog(QDialog):
     def _show_offsets(self, offsets: dict[str, FilmOffset]) -> None:
         self._job = None
         self.bar.setValue(1000)
-        for row in range(self.table.rowCount()):
-            later = self.table.cellWidget(row, 3)
+        for k, row in enumerate(self.table.records):
+            later = self.field(k, _LATER)
             assert isinstance(later, QDoubleSpinBox)
-            later.setValue(offsets[str(self._path(row))].seconds)
+            later.setValue(offsets[str(row.path)].seconds)
         self._show_state()
         found = ", ".join(f"{Path(path).name} {one.seconds:+.3f} ± {one.std_s:.3f} s" for path, one in offsets.items())
         self.sentence.setText(tr("Aligned: {offsets}.", offsets=found))

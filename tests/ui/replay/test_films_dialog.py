@@ -72,7 +72,7 @@ def test_two_films_of_a_folder_are_tracked_and_open(person: Person, films: Path,
     person.until(dialog.track_button.isEnabled)
     assert [(film.camera, film.path.name) for film in dialog.films] == [
         (node.name, f"{node.name}-take1.avi") for node in sorted(RIG.nodes, key=lambda node: node.name)]
-    person.until(lambda: "images/s" in dialog.table.item(0, 2).text())
+    person.until(lambda: "images/s" in dialog.table.text(0, 2))
     log = tmp_path / "hand.rhotlog"
     answer(monkeypatch, "getSaveFileName", str(log))
     person.click(dialog.track_button)
@@ -102,12 +102,12 @@ def test_what_is_missing_is_said(person: Person, films: Path, tmp_path: Path,
     assert said(person, "Add the film")() and not dialog.track_button.isEnabled()
     dialog.add([tmp_path / "notes.mp4"])
     person.until(said(person, "notes.mp4"))
-    assert not dialog.track_button.isEnabled() and dialog.table.item(0, 2).text() == "no film"
+    assert not dialog.track_button.isEnabled() and dialog.table.text(0, 2) == "no film"
     dialog.table.selectRow(0)
     person.click(dialog.remove_button)
     dialog.add(sorted(films.iterdir()))
     dialog.rig_choice.show_path(tmp_path / "rig.json")
-    dialog.table.cellWidget(1, 0).setCurrentIndex(dialog.table.cellWidget(0, 0).currentIndex())
+    dialog.field(1, 0).setCurrentIndex(dialog.field(0, 0).currentIndex())
     person.until(said(person, "two films"))
     dialog.rig_choice.show_path(tmp_path / "notes.mp4")
     person.until(said(person, "notes.mp4"))
@@ -115,6 +115,20 @@ def test_what_is_missing_is_said(person: Person, films: Path, tmp_path: Path,
     (tmp_path / "notes.mp4").unlink()
     person.click(dialog.folder_button)
     person.until(said(person, "holds no films"))
+
+
+def test_what_was_chosen_for_a_film_stays_when_another_goes(person: Person, films: Path, tmp_path: Path) -> None:
+    dialog = person.window
+    dialog.rig_choice.show_path(tmp_path / "rig.json")
+    dialog.add([tmp_path / "notes.mp4", *sorted(films.iterdir())])
+    person.until(lambda: dialog.table.text(0, 2) == "no film")
+    dialog.field(2, 3).setValue(0.25)
+    dialog.field(2, 0).setCurrentIndex(0)
+    chosen = dialog.films[2]
+    person.click(dialog.table.viewport(), dialog.table.visualRect(dialog.table.records_model.index(0, 1)).center())
+    person.click(dialog.remove_button)
+    assert dialog.films[1] == chosen and chosen.offset_s == 0.25 and len(dialog.films) == 2
+    assert (dialog.field(1, 3).value(), dialog.field(1, 0).currentText()) == (0.25, chosen.camera)
 
 
 def flashing(path: Path, at: int) -> Path:
