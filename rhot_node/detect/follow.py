@@ -247,9 +247,8 @@ def _axes_hold(outline, fitted):
 @njit(**c.FAST)
 def _state(track, fitted, outline, noise, report):
     """Report what was fitted, and take it into the track."""
-    half = 0.5 * (fitted.m_xx + fitted.m_yy)
-    spread = math.hypot(0.5 * (fitted.m_xx - fitted.m_yy), fitted.m_xy)
-    extent, breadth = length_of(half + spread), length_of(max(half - spread, 0.0))
+    moments = fitted.m_xx, fitted.m_xy, fitted.m_yy
+    extent = length_of(t.principal(moments)[0])
     bias = math.hypot(t.hidden_bias(fitted.area / track.area, max(extent, track.extent), fitted.area, t.SHARP),
                       t.smear_bias(outline.blur))
     bias = math.hypot(bias, outline.off_axis * extent)
@@ -264,9 +263,11 @@ def _state(track, fitted, outline, noise, report):
         fitted.y -= track.limb_taken * limb_y
         bias = math.hypot(bias, track.limb_left * limb)
     t.state(fitted, floor, bias, level, noise, report)
+    cover = t.cover_of(track, fitted, moments)
+    t.widen_covered(cover, report)
     if outline.rims > 0.0:
         t.widen_band(outline.axis_x, outline.axis_y, extent, report)
-    t.take(track, fitted, (extent, breadth, 1.0), level, False)
+    t.take(track, fitted, cover, level, False)
 
 
 # -- start of fast tracking --------------------------------------------------------------------------------------------

@@ -30,7 +30,6 @@ LEVEL_TOLERANCE = 0.08  # a local level further off than this from the assumed o
 SEAM = 16  # chroma pixels; a component this large without any interior is a seam where two other colours mix
 SIZE_SIGMA = 0.35  # of the log area from one frame to the next
 FRAGMENT_REACH = 1.0  # diameters from the prediction within which pieces of a marker are put together
-FRAGMENT_AREA = 1.2  # of the expected area: more is another object
 
 
 COMPONENTS_MAX = 64
@@ -192,7 +191,8 @@ def _cost(component, request):
 def _choose(components, count, request, own, result):
     """Mark the component nearest to the hypothesis, and its fragments, in `own`; return the former.
 
-    Pieces of a marker that a finger crosses count as one, as long as they are together no larger than the marker was.
+    Pieces of a marker that a finger crosses count as one: those with which the area is nearer to that of the whole, by
+    its logarithm, than without. Beside a whole marker, what has its colour is another object.
     """
     best = 0
     best_cost = np.inf
@@ -212,7 +212,7 @@ def _choose(components, count, request, own, result):
         component = components[number]
         away = np.hypot(component.sum_x / component.area - request.x,
                         component.sum_y / component.area - request.y)
-        if away < reach and total + component.area <= FRAGMENT_AREA * request.area:
+        if away < reach and total * (total + component.area) < request.area ** 2:
             own[number] = True
             total += component.area
             fragments += 1

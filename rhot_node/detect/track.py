@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rhot_node.detect.band import ARC, length_of
 from rhot_node.detect.image import EVEN, table_of
+from rhot_node.detect.outline_pixels import BLUR_VARIANCE
 from rhot_node.markers import Shape
 from rhot_node.wire.messages import MarkerFlag
 
@@ -154,6 +155,7 @@ def widen_band(axis_x, axis_y, breadth, report):
 MEMORY_FRAMES = 40  # for which a lost marker's size and velocity are kept
 VELOCITY_GAIN = 0.7
 AREA_GAIN = 0.4  # per frame, of the expected log area and of its trend
+COVERED = 0.5  # of the shift of the centroid by a cover: what the centroid may be off it, so that a cover explains both
 GROWTH_MAX = 0.1  # of log area per frame: 2 m/s of approach at 1 m, at 40 frames/s
 PARTIAL_AREA = 0.82  # of the expected area: less is half hidden
 BROKEN_AREA = 0.93  # of the expected area: a band with less whose rims no longer fit is half hidden
@@ -168,10 +170,12 @@ PARTIAL, EDGE, AMBIGUOUS = int(MarkerFlag.PARTIAL), int(MarkerFlag.EDGE), int(Ma
 
 
 class Track(NamedTuple):
-    """Chroma px, and px per frame. `area`: expected in the next frame; `growth`: trend of its logarithm per frame, by
-    approach. `extent`, `breadth`: lengths along both axes, `outlined`: by a fitted outline. `fitted`: a band's
-    curvature is known; `sag_x`, `sag_y`: from its centre to its centroid. `missed`: frames since the last observation.
-    `limb_taken`, `limb_left`: LIMB_OF_SHAPE; `band`: whether its marker is one."""
+    """Chroma px, and px per frame, of the whole marker, also while something hides a part of it (`Cover`).
+
+    `area`: expected in the next frame; `growth`: trend of its logarithm per frame, by approach. `m_xx`, `m_xy`, `m_yy`:
+    second moments, without blur; `extent`: the longest length. `fitted`: a band's curvature is known; `sag_x`, `sag_y`:
+    from its centre to its centroid. `missed`: frames since the last observation. `limb_taken`, `limb_left`:
+    LIMB_OF_SHAPE; `band`: whether its marker is one."""
 
     x: float = 0.0
     y: float = 0.0
@@ -180,8 +184,9 @@ class Track(NamedTuple):
     area: float = 0.0
     growth: float = 0.0
     extent: float = 0.0
-    breadth: float = 0.0
-    outlined: float = 0.0
+    m_xx: float = 0.0
+    m_xy: float = 0.0
+    m_yy: float = 0.0
     level: float = 0.0
     fitted: float = 0.0
     sag_x: float = 0.0
@@ -191,6 +196,16 @@ class Track(NamedTuple):
     limb_taken: float = 0.0
     limb_left: float = 0.0
     band: float = 0.0
+
+
+class Cover(NamedTuple):
+    """Second moments xx, xy, yy of the whole marker, px^2; growth of its log area by approach; and how far a cover has
+    moved the centroid of what is visible, px, 0 without one."""
+
+    moments: tuple[float, float, float]
+    growth: float
+    x: float
+    y: float
 
 
 class Request(NamedTuple):
@@ -261,9 +276,11 @@ def observe(tracks, slot, measured, noise, flags, reports):
         bias = math.hypot(bias, off_axis)
     if not known:
         track.vx = track.vy = track.area = track.growth = track.fitted = track.sag_x = track.sag_y = 0.0
-    take(track, row, (extent, length_of(row.var_minor), 0.0), row.level, flags & (PARTIAL | EDGE) and ratio < 1.0)
+    cover = cover_of(track, row, _moments(row))
+    take(track, row, cover, row.level, flags & (PARTIAL | EDGE) and ratio < 1.0)
     floor = FLOOR_VARIANCE if row.careful > 0.0 else mask_variance(row.area)
     state(row, floor, bias, row.level, noise, report)
+    widen_covered(cover, report)
     if row.fit > 0.0:
         sag = ARC * row.sag
         track.fitted, track.sag_x, track.sag_y = 1.0, -row.axis_y * sag, row.axis_x * sag
@@ -303,42 +320,113 @@ def _plausible_bias(track, row, ratio, width, flags):
 
 
 @njit(cache=True)
-def even_growth(track, lengths):
-    """Growth of the log area by approach, which changes both lengths alike: twice the lesser of theirs.
-
-    What is hidden from one side, or turns away, changes one length alone. Lengths of coverage hold the blur, those of
-    an outline do not.
-    """
-    extent, breadth, outlined = lengths
-    if outlined != track.outlined or not min(track.breadth, breadth) > 0.0:
-        return 0.0
-    along, across = math.log(extent / track.extent), math.log(breadth / track.breadth)
-    if along * across <= 0.0:
-        return 0.0
-    return 2.0 * (along if abs(along) < abs(across) else across)
+def _moments(row):
+    """xx, xy and yy of what was measured, less the blur that coverage has, as of a fitted outline."""
+    blur = BLUR_VARIANCE if row.careful > 0.0 else 0.0
+    major, minor = max(row.var_major - blur, EVEN), max(row.var_minor - blur, EVEN)
+    ax, ay = row.axis_x, row.axis_y
+    return (major * ax * ax + minor * ay * ay, (major - minor) * ax * ay, major * ay * ay + minor * ax * ax)
 
 
 @njit(cache=True)
-def take(track, place, lengths, level, hidden):
+def principal(moments):
+    """Variances along the major and the minor axis, of second moments xx, xy, yy."""
+    xx, xy, yy = moments
+    half, spread = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
+    return half + spread, half - spread
+
+
+@njit(cache=True)
+def _change(before, now):
+    """(growth, x, y): how the second moments of a marker have changed, by approach and by a cover.
+
+    Approach scales both principal lengths alike: `growth`, of the log area, is twice the lesser of theirs. A cover
+    takes a share of the area from one side, and so shortens one direction alone. That is the u of the least l in
+
+        M u = l W u;  share = 1 - sqrt(|M| / |W|) / exp(growth);  (x, y) = share sqrt(3) W u / sqrt(u'W u)
+
+    with W, M the moments before and now. (x, y), or its opposite, is how far the centroid of what stays has moved:
+    exactly, for a rectangle that is cut along a side.
+    """
+    major, minor = principal(before)
+    long, short = principal(now)
+    if not min(minor, short) > 0.0:
+        return 0.0, 0.0, 0.0
+    along, across = math.log(long / major), math.log(short / minor)
+    growth = 0.0
+    if along * across > 0.0:
+        growth = along if abs(along) < abs(across) else across
+    share = 1.0 - math.exp(0.5 * (along + across) - growth)
+    w_xx, w_xy, w_yy = before
+    xx, xy, yy = now
+    whole = major * minor
+    half = 0.5 * (xx * w_yy - 2.0 * xy * w_xy + yy * w_xx) / whole
+    least = half - math.sqrt(max(half * half - long * short / whole, 0.0))
+    a, b, c = xx - least * w_xx, xy - least * w_xy, yy - least * w_yy
+    u_x, u_y = (-b, a) if abs(a) > abs(c) else (c, -b)
+    v_x, v_y = w_xx * u_x + w_xy * u_y, w_xy * u_x + w_yy * u_y
+    square = u_x * v_x + u_y * v_y
+    if not (share > 0.0 and square > 0.0):
+        return growth, 0.0, 0.0
+    scale = share * math.sqrt(3.0 / square)
+    return growth, scale * v_x, scale * v_y
+
+
+@njit(cache=True)
+def cover_of(track, place, moments):
+    """What the change of a marker's moments (xx, xy, yy, without blur) says: a `Cover`.
+
+    A marker that turns away and one that is covered both lose area in one direction. They differ by their centroid: of
+    the former it goes on as it moved, of the latter it is drawn from the cover by just as much as it lost.
+    """
+    if not track.area > 0.0:
+        return Cover(moments, 0.0, 0.0, 0.0)
+    before, gap = (track.m_xx, track.m_xy, track.m_yy), track.missed + 1.0
+    growth, shift_x, shift_y = _change(before, moments)
+    dx, dy = place.x - track.x - gap * track.vx, place.y - track.y - gap * track.vy
+    if dx * shift_x + dy * shift_y < 0.0:
+        shift_x, shift_y = -shift_x, -shift_y
+    off = math.hypot(dx - shift_x, dy - shift_y)
+    if track.alive > 0.0 and off < COVERED * math.hypot(shift_x, shift_y):
+        grown = math.exp(growth)
+        return Cover((grown * before[0], grown * before[1], grown * before[2]), growth, shift_x, shift_y)
+    return Cover(moments, growth, 0.0, 0.0)
+
+
+@njit(cache=True)
+def widen_covered(cover, report):
+    """Add to the covariance of a report, luma px, how far a cover has moved the centroid."""
+    x, y = 2.0 * cover.x, 2.0 * cover.y
+    report.cov_xx += x * x
+    report.cov_xy += x * y
+    report.cov_yy += y * y
+
+
+@njit(cache=True)
+def take(track, place, cover, level, hidden):
     """Take a measured place into a track: motion, and, unless something hides a part, size and its trend.
 
-    A track whose area is 0 knows nothing yet. `lengths`: extent, breadth and outlined, as in `Track`.
+    What is covered keeps its size, and the centre that it has with that. A track whose area is 0 knows nothing yet.
     """
     gap = track.missed + 1.0
-    if track.area > 0.0:
+    covered = cover.x != 0.0 or cover.y != 0.0
+    x, y = place.x - cover.x, place.y - cover.y
+    if not track.area > 0.0:
+        track.area = place.area
+    else:
         gain = VELOCITY_GAIN if track.alive > 0.0 else 1.0
-        track.vx += gain * ((place.x - track.x) / gap - track.vx)
-        track.vy += gain * ((place.y - track.y) / gap - track.vy)
+        track.vx += gain * ((x - track.x) / gap - track.vx)
+        track.vy += gain * ((y - track.y) / gap - track.vy)
         if hidden:
             track.area *= HIDDEN_DECAY
             track.growth = 0.0
         else:
-            seen = min(max(even_growth(track, lengths) / gap, -GROWTH_MAX), GROWTH_MAX)
-            track.growth += AREA_GAIN * (seen - track.growth)
-            track.area *= (place.area / track.area) ** AREA_GAIN * math.exp(track.growth)
-            track.extent, track.breadth, track.outlined = lengths
-    else:
-        track.area = place.area
-        track.extent, track.breadth, track.outlined = lengths
-    track.x, track.y, track.level = place.x, place.y, level
+            track.growth += AREA_GAIN * (min(max(cover.growth / gap, -GROWTH_MAX), GROWTH_MAX) - track.growth)
+            if not covered:
+                track.area *= (place.area / track.area) ** AREA_GAIN
+            track.area *= math.exp(track.growth)
+    if not hidden or track.extent == 0.0:
+        track.m_xx, track.m_xy, track.m_yy = cover.moments
+        track.extent = length_of(principal(cover.moments)[0])
+    track.x, track.y, track.level = x, y, level
     track.alive, track.missed = 1.0, 0.0

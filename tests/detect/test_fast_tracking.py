@@ -262,3 +262,29 @@ def test_a_marker_that_is_covered_slowly_from_one_side_is_half_hidden_not_farthe
         seen = detector.detect(canvas.expose(rng))[0]
         assert seen.flags & DOUBTS or error(seen, 160.0, 120.0) < 0.5 + 2.5 * sigma(seen)
         assert seen.flags & DOUBTS or cover < 22.0
+
+
+@pytest.mark.parametrize(("factor", "turned"), [(0.97, True), (0.97, False)])
+def test_a_marker_that_turns_away_is_plain(factor: float, turned: bool) -> None:
+    """Its lengths shrink about a centroid that goes on as it moved."""
+    detector = only("ring")
+    rng = np.random.default_rng(5)
+    flagged = 0
+    for k in range(26):
+        share, x, y = factor ** max(k - 6, 0), 120.0 + 1.5 * k, 120.0
+        reach = 9.0 * share
+        ends = ((x, y - reach), (x, y + reach)) if turned else ((x - reach, y), (x + reach, y))
+        canvas = Canvas(320, 240).paint(capsule(*ends, 9.0), RGB["ring"], (x, y), 22)
+        flagged += bool(detector.detect(canvas.expose(rng))[0].flags & DOUBTS)
+    assert flagged == 0
+
+
+def test_beside_a_whole_marker_a_speck_of_its_colour_is_no_piece_of_it() -> None:
+    rng, detector = np.random.default_rng(6), only("ring")
+    for k in range(8):
+        canvas = Canvas(320, 240).paint(disc(160, 120, 16), RGB["ring"], (160, 120), 19)
+        if k > 2:
+            canvas.paint(disc(190, 120, 5), RGB["ring"], (190, 120), 8)
+        seen = detector.detect(canvas.expose(rng))[0]
+        assert not seen.flags & DOUBTS
+        assert error(seen, 160.0, 120.0) < 0.1

@@ -67,6 +67,27 @@ def test_a_face_does_not_jump_while_the_picture_moves() -> None:
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
+def test_a_face_that_a_bar_crosses_is_not_called_plain_far_off(camera: int) -> None:
+    """The bar hides up to half of a face, by 5 px a frame: see `benchmarks/moved_cube.py`."""
+    bgr = cv2.imread(str(FOLDER / f"camera{camera}.png"))
+    assert bgr is not None
+    rng, detector, first, far = np.random.default_rng(0), FastDetector(CUBE), dict[int, MarkerObservation](), 0
+    for start in range(150, 450, 5):
+        covered = bgr.astype(np.float64)
+        covered[:, start:start + 36] = (90, 120, 160)
+        noisy = np.clip(covered + rng.normal(0.0, 3.0, bgr.shape), 0, 255).astype(np.uint8)
+        seen = detector.detect(from_bgr(noisy))[:len(CUBE.ids)]
+        first = first or {mark.index: mark for mark in seen if mark_is_visible(mark, camera)}
+        far += sum(seen[index].found and not seen[index].flags & DOUBTFUL
+                   and np.hypot(seen[index].x - at.x, seen[index].y - at.y) > 8.0 for index, at in first.items())
+    assert far <= 9  # of 150 and more
+
+
+def mark_is_visible(mark: MarkerObservation, camera: int) -> bool:
+    return mark.found and mask_centroid(CUBE.ids[mark.index], camera) is not None
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
 def test_the_faces_are_found_in_a_turned_and_mirrored_picture_too(camera: int) -> None:
     plain, turned = detect(camera), detect(camera, turns=2, flip=True)
     for name in CUBE.ids:
