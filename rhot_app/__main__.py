@@ -39,7 +39,7 @@ SUBCOMMANDS = {
     "trim": Subcommand("rhot_app.export.trim_command", "take a part of a recording as a recording of its own"),
     "batch": Subcommand("rhot_app.export.batch_command", "track or export many raw logs"),
     "simulate": Subcommand("rhot_app.simulator.simulate_command", "render what the cameras would see, with the truth"),
-    "calibrate": Subcommand("rhot_app.calibration.calibrate_command", "calibrate from images and tables"),
+    "calibrate": Subcommand("rhot_app.calibration.commands.calibrate", "calibrate from images and tables"),
     "refine": Subcommand("rhot_app.calibration.commands.refine", "refine the cameras' poses from a recorded hand"),
     "target": Subcommand("rhot_app.calibration.commands.target", "draw a calibration board in true scale"),
     "check": Subcommand("rhot_app.calibration.commands.check", "check a rig file for what cannot be"),

@@ -1,92 +1,123 @@
-"""All calibrations: what each is called wherever it is named, in the order in which a new rig needs them.
+"""What a calibration is, and all of them in the order in which a new rig needs them.
 
-The Calibrate menu, `rhot calibrate`, a rig's history, its health and the documents' list follow these records. No other
-list of calibrations exists. A wizard is loaded as the module of that name in `rhot_app.ui.wizards`.
+The Calibrate menu, `rhot calibrate`, the wizards, a rig's history, its health and the documents' list read these
+records. No other list of calibrations exists. A record stands in a file of `rhot_app.calibration.kinds`, with the
+functions that it names. Those files import what computes inside their functions, so that menus and help stay fast.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import importlib
+import pkgutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import argparse
+
+    from rhot_app.calibration.report import Report
+    from rhot_app.calibration.verdict import Finding
+    from rhot_app.progress import Progress
+    from rhot_app.project import Rig
+
+KINDS = "rhot_app.calibration.kinds"
+ORDER = ("camera", "lens", "stereo", "refined", "colours", "foreground", "adapted", "measured", "time", "depth",
+         "bones", "filters", "alignment", "certificate")
+"""In which a new rig needs them; others follow by their names."""
 
 
-class Command(NamedTuple):
-    """``rhot calibrate WORD``, also by the words `aliases`. `summary` goes on after "Calibrate". `module` has
-    ``add_arguments(parser)`` and ``run(args)``."""
+@dataclass(frozen=True, slots=True)
+class InForce:
+    """What a calibration would change: the rig, its file (None: it came from none), and the settings of the nodes that
+    answered, by id."""
+
+    rig: Rig
+    path: Path | None = None
+    node_settings: Mapping[int, dict[str, Any]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """What a command has read: `observations` for ``solve``, and what is in force, None without a rig. `findings`,
+    `notes` and `fields` (of JSON) join the report."""
+
+    observations: tuple[Any, ...]
+    now: InForce | None = None
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[str, ...] = ()
+    fields: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """``rhot calibrate WORD``, also by the words `aliases`. `summary` goes on after "Calibrate".
+
+    `observe` reads what the arguments name. `write` gives the files that it has written of a result that may be used;
+    by default the proposed rig goes to ``--out``. `instead` may do something else, and gives its exit code then.
+    """
 
     word: str
     summary: str
+    add_arguments: Callable[[argparse.ArgumentParser], None]
+    observe: Callable[[argparse.Namespace, Progress], Observed]
     aliases: tuple[str, ...] = ()
-    module: str = ""
-
-    @property
-    def imported(self) -> str:
-        """The dotted name of its module."""
-        return self.module or f"rhot_app.calibration.commands.{self.word}"
+    write: Callable[[argparse.Namespace, Any, InForce | None], str] | None = None
+    instead: Callable[[argparse.Namespace], int | None] | None = None
 
 
-class Calibration(NamedTuple):
-    """One calibration. `title` is its wizard's, `meaning` what it finds and from what, a sentence. `reason` begins what
-    it writes into a rig's history, so that menus can tell when it was used last."""
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """One calibration.
+
+    `title` is its wizard's, `meaning` what it finds and from what, a sentence. `reason` begins what it writes into a
+    rig's history, so that menus can tell when it was used last.
+
+    `collect` are the steps of its wizard (`rhot_app.calibration.collect`); without any, the module of that name in
+    `rhot_app.ui.wizards` makes its pages. ``solve(*observations, now, progress=...)`` gives the result, or raises
+    CalibrationError; it runs in another process, so it is a function of a module. `solver` is a module that this
+    process should import in good time.
+
+    ``report(result, now)`` says what was found, ``propose(result, now)`` gives a
+    `proposal.Proposal` of what would change, None for nothing.
+    ``check(figures)`` looks at a running rig's `check.health.HealthFigures` for what this calibration mends.
+    """
 
     name: str
     title: str
     meaning: str
     reason: str
     command: Command | None = None
+    collect: tuple[Any, ...] = ()
+    solve: Callable[..., Any] | None = None
+    report: Callable[..., Report] | None = None
+    propose: Callable[..., Any] | None = None
+    check: Callable[[Any], list[Finding]] = lambda figures: []
+    solver: str = ""
 
 
-CAMERA = Calibration(
-    "camera", "Set the cameras", "Exposure, gains, white balance: what each camera is told, tried out live.",
-    "camera settings")
-LENS = Calibration(
-    "lens", "Intrinsics of a camera", "Focal length, centre and distortion of one camera's lens, from a board that is "
-    "held all over its picture.", "intrinsics of",
-    Command("intrinsics", "focal length, centre and distortion of one camera's lens, from pictures of a board",
-            ("lens",)))
-STEREO = Calibration(
-    "stereo", "Stereo calibration", "Where the cameras stand to each other and to the table, from a board that they "
-    "see at the same time.", "stereo calibration",
-    Command("stereo", "how two or more cameras stand to each other, from pictures of a board that they took together",
-            ("together",)))
-REFINED = Calibration(
-    "refined", "Use refined calibration", "How the cameras stand now, from the hand that moves while it is tracked.",
-    "refined calibration")
-COLOURS = Calibration(
-    "colours", "Colours of the markers", "Which colour each marker has, and what may be mistaken for it.",
-    "colour calibration", Command("colours", "the markers' colours, from boxes on their paint in pictures"))
-FOREGROUND = Calibration(
-    "foreground", "Background and skin", "What the empty scene and your skin look like, so that a bare hand can be "
-    "tracked.", "background and skin")
-ADAPTED = Calibration(
-    "adapted", "Adapt the hand's shape", "How long and how thick the fingers are, from a bare hand that moves while it "
-    "is tracked.", "hand adapted while it was tracked")
-MEASURED = Calibration(
-    "measured", "Use measured bones", "How long the bones are, from the landmarks of a hand that two cameras see while "
-    "it is tracked.", "bones measured while the hand was tracked")
-TIME = Calibration(
-    "time", "Time of the cameras", "When each camera sees, from a hand that waves.", "time calibration",
-    Command("time", "when each camera sees, from a moving marker"))
-DEPTH = Calibration(
-    "depth", "Depth without a board", "Distance from disparity, from a marker at measured distances.",
-    "depth calibration",
-    Command("depth", "distance from disparity, without a board, from a table of measured distances"))
-BONES = Calibration(
-    "bones", "Bones of the hand", "How long the bones are, from a minute of movement or by a ruler.",
-    "bones calibration",
-    Command("bones", "the hand's bones and where the markers sit, from a minute of free movement or a ruler"))
-FILTERS = Calibration(
-    "filters", "Filters", "How much jitter and how much lag, from a hand held still and one that moves fast.",
-    "filter tuning", Command("filters", "the filters' settings, from a hand held still and one that moves fast"))
-ALIGNMENT = Calibration(
-    "alignment", "Alignment with another tracker", "Where a Vive tracker's world is in the rig, from a movement of "
-    "both.", "alignment with another tracker",
-    Command("alignment", "where another tracker's world is in the rig, from two streams of one motion", ("tracker",),
-            "rhot_app.objects.alignment.calibration"))
-CERTIFICATE = Calibration(
-    "certificate", "Certificate", "How good this rig is, measured as the thesis did, with 95 % intervals: five "
-    "minutes.", "certificate")
+@cache
+def calibrations() -> tuple[Calibration, ...]:
+    """All that stand in files of `KINDS`."""
+    found = {}
+    for module in pkgutil.iter_modules(importlib.import_module(KINDS).__path__):
+        for one in vars(importlib.import_module(f"{KINDS}.{module.name}")).values():
+            if isinstance(one, Calibration):
+                found[one.name] = one
+    order = {name: place for place, name in enumerate(ORDER)}
+    return tuple(sorted(found.values(), key=lambda one: (order.get(one.name, len(order)), one.name)))
 
-CALIBRATIONS = (CAMERA, LENS, STEREO, REFINED, COLOURS, FOREGROUND, ADAPTED, MEASURED, TIME, DEPTH, BONES, FILTERS,
-                ALIGNMENT, CERTIFICATE)
 
-COMMANDS = tuple(one.command for one in CALIBRATIONS if one.command is not None)
+def calibration(name: str) -> Calibration:
+    """The one of that name. Raises KeyError."""
+    found = find_calibration(name)
+    if found is None:
+        raise KeyError(name)
+    return found
+
+
+def find_calibration(name: str) -> Calibration | None:
+    """The one of that name, None without one."""
+    return next((one for one in calibrations() if one.name == name), None)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from rhot_app.errors import EngineError
 
 
 class Grade(enum.Enum):
@@ -71,6 +73,17 @@ class Verdict:
             "findings": [{"code": f.code, "grade": f.grade.value, "figure": f.figure, "cause": f.cause,
                           "remedy": f.remedy} for f in self.findings],
         }
+
+
+def verdict_from(answer: Mapping[str, Any]) -> Verdict:
+    """The verdict in an engine's answer. Raises EngineError when it is of another version."""
+    try:
+        findings = tuple(Finding(one["code"], Grade(one["grade"]), one["figure"], one["cause"], one["remedy"])
+                         for one in answer["findings"])
+        return Verdict(answer["verdict"], findings)
+    except (KeyError, TypeError, ValueError) as exc:
+        raise EngineError(f"the engine's answer cannot be read ({exc}); is it of another version? Restart "
+                          "engine and app.") from exc
 
 
 def judge(summary: str, findings: list[Finding]) -> Verdict:

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rhot_app.calibration.check.camera_calibration import NOT_CALIBRATED, calibration_finding, times_unknown
-from rhot_app.calibration.registry import STEREO
 from rhot_app.engine.node_meter import RECENT_NS, Recent
 from rhot_app.engine.status import Advice, Level, NodeStatus, advise, words
 from rhot_app.project import Rig
@@ -280,7 +279,7 @@ def one_camera_advice(rig: Rig) -> list[Advice]:
     if len(used) > 1 and not apart:
         return []
     names, by = " and ".join(apart), " and ".join(node.name for node in used)
-    mender = STEREO.name if apart else ""
+    mender = "stereo" if apart else ""
     if len(used) == 1 and rig.painted and rig.tracker.observe == "markers" and rig.tracker.palm_plane is None:
         if apart:
             return [advise("{by} alone does not find a hand by painted markers. Put {names} together with it, or track "

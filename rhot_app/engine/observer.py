@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 
 from rhot_app.calibration.check.health import HealthMonitor, HealthSample
-from rhot_app.calibration.registry import STEREO
 from rhot_app.calibration.verdict import Grade
 from rhot_app.diagnostics import Diagnostic
 from rhot_app.engine.advice import (
@@ -116,7 +115,7 @@ class Observer:
             health = self._health.advice(self._pipeline.last_state, self._pipeline.work.tracker, now_ns)
             found += self.hand_watch.advice(self._pipeline.work.tracker, now_ns)
             found += self.bones_watch.advice(self._pipeline.last_state, now_ns)
-            found += [*stale, *(one for one in health if not (stale and one.mender == STEREO.name))]
+            found += [*stale, *(one for one in health if not (stale and one.mender == "stereo"))]
         found += [Advice(one.level, one.sentence, subject="tracking" if one.level == "error" else "sight")
                   for one in self._diagnosed(now_ns)]
         notices = [Advice("info", text, subject="information") for text in self._source.notices()]

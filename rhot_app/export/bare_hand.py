@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.registry import ADAPTED
+from rhot_app.calibration.registry import calibration
 from rhot_app.errors import ExportError, RecordingError, note_loss
 from rhot_app.export.export import check_place, format_of, whole_file
 from rhot_app.export.formats import all_formats
@@ -132,7 +132,7 @@ def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[F
     if hand_file is not None and run.key_frames.sufficient:
         adapted = adapt(rig.hand, run.key_frames.kept)
         if adapted.verdict.acceptable:
-            accept_hand(hand_file, adapted.hand, ADAPTED.reason)
+            accept_hand(hand_file, adapted.hand, calibration("adapted").reason)
         else:
             note_loss(str(hand_file), f"{hand_file}: not written. {adapted.verdict.findings[0].sentence}")
             adapted = None

@@ -8,6 +8,7 @@ from PySide6.QtCore import QObject, QSize, Qt
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence, QPainter
 from PySide6.QtWidgets import QLabel, QMenuBar, QSizePolicy, QToolBar, QToolButton, QWidget
 
+from rhot_app.calibration.registry import calibrations
 from rhot_app.ui.common.menu import Menu, give_letters
 from rhot_app.ui.common.shapes import shape_icon, show_overflow
 from rhot_app.ui.language import tr, tr_noop
@@ -15,7 +16,6 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.panels.state_badge import StateBadge
 from rhot_app.ui.scene.ellipsoid_mesh import LARGER
 from rhot_app.ui.scene.page import SceneBar
-from rhot_app.ui.wizards.framework.definition import WIZARDS
 
 CLOUD_KINDS = (
     ("joints", tr_noop("of joints"), tr_noop("Of the hand's inner joints; the estimator estimates them.")),
@@ -84,7 +84,7 @@ class Actions(QObject):
         self.quit = self._make(tr("Quit"), "Ctrl+Q", tr("End what the app started and close it."))
         self.next_steps = self._make(tr("What to do next …"), "",
                                      tr("Say what you have, and see the steps that are missing."))
-        self.wizards = [self._make(f"{tr(wizard.title)} …", "", tr(wizard.meaning)) for wizard in WIZARDS]
+        self.wizards = [self._make(f"{tr(wizard.title)} …", "", tr(wizard.meaning)) for wizard in calibrations()]
         self.fit = self._make(tr("Fit the hand to pictures …"), "",
                               tr("Drag joints in the cameras' pictures, move sliders, and let edges finish it: the "
                                  "hand's lengths and pose."))
@@ -148,7 +148,7 @@ class Actions(QObject):
         for name, action in vars(self).items():
             if isinstance(action, QAction):
                 action.setObjectName(name)
-        for prefix, actions, names in (("wizard", self.wizards, [wizard.name for wizard in WIZARDS]),
+        for prefix, actions, names in (("wizard", self.wizards, [wizard.name for wizard in calibrations()]),
                                        ("cloud", self.cloud_kinds, [kind for kind, _, _ in CLOUD_KINDS]),
                                        ("cloud", self.cloud_sizes, ["in true size", "larger"])):
             for action, name in zip(actions, names, strict=True):

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.calibration.registry import calibrations, find_calibration
 from rhot_app.errors import RhotError
 from rhot_app.sources.cameras.camera_set import camera_set_of, change_observed
 from rhot_app.ui.actions import Actions, MainMenuBar, MainToolBar
@@ -41,7 +42,7 @@ from rhot_app.ui.simulated_rig_menus import LensCaps, SceneFiles, TwinShows
 from rhot_app.ui.status_words import RigFileWatch, label_of, look_of, notices_of
 from rhot_app.ui.tracked_objects import TrackedObjects
 from rhot_app.ui.welcome import WelcomePage
-from rhot_app.ui.wizards.framework.definition import OPEN_WIZARD, WIZARDS, wizard_named
+from rhot_app.ui.wizards.framework.definition import OPEN_WIZARD
 from rhot_app.ui.wizards.launcher import Launcher
 
 TICK_MS = 16
@@ -183,7 +184,7 @@ class MainWindow(QMainWindow):
         self.docks.docks[2].visibilityChanged.connect(c.set_preview)
 
     def _connect_wizards(self) -> None:
-        for action, wizard in zip(self.actions_.wizards, WIZARDS, strict=True):
+        for action, wizard in zip(self.actions_.wizards, calibrations(), strict=True):
             action.triggered.connect(lambda checked=False, wizard=wizard: self.wizards.open(wizard))
         self.actions_.earlier.triggered.connect(self.wizards.open_versions)
         self.actions_.fit.triggered.connect(self.wizards.open_fit)
@@ -273,7 +274,7 @@ class MainWindow(QMainWindow):
 
     def _do_step(self, action: str) -> None:
         """Open what a step asks for."""
-        wizard = wizard_named(action)
+        wizard = find_calibration(action)
         if wizard is not None:
             self.wizards.open(wizard)
         elif action == TRACKER:
@@ -317,7 +318,7 @@ class MainWindow(QMainWindow):
 
     def _act(self, key: str) -> None:
         """The button of a sentence."""
-        wizard = wizard_named(key.removeprefix(OPEN_WIZARD)) if key.startswith(OPEN_WIZARD) else None
+        wizard = find_calibration(key.removeprefix(OPEN_WIZARD)) if key.startswith(OPEN_WIZARD) else None
         if wizard is not None:
             self.wizards.open(wizard)
         elif key == SHOW_FOLDER:

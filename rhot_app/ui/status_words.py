@@ -8,6 +8,7 @@ from pathlib import Path
 
 import msgspec
 
+from rhot_app.calibration.registry import find_calibration
 from rhot_app.engine.status import Advice, EngineStatus
 from rhot_app.errors import RigError
 from rhot_app.project import Rig, load_rig, parse_rig
@@ -17,7 +18,7 @@ from rhot_app.ui.language import tr
 from rhot_app.ui.models.notice import Notice
 from rhot_app.ui.models.rows import bytes_text
 from rhot_app.ui.models.words import NO_ENGINE, NO_RIG, STARTING, Look, condition_look
-from rhot_app.ui.wizards.framework.definition import OPEN_WIZARD, wizard_named
+from rhot_app.ui.wizards.framework.definition import OPEN_WIZARD
 
 
 def look_of(controller: Controller) -> Look:
@@ -79,7 +80,7 @@ def label_of(controller: Controller) -> tuple[str, str]:
 
 def _advice_notice(advice: Advice) -> Notice:
     """The engine's sentence, with the wizard that mends it as a button."""
-    wizard = wizard_named(advice.mender)
+    wizard = find_calibration(advice.mender)
     text = advice.text
     if advice.pattern:
         text = tr(advice.pattern, **{name: tr(value) if isinstance(value, str) and " " in value else value

@@ -232,5 +232,5 @@ def test_the_command_refuses_with_a_sentence(tmp_path: Path, capsys: pytest.Capt
         told = capsys.readouterr().err
         assert told.startswith("rhot: ") and words in told
     assert main(["calibrate", "bones", "--set", "index.proximal=41", "--out", str(tmp_path / "no" / "hand.json")]) == 2
-    assert "does not exist; create it first" in capsys.readouterr().err
+    assert "there is no folder" in capsys.readouterr().err
     assert not out.exists() and not (tmp_path / "no").exists()

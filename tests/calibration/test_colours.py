@@ -16,7 +16,7 @@ from rhot_app.calibration.colour.colours import NO_COLOURS, ColourReport, solve_
 from rhot_app.calibration.colour.illuminant import LAMPS
 from rhot_app.calibration.colour.samples import ColourSamples
 from rhot_app.calibration.colour.surroundings import hue_histogram
-from rhot_app.calibration.commands.colours import report as said_of
+from rhot_app.calibration.kinds.colours import report as said_of
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 from rhot_node.detect.colour import box_mask, colours_of
@@ -141,7 +141,7 @@ def test_a_marker_behind_four_larger_things_of_its_colour_is_said_to_be_so_and_w
     assert finding.figure == "ring is found in another place in picture 1 itself."
     assert finding.cause.startswith("4 other objects of its colour are likelier, the first at ")
     assert "plainer background" in finding.remedy and finding.grade is Grade.POOR
-    (said,) = {(one["cause"], one["sentence"]) for one in said_of(report).to_json()["failures"]
+    (said,) = {(one["cause"], one["sentence"]) for one in said_of(report, None).to_json()["failures"]
                if one["same_lamp"] and not one["tracked"]}
     assert said == ("crowded", finding.cause)
 

@@ -11,7 +11,7 @@ import pytest
 from colour_scenes import PAINTS, box, picture, place
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.commands import colours
+from rhot_app.calibration.kinds import colours
 from rhot_node.commands.detect_command import detect_all
 from rhot_node.detect.image import to_bgr
 from rhot_node.files import resource_path
@@ -225,4 +225,4 @@ def test_unreadable_pictures_and_missing_folders_are_sentences(tmp_path: Path, c
     assert calibrate("--image", str(path), *sample("ring"), "--out", str(tmp_path / "m.json")) == 2
     assert said.split("|")[-1] in capsys.readouterr().err
     assert calibrate("--image", str(path), *sample("ring"), "--out", str(tmp_path / "none" / "m.json")) == 2
-    assert "does not exist" in capsys.readouterr().err
+    assert "there is no folder" in capsys.readouterr().err

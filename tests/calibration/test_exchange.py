@@ -30,7 +30,7 @@ from published_cameras import (
     ROS_PAIR,
 )
 
-from rhot_app.calibration.commands.output import FORMAT_NAMES
+from rhot_app.calibration.commands.arguments import FORMAT_NAMES
 from rhot_app.calibration.exchange.formats import FORMATS, read_files
 from rhot_app.calibration.exchange.records import ForeignCamera, Stated
 from rhot_app.errors import CalibrationError

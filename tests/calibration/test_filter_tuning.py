@@ -138,8 +138,8 @@ def test_a_noisy_marker_gets_settings_of_its_own(tables: tuple[InstantTable, Ins
     own = report.pixel.by_marker
     assert own[2].min_cutoff_hz < min(one.min_cutoff_hz for k, one in enumerate(own) if k != 2)
     assert report.pixel.chosen.min_cutoff_hz == own[2].min_cutoff_hz  # what holds for all is the strictest
-    rig = report.apply(RIG, per_marker=True)
-    common, single = (report.choice(per_marker=per_marker).markers for per_marker in (False, True))
+    rig = replace(report, per_marker=True).apply(RIG)
+    common, single = (replace(report, per_marker=per_marker).choice.markers for per_marker in (False, True))
     assert single[0].lag_s < common[0].lag_s, "the figures are those of the settings that are written"
     assert rig.filters.pixel_markers[RIG.markers.ids[2]] == own[2] and len(rig.filters.position_markers) == 6
 
@@ -171,7 +171,7 @@ def test_recordings_that_do_not_serve_are_named(tables: tuple[InstantTable, Inst
     partly[:, 3] = False
     report = tune_filters(replace(still, measured=partly), fast, RIG)
     assert "unseen" in report.verdict.codes and RIG.markers.ids[3] in report.verdict.findings[0].sentence
-    assert RIG.markers.ids[3] not in report.apply(RIG, per_marker=True).filters.pixel_markers
+    assert RIG.markers.ids[3] not in replace(report, per_marker=True).apply(RIG).filters.pixel_markers
 
 
 def test_the_command_writes_the_filters(tmp_path: Path, logs, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,7 +17,7 @@ from stereo_pictures import FOLDER, needs_pictures, picture
 from rhot_app import rig_history
 from rhot_app.__main__ import main
 from rhot_app.calibration.board.boards import STANDARD_BOARD, AprilGrid, CharucoBoard, Chessboard, CircleGrid
-from rhot_app.calibration.commands.output import add_board_arguments, board_of, described_board
+from rhot_app.calibration.commands.arguments import add_board_arguments, board_of, described_board
 from rhot_app.errors import CalibrationError
 from rhot_app.project import load_rig, save_rig
 from rhot_node.files import resource_path

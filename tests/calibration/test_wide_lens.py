@@ -15,7 +15,7 @@ from intrinsics_twin import BOARD, twin_views
 from rhot_app.__main__ import main
 from rhot_app.calibration.board.shared_views import SharedViews
 from rhot_app.calibration.check.checks import check_cameras
-from rhot_app.calibration.commands.intrinsics import report as said_of
+from rhot_app.calibration.kinds.lens import report as said_of
 from rhot_app.calibration.lens.fit import LensStart, find_lens
 from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, load_intrinsics, save_intrinsics, solve
 from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate, calibrated_rig, lens_of
@@ -89,7 +89,7 @@ def test_a_wide_lens_is_kept_in_a_file(report: IntrinsicsReport, wide: SharedVie
 
 
 def text_of(report: IntrinsicsReport) -> str:
-    return json.dumps([said_of(report).to_json(), said_of(report).lines()], allow_nan=False)
+    return json.dumps([said_of(report, None).to_json(), said_of(report, None).lines()], allow_nan=False)
 
 
 def first_cause(verdict: Verdict) -> str:

@@ -51,8 +51,9 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "rhot_app.calibration": (*APP_BASE, *MODELS, "rhot_app.hand"),
     "rhot_app.calibration.commands": BELOW_ENGINE,  # they read logs
     "rhot_app.calibration.recorded_observations": BELOW_ENGINE,  # reads them for all
+    "rhot_app.calibration.kinds": (*BELOW_ENGINE, "rhot_app.certificate"),  # what is imported where it is called
+    "rhot_app.calibration.collect": ("rhot_app.calibration", "rhot_app.state"),
     "rhot_app.objects": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.calibration.verdict"),
-    "rhot_app.objects.alignment.calibration": BELOW_ENGINE,
     "rhot_app.state": ("rhot_node.wire.messages", "rhot_app.objects.state"),
     "rhot_app.latency": ("rhot_app.state",),
     "rhot_app.barehand": (*APP_BASE, *MODELS, "rhot_app.hand", "rhot_app.state"),

@@ -17,13 +17,13 @@ import pytest
 
 from rhot_app.__main__ import SUBCOMMANDS, parse
 from rhot_app.__main__ import main as rhot
-from rhot_app.calibration.calibrate_command import FILES
-from rhot_app.calibration.registry import COMMANDS as CALIBRATING
-from rhot_app.ui.wizards.framework.definition import WIZARDS
+from rhot_app.calibration.commands.calibrate import FILES
+from rhot_app.calibration.registry import calibrations
 from rhot_node.__main__ import daemon_parser
 from rhot_node.commands import COMMANDS, parser_of
 
 ROOT = Path(__file__).parents[2]
+CALIBRATING = tuple(one.command.word for one in calibrations() if one.command is not None)
 MODULES = {"rhot": "rhot_app", "rhot-node": "rhot_node"}
 
 OPTIONS: dict[str, tuple[str, ...]] = {
@@ -154,7 +154,7 @@ def test_a_program_starts_as_a_module(module: str) -> None:
 
 
 EVERY_COMMAND = ("rhot", *(f"rhot {name}" for name in SUBCOMMANDS),
-                 *(f"rhot calibrate {kind}" for kind in (command.word for command in (*CALIBRATING, *FILES))),
+                 *(f"rhot calibrate {kind}" for kind in (*CALIBRATING, *FILES)),
                  *(f"rhot evaluate {name}" for name in ("live", "compare", "bare-hand")),
                  *(f"rhot mouse {name}" for name in ("run", "measure")),
                  "rhot-node", *(f"rhot-node {name}" for name in COMMANDS))
@@ -187,8 +187,8 @@ def test_help_ends_with_two_examples_that_are_valid(command: str, tmp_path: Path
             daemon_parser().parse_args(arguments)
 
 
-@pytest.mark.parametrize(("word", "kind"), [(alias, command.word) for command in CALIBRATING
-                                            for alias in command.aliases])
+@pytest.mark.parametrize(("word", "kind"), [(alias, one.command.word) for one in calibrations() if one.command
+                                            for alias in one.command.aliases])
 def test_a_calibration_has_one_name_and_its_former_ones_still_run_it(
         word: str, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Each refuses to begin without its input."""
@@ -202,8 +202,8 @@ def test_a_calibration_has_one_name_and_its_former_ones_still_run_it(
 
 def test_wizards_and_commands_call_a_calibration_by_one_name() -> None:
     """Every kind of `rhot calibrate` is a word of its wizard's title, and no former title is left in the documents."""
-    titles = " ".join(wizard.title.lower() for wizard in WIZARDS)
-    assert [command.word for command in CALIBRATING if command.word not in titles] == []
+    titles = " ".join(wizard.title.lower() for wizard in calibrations())
+    assert [word for word in CALIBRATING if word not in titles] == []
     told = " ".join(path.read_text() for path in (ROOT / "docs").rglob("*.md"))
     assert not re.findall(r"put the cameras together|find the lens", told, re.IGNORECASE)
 

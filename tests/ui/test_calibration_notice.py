@@ -8,11 +8,11 @@ from fake_engine import synthetic_rig
 from test_tracker_dialog import FLOATING
 
 from rhot_app.calibration.check.camera_calibration import calibration_error
+from rhot_app.calibration.registry import calibration
 from rhot_app.engine.status import Advice
 from rhot_app.project import CameraCalibration, CameraPose, Intrinsics, load_rig
 from rhot_app.ui.panels.advice_bar import RESERVED
 from rhot_app.ui.scene.hands import spots
-from rhot_app.ui.wizards.framework.definition import wizard_named
 from rhot_node.files import resource_path
 
 HEADLINE = "Not calibrated"
@@ -69,7 +69,7 @@ def test_an_uncalibrated_rig_says_so_and_its_button_opens_the_lens_wizard(tracke
     assert set(bench.window.screen_parts.markers.spreads) == {"≥ 1.8"}
     bench.click(advice.buttons["Calibrate …"])
     bench.until(lambda: bench.window.wizards.wizard is not None)
-    assert bench.window.wizards.wizard.definition.title == wizard_named("lens").title
+    assert bench.window.wizards.wizard.windowTitle() == calibration("lens").title
 
 
 def test_the_notice_stays_where_it_is_while_other_sentences_come_and_go(tracked):
@@ -112,7 +112,7 @@ def test_lengths_that_were_never_checked_are_said_with_the_stereo_wizard(tracked
     assert "never checked" in advice.texts[-1]
     bench.click(*advice.buttons.values())
     bench.until(lambda: bench.window.wizards.wizard is not None)
-    assert bench.window.wizards.wizard.definition.title == wizard_named("stereo").title
+    assert bench.window.wizards.wizard.windowTitle() == calibration("stereo").title
 
 
 def test_the_hand_and_the_scene_state_no_precision_that_nobody_knows(tracked):

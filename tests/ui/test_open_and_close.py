@@ -21,6 +21,7 @@ from PySide6.QtOpenGLWidgets import QOpenGLWidget
 from PySide6.QtWidgets import QApplication, QDialog, QDoubleSpinBox, QVBoxLayout, QWidget
 from wizard_rig import RigBackend
 
+from rhot_app.calibration.registry import Calibration, calibrations
 from rhot_app.sources.discovery import Search
 from rhot_app.ui.common.disposal import plot_widget, release_style
 from rhot_app.ui.dialogs import dialogs
@@ -28,7 +29,6 @@ from rhot_app.ui.dialogs.nodes_dialog import NodesDialog
 from rhot_app.ui.dialogs.rig_dialog import RigDialog
 from rhot_app.ui.main_window import MainWindow
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.framework.definition import WIZARDS, Wizard
 from rhot_app.ui.wizards.framework.window import WizardWindow
 
 ROUNDS, MANY = 3, 100
@@ -79,7 +79,7 @@ class Opener:
     find: Callable[[MainWindow], Any]
 
 
-def wizard(one: Wizard) -> Opener:
+def wizard(one: Calibration) -> Opener:
     return Opener(one.name, lambda window: window.wizards.open(one), lambda window: window.wizards.wizard)
 
 
@@ -93,7 +93,7 @@ def at_top(kind: type) -> Callable[[MainWindow], Any]:
 
 
 OPENERS = (
-    *map(wizard, WIZARDS),
+    *map(wizard, calibrations()),
     dialog("tracker", lambda window: window.actions_.tracker.trigger()),
     dialog("networks", lambda window: window.actions_.networks.trigger()),
     dialog("outputs", lambda window: window.actions_.outputs.trigger()),

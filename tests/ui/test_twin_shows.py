@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from rhot_app.calibration.registry import calibration
 from rhot_app.errors import SimulatorError
 from rhot_app.ui.backend.session import key_of, show_named
 from rhot_app.ui.simulated_rig_menus import TITLE
-from rhot_app.ui.wizards.framework.definition import wizard_named
 
 
 def ticked(bench):
@@ -39,7 +39,7 @@ def test_what_is_refused_is_told(tracking):
 
 def test_a_wizard_offers_it_too(tracking):
     wizards = tracking.window.wizards
-    wizards.open(wizard_named("depth"))
+    wizards.open(calibration("depth"))
     tracking.until(lambda: wizards.wizard is not None and wizards.wizard.frame.twin_button.isVisible())
     menu = wizards.wizard.frame.twin_button.menu()
     assert menu.title() == TITLE
@@ -56,7 +56,7 @@ def test_a_real_rig_has_no_such_menu(tracking, tmp_path: Path):
     bench.window.open_rig(tmp_path / "two_pis.json")
     bench.until(lambda: bench.controller.rig is not None)
     assert not bench.window.actions_.shows.menuAction().isVisible()
-    bench.window.wizards.open(wizard_named("depth"))
+    bench.window.wizards.open(calibration("depth"))
     bench.until(lambda: bench.window.wizards.wizard is not None)
     assert not bench.window.wizards.wizard.frame.twin_button.isVisible()
     bench.window.wizards.wizard.reject()

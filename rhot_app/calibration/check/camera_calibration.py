@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.check.health import HealthFinding
-from rhot_app.calibration.registry import LENS, STEREO
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.project import Intrinsics, Rig, RigNode
 
@@ -26,7 +25,7 @@ _NO_TURN = 1e-9
 def calibration_finding(rig: Rig) -> HealthFinding | None:
     """The most serious fault of a rig's lenses and poses, with the calibration to do next; None without a known one."""
     if rig.depth.mode == "disparity":
-        return HealthFinding(STEREO.name, Finding(
+        return HealthFinding("stereo", Finding(
             "disparity", Grade.FAIR, "Distances are estimates: the rig finds them from disparity, without a "
             "calibration.", remedy="A stereo calibration with a board (Calibrate menu) gives exact ones."))
     if rig.calibration is not None and rig.calibration.method == "exact":
@@ -34,25 +33,25 @@ def calibration_finding(rig: Rig) -> HealthFinding | None:
     nominal = [node.name for node in rig.nodes if node.intrinsics.nominal]
     if nominal:
         exact = " The estimator takes them as exact." if rig.tracker.kind != "classic" else ""
-        return HealthFinding(LENS.name, Finding(
+        return HealthFinding("lens", Finding(
             "nominal", Grade.FAIR, NOT_CALIBRATED, f"The lenses of {' and '.join(nominal)} are nominal.{exact}",
             "Calibrate the intrinsics of each camera, then stereo."))
     apart = [node.name for node, used in zip(rig.nodes, rig.tracked_with, strict=True) if not used]
     if apart:
-        return HealthFinding(STEREO.name, Finding(
+        return HealthFinding("stereo", Finding(
             "unknown_poses", Grade.FAIR, NOT_CALIBRATED, f"Where {' and '.join(apart)} stands is not known.",
             "Do the stereo calibration with a board."))
     if rig.calibration is not None and rig.calibration.method == "outdated":
-        return HealthFinding(STEREO.name, Finding(
+        return HealthFinding("stereo", Finding(
             "outdated_poses", Grade.FAIR, NOT_CALIBRATED,
             "Intrinsics were calibrated anew after the stereo calibration.",
             "Repeat the stereo calibration with a board."))
     if rig.calibration is None and _poses_nominal(rig):
-        return HealthFinding(STEREO.name, Finding(
+        return HealthFinding("stereo", Finding(
             "nominal_poses", Grade.FAIR, NOT_CALIBRATED, "The cameras' poses are nominal: none is turned.",
             "Do the stereo calibration with a board."))
     if rig.calibration is not None and rig.calibration.lengths == "skipped":
-        return HealthFinding(STEREO.name, lengths_finding())
+        return HealthFinding("stereo", lengths_finding())
     return None
 
 

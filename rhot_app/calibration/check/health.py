@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.calibration.registry import BONES, COLOURS, STEREO, TIME
-from rhot_app.calibration.verdict import Finding, Grade
+from rhot_app.calibration.registry import calibrations
+from rhot_app.calibration.verdict import Finding
 from rhot_app.hand.model import build_model
 from rhot_app.hand.skeleton import FINGERS, TIP_ROLES, WRIST_ROLE
 from rhot_app.project import Rig
@@ -24,20 +24,9 @@ Mask = NDArray[np.bool_]
 
 # -- advice on stale calibrations --------------------------------------------------------------------------------------
 
-FAIR_ERROR_PX, POOR_ERROR_PX = 0.5, 1.5
+FAIR_ERROR_PX = 0.5
 """Median reprojection error (rms over cameras; half the distance of a pair's epipolar lines). A calibrated rig has 0.1
 to 0.3; markers are refused from 2.5 on."""
-
-RIGID_PART, RIGID_M = 0.03, 3e-3
-"""How far the distance of two markers on one bone may change, and at least."""
-
-REACH_PART = 0.05
-"""By how much a tip may be further from the wrist than all bones in a row."""
-
-WEAK_QUALITY = 0.45
-"""A marker as plain as it should be has 0.8 to 1."""
-
-DOUBLED_PART = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +77,17 @@ class HealthFigures:
     reaches: tuple[Reach, ...]
     qualities: tuple[MarkerQuality, ...]
 
+    @property
+    def late(self) -> bool:
+        """Whether the rays of fast markers alone miss each other."""
+        _, slow, fast = self.errors_px
+        return slow < FAIR_ERROR_PX < fast and fast > 2.0 * slow
+
+    @property
+    def apart(self) -> bool:
+        """Whether the rays of all markers do."""
+        return self.errors_px[0] > FAIR_ERROR_PX and not self.late
+
 
 def misfit_cause(rig: Rig) -> str:
     """Why the rays of a rig's cameras may miss each other, by what the rig says of its calibration."""
@@ -102,72 +102,8 @@ def misfit_cause(rig: Rig) -> str:
 
 def findings_of(figures: HealthFigures) -> tuple[HealthFinding, ...]:
     """All findings, the gravest first. Comparisons with what is not known are false, and so say nothing."""
-    geometry = _geometry(figures)
-    found = [*geometry, *_rigid(figures), *([] if geometry else _reach(figures)), *_weak(figures), *_doubled(figures)]
+    found = [HealthFinding(one.name, finding) for one in calibrations() for finding in one.check(figures)]
     return tuple(sorted(found, key=lambda one: -one.finding.grade.rank))
-
-
-def _geometry(figures: HealthFigures) -> list[HealthFinding]:
-    error, slow, fast = figures.errors_px
-    if slow < FAIR_ERROR_PX < fast and fast > 2.0 * slow:
-        return [HealthFinding(TIME.name, Finding(
-            "late_camera", Grade.FAIR, f"Rays of fast markers miss each other by {fast:.1f} px, of slow ones by "
-            f"{slow:.1f} px only.", "One camera's times are off.",
-            "Calibrate the cameras' times with a waving hand (Calibrate menu)."))]
-    if not error > FAIR_ERROR_PX:
-        return []
-    return [HealthFinding(STEREO.name, Finding(
-        "stale_geometry", Grade.POOR if error > POOR_ERROR_PX else Grade.FAIR,
-        f"The cameras' rays miss each other by {error:.1f} px.", figures.misfit,
-        "Do the stereo calibration with a board (Calibrate menu)."))]
-
-
-def _rigid(figures: HealthFigures) -> list[HealthFinding]:
-    worst = max(figures.rigid, key=lambda one: abs(one.now_m - one.learnt_m), default=None)
-    if worst is None or abs(worst.now_m - worst.learnt_m) <= max(RIGID_PART * worst.learnt_m, RIGID_M):
-        return []
-    figure = (f"{' and '.join(worst.markers)} sit on one bone; they were {1e3 * worst.learnt_m:.1f} mm apart and are "
-              f"{1e3 * worst.now_m:.1f} mm now.")
-    return [HealthFinding(BONES.name, Finding(
-        "rigid_drift", Grade.FAIR, figure, "A marker slipped, or a camera was moved.",
-        "Press the markers on and measure the hand again (Calibrate menu)."))]
-
-
-def _reach(figures: HealthFigures) -> list[HealthFinding]:
-    far = [one for one in figures.reaches if one.seen_m > (1.0 + REACH_PART) * one.longest_m]
-    if not far:
-        return []
-    worst = max(far, key=lambda one: one.seen_m / one.longest_m)
-    figure = (f"{worst.marker} was {1e3 * worst.seen_m:.0f} mm from the wrist, but the bones between are only "
-              f"{1e3 * worst.longest_m:.0f} mm long in all.")
-    cause = "It sits elsewhere than the rig says, something else has its colour, or a camera was turned."
-    if len(far) > 1:
-        cause = "This hand is larger than the hand file says, or the rig's cameras stand further apart than it says."
-    remedy = "Measure this hand (Calibrate menu)."
-    return [HealthFinding(BONES.name, Finding("reach", Grade.FAIR, figure, cause, remedy))]
-
-
-def _weak(figures: HealthFigures) -> list[HealthFinding]:
-    weak = [one for one in figures.qualities if one.quality < WEAK_QUALITY]
-    if not weak:
-        return []
-    worst = min(weak, key=lambda one: one.quality)
-    names = ", ".join(dict.fromkeys(one.marker for one in weak))
-    return [HealthFinding(COLOURS.name, Finding(
-        "weak_colour", Grade.FAIR, f"The colour of {names} is hardly told from its surroundings (quality "
-        f"{worst.quality:.2f} in camera {worst.camera}).", "The light has changed, or the paint is dirty.",
-        "Give more light, or learn the colours again (Calibrate menu)."))]
-
-
-def _doubled(figures: HealthFigures) -> list[HealthFinding]:
-    worst = max((one for one in figures.qualities if one.ambiguous > DOUBLED_PART), key=lambda one: one.ambiguous,
-                default=None)
-    if worst is None:
-        return []
-    return [HealthFinding(COLOURS.name, Finding(
-        "doubled_colour", Grade.FAIR, f"In {100 * worst.ambiguous:.0f} % of its pictures camera {worst.camera} sees "
-        f"something else in the colour of {worst.marker}.", "",
-        "Take it out of the picture, or choose another paint (Calibrate menu)."))]
 
 
 # -- the monitor of a running rig --------------------------------------------------------------------------------------

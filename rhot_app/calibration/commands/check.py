@@ -6,7 +6,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import add_rig_or_file, rig_of, tell
+from rhot_app.calibration.commands.arguments import add_rig_or_file, rig_of, tell
 from rhot_app.calibration.report import Report
 from rhot_app.options import add_json_argument
 from rhot_node.terminal import add_examples

@@ -7,7 +7,7 @@ import contextlib
 import re
 from pathlib import Path
 
-from rhot_app.calibration.commands.output import FORMAT_NAMES, add_length_arguments, require_folder, unit_of
+from rhot_app.calibration.commands.arguments import FORMAT_NAMES, add_length_arguments, require_folder, unit_of
 from rhot_app.errors import CalibrationError, refuse_existing
 from rhot_app.options import add_force_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples

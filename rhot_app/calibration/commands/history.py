@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import add_rig_or_file, rig_of
+from rhot_app.calibration.commands.arguments import add_rig_or_file, rig_of
 from rhot_app.errors import positive_count
 from rhot_app.options import add_json_argument
 from rhot_node.terminal import add_examples

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import (
+from rhot_app.calibration.commands.arguments import (
     FORMAT_NAMES,
     UNITS_M,
     add_length_arguments,

@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import require_folder, show
-from rhot_app.calibration.registry import REFINED
+from rhot_app.calibration.commands.arguments import require_folder, show
+from rhot_app.calibration.registry import calibration
 from rhot_app.calibration.report import Report
 from rhot_app.errors import CalibrationError, RecordingError, RhotError, input_file
 from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     verdict = verdict_of(found, rig.nodes[0].name, scale)
     written = ""
     if target is not None and verdict.acceptable and not found.holds:
-        accept(target, refined, REFINED.reason)
+        accept(target, refined, calibration("refined").reason)
         written = str(target)
     rows = figure_rows(found, scale)
     wide = max(len(what) for what, _, _ in rows)

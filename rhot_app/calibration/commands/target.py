@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from rhot_app.calibration.commands.output import BOARD_HELP, add_square_argument, described_board, require_folder
+from rhot_app.calibration.commands.arguments import BOARD_HELP, add_square_argument, described_board, require_folder
 from rhot_app.options import add_out_argument
 from rhot_node.terminal import add_examples
 

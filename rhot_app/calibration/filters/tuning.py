@@ -150,13 +150,14 @@ class FilterChoice:
 @dataclass(frozen=True, slots=True)
 class FilterReport:
     """The proposal, the curves behind it, and what it does: `common` with the settings that hold for all markers, `own`
-    with each marker's."""
+    with each marker's, which are proposed too where it is `per_marker`."""
 
     targets: FilterTargets
     pixel: FilterCurves = field(repr=False)
     position: FilterCurves = field(repr=False)
     common: FilterChoice
     own: FilterChoice
+    per_marker: bool = False
 
     @property
     def markers(self) -> tuple[MarkerFigures, ...]:
@@ -168,14 +169,15 @@ class FilterReport:
         """The verdict on the settings for all markers."""
         return self.common.verdict
 
-    def choice(self, *, per_marker: bool) -> FilterChoice:
+    @property
+    def choice(self) -> FilterChoice:
         """What `apply` would do."""
-        return self.own if per_marker else self.common
+        return self.own if self.per_marker else self.common
 
-    def apply(self, rig: Rig, *, per_marker: bool = False) -> Rig:
-        """The rig with the proposed filters, switched on; `per_marker`: with each known marker's own settings too."""
+    def apply(self, rig: Rig) -> Rig:
+        """The rig with the proposed filters, switched on."""
         pixel, position = ({marker.marker_id: own for marker, own in zip(self.markers, curves.by_marker, strict=True)
-                            if per_marker and marker.known} for curves in (self.pixel, self.position))
+                            if self.per_marker and marker.known} for curves in (self.pixel, self.position))
         return msgspec.structs.replace(rig, filters=FilterSettings(
             enabled=True, pixel=self.pixel.chosen, position=self.position.chosen, pixel_markers=pixel,
             position_markers=position))

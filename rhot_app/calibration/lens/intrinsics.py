@@ -53,7 +53,8 @@ class IntrinsicsReport:
     `lens` (12,), see `geometry.camera`, for pictures of `size` (width, height), and its `covariance` (12, 12) with
     poses and board errors marginalised. `rms_px` over all corners. `undetermined` names the coefficients that the views
     leave open; `errors` what the uncertainty means in millimetres at the working distance.
-    `error_inflation`: 1 where independent corner errors explain all; it is in all standard deviations.
+    `error_inflation`: 1 where independent corner errors explain all; it is in all standard deviations. `camera`: its
+    name in the rig, "" for one without a rig.
     """
 
     board: Board
@@ -70,6 +71,7 @@ class IntrinsicsReport:
     errors: ExpectedErrors
     error_inflation: float
     verdict: Verdict
+    camera: str = ""
 
     @property
     def std(self) -> Array:

@@ -28,6 +28,7 @@ from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
 from rhot_app.calibration.stereo.adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo.points import Squares, epipolar_px, locate, measure_squares
 from rhot_app.calibration.stereo.ruler import RulerResult
+from rhot_app.calibration.stereo.start import WorldFrame
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.estimation.se3 import exp_so3, log_so3
 from rhot_app.geometry.camera import LENS
@@ -122,7 +123,8 @@ class StereoReport:
     """What came of a stereo calibration.
 
     `figures` are None when the cameras could not be put together; `dropped` shots with reasons; `summary` the sentence
-    with the main figures, for whoever adds findings of their own to the `verdict`.
+    with the main figures, for whoever adds findings of their own to the `verdict`; `table` the frame of the table
+    that the board lies on, where it was seen there.
     """
 
     cameras: tuple[str, ...]
@@ -130,6 +132,7 @@ class StereoReport:
     dropped: tuple[Dropped, ...]
     summary: str
     verdict: Verdict
+    table: WorldFrame | None = None
 
 
 def figures_of(solution: StereoSolution, lenses: Sequence[LensStart], names: Sequence[str]) -> StereoFigures:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rhot_app.calibration.check.camera_calibration import calibration_finding, times_text, times_unknown
-from rhot_app.calibration.registry import ADAPTED, BONES, COLOURS, LENS, MEASURED, STEREO, TIME
+from rhot_app.calibration.registry import calibration
 from rhot_app.hand.anatomy import is_shipped
 from rhot_app.project import Rig
 from rhot_app.ui.language import tr
@@ -16,7 +16,7 @@ Wear = Literal["paint", "bare", "landmarks"]
 """What shows the hand: painted or taped markers; a bare hand, by the networks; landmarks or nodes of one's own."""
 
 CAMERAS, TRACKER, NETWORKS, BOARD = "cameras", "tracker", "networks", "board"
-"""Actions that are no wizard; the others are names of `calibration.registry.CALIBRATIONS`."""
+"""Actions that are no wizard; the others are names of calibrations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,20 +60,20 @@ def next_steps(answers: Answers, rig: Rig, *, networks: bool, printed: bool, rea
                       printed or exact or bool(measured), BOARD))
     steps.append(Step(tr("Calibrate each lens"), tr("Until then distances are a guess.")
                       if len(missing) == len(rig.nodes) else tr("Missing: {names}.", names=", ".join(missing))
-                      if missing else tr("All lenses are known."), exact or not missing, LENS.name))
+                      if missing else tr("All lenses are known."), exact or not missing, "lens"))
     if two:
         steps.append(Step(tr("Put the cameras together"),
                           tr("Where they stand to each other, from the board before both."), _together(rig),
-                          STEREO.name))
+                          "stereo"))
         steps.append(Step(tr("Compare the cameras' times"), times_text(rig), _together(rig) and not times_unknown(rig),
-                          TIME.name))
+                          "time"))
     if answers.wear == "paint":
         steps.append(Step(tr("Teach the colours"), tr("Which colour each marker has in this light."),
-                          exact or _noted(reasons, COLOURS.reason), COLOURS.name))
+                          exact or _noted(reasons, "colours"), "colours"))
     if answers.wear == "paint" or two:
         steps.append(Step(tr("Measure your hand"), tr("How long its bones are, from a minute of movement."),
-                          not is_shipped(rig.hand) or _noted(reasons, BONES.reason, MEASURED.reason, ADAPTED.reason),
-                          (BONES if answers.wear == "paint" else MEASURED).name))
+                          not is_shipped(rig.hand) or _noted(reasons, "bones", "measured", "adapted"),
+                          "bones" if answers.wear == "paint" else "measured"))
     return steps
 
 
@@ -91,5 +91,6 @@ def _together(rig: Rig) -> bool:
             and (found is None or found.finding.code == "lengths_unproven"))
 
 
-def _noted(reasons: Collection[str], *beginnings: str) -> bool:
+def _noted(reasons: Collection[str], *names: str) -> bool:
+    beginnings = tuple(calibration(name).reason for name in names)
     return any(reason.startswith(beginnings) for reason in reasons)

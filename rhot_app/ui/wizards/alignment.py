@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QLineEdit, QPushButton
 
-from rhot_app.calibration.registry import ALIGNMENT
-from rhot_app.errors import CalibrationError, EngineError
-from rhot_app.objects.alignment.alignment_file import Alignment, alignment_path, load_alignment
-from rhot_app.objects.alignment.calibration import StreamRecording, propose, report, solve_recording
+from rhot_app.calibration.collect import Bar
+from rhot_app.calibration.kinds.alignment import StreamRecording
+from rhot_app.errors import EngineError
 from rhot_app.objects.alignment.fit import LASTING_M, SEARCH_S
 from rhot_app.objects.alignment.report import FAIR_M, FAST_M_S, REACH_M, Coverage
 from rhot_app.state import HandState
@@ -28,7 +27,7 @@ from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.page import ChartPage, Page
-from rhot_app.ui.wizards.models.step import Bar, SolveStep, Step, StepView, Task
+from rhot_app.ui.wizards.models.step import SolveStep, Step, StepView
 
 _KIND, _DETAIL, _TRACKER = "pose source", "pose source detail", "pose tracker"  # as they are remembered
 
@@ -53,16 +52,13 @@ def make_wizard(context: WizardContext, poses: PoseFeed | None = None,
     if context.listen is None:
         raise EngineError("this window cannot hear the hand; open the wizard from the main window.")
     states, poses = StateFeed(context.listen), poses or PoseFeed()
-    simulated = simulated_kind(context.rig_path)
+    simulated = simulated_kind(context.now.path)
     source = SourceStep(KINDS if simulated is None else (simulated, *KINDS), poses)
     together = TogetherStep(context.rig.markers.ids, poses, states.recent, now_ns)
-    path = None if context.rig_path is None else alignment_path(context.rig_path)
-    before = in_use(path)
-    solve = SolveStep(lambda: None if together.recording is None else Task(
-        "Aligning both trackers …", solve_recording, (together.recording, before)),
-        lambda result: report(result.report, result.search))
-    accept = accept_result(context, solve, lambda result: propose(result, before, path),
-                           "Record a movement of both first.")
+    solve = SolveStep(context.calibration, context.now,
+                      lambda: None if together.recording is None else (together.recording, SEARCH_S),
+                      "Aligning both trackers …")
+    accept = accept_result(context, solve, "Record a movement of both first.")
 
     def end() -> None:
         poses.stop()
@@ -70,17 +66,7 @@ def make_wizard(context: WizardContext, poses: PoseFeed | None = None,
 
     pages = (SourcePage(source, context.memory), TogetherPage(together, states, context),
              ChartPage(solve, context.scheme), accept)
-    return Definition(ALIGNMENT.title, pages, solver="rhot_app.objects.alignment.fit", put_back=end)
-
-
-def in_use(path: Path | None) -> Alignment | None:
-    """The alignment beside the rig; one that cannot be read counts as none: the new one replaces it."""
-    if path is None or not path.exists():
-        return None
-    try:
-        return load_alignment(path)
-    except CalibrationError:
-        return None
+    return Definition(pages, put_back=end)
 
 
 # -- steps -------------------------------------------------------------------------------------------------------------

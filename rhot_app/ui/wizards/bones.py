@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 import numpy as np
@@ -11,11 +11,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QBrush, QColor
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QHeaderView, QLabel, QPushButton, QWidget
 
-from rhot_app.calibration.commands.bones import propose, report, roles_of, solve_log
+from rhot_app.calibration.collect import Bar, Guide, Movement
 from rhot_app.calibration.hand.bones import BONE_NAMES, enter_bones
 from rhot_app.calibration.hand.bones_report import BoneLength, BonesReport
 from rhot_app.calibration.hand.marker_places import tracks_of
-from rhot_app.calibration.registry import BONES as HAND_BONES
+from rhot_app.calibration.kinds.bones import roles_of
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import BONES, FINGERS
@@ -25,8 +25,8 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.movement_page import Movements
 from rhot_app.ui.wizards.framework.page import FigureTable, Page
-from rhot_app.ui.wizards.models.movement import Guide, QuietGuide
-from rhot_app.ui.wizards.models.step import Bar, Done, SolveStep, Step, StepView, Task
+from rhot_app.ui.wizards.models.movement import QuietGuide
+from rhot_app.ui.wizards.models.step import Done, SolveStep, Step, StepView
 
 if TYPE_CHECKING:
     from rhot_app.calibration.hand.bones_collector import BonesCollector
@@ -38,21 +38,20 @@ def make_wizard(context: WizardContext) -> Definition:
     """Which hand, a minute of movement, the bones, use them."""
     movements, rig = Movements(context), context.rig
     entry = EntryStep(rig.hand)
-    page = movements.page("Move freely", "Press Record, then bend and stretch every finger and turn the hand.", SECONDS,
-                          lambda: make_guide(rig))
-    page.twin_facts = "Moves every joint: all of them within the minute."
+    page = movements.page(Movement(
+        "Move freely", "Press Record, then bend and stretch every finger and turn the hand.", SECONDS,
+        lambda: make_guide(rig), "Moves every joint: all of them within the minute."))
     page.movement.unneeded = lambda: "Press Next: the bones were entered." if entry.result is not None else ""
 
-    def fitting() -> Task | Done | None:
+    def measured() -> tuple[Any, ...] | Done | None:
         if entry.result is not None:
             return Done(entry.result)
         log = page.movement.log
-        return None if log is None else Task("Fitting the hand …", solve_log, (log, rig, entry.base))
+        return None if log is None else (log, entry.base)
 
-    hand = SolveStep(fitting, report)
-    accept = accept_result(context, hand, lambda result: propose(result, rig), "Record the movement first.")
-    return Definition(HAND_BONES.title, (EntryPage(entry), page, HandPage(hand, context.scheme), accept),
-                      solver="rhot_app.calibration.hand.bones", put_back=movements.end)
+    hand = SolveStep(context.calibration, context.now, measured, "Fitting the hand …")
+    accept = accept_result(context, hand, "Record the movement first.")
+    return Definition((EntryPage(entry), page, HandPage(hand, context.scheme), accept), put_back=movements.end)
 
 
 # -- steps -------------------------------------------------------------------------------------------------------------

@@ -12,7 +12,6 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from rhot_app.calibration.proposal import NodeChange
-from rhot_app.calibration.registry import CAMERA
 from rhot_app.errors import RhotError
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import Picture
@@ -26,7 +25,7 @@ from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, Cont
 
 def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand."""
-    choices = CameraChoices(context.rig.nodes, context.node_settings)
+    choices = CameraChoices(context.rig.nodes, context.now.node_settings)
     step = SettingsStep(choices, context.rig.markers)
     tryout = Tryout(context.connect)
     last = accept_page(context, step.propose, "No picture shows these settings yet, or they cannot be used: go back.")
@@ -44,7 +43,7 @@ def make_wizard(context: WizardContext) -> Definition:
                     in_force[change.node_id]["camera"].update(change.after["camera"])
         tryout.put_back(in_force)
 
-    return Definition(CAMERA.title, (page, last), put_back=put_back)
+    return Definition((page, last), put_back=put_back)
 
 
 # -- the knobs of the camera wizard ------------------------------------------------------------------------------------

@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
-from collections.abc import Callable
-from datetime import datetime
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
 
-from platformdirs import user_documents_path
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFormLayout, QLabel, QWidget
 
-from rhot_app.calibration.registry import CERTIFICATE
+from rhot_app.calibration.collect import Movement
+from rhot_app.certificate.collect import SECONDS
 from rhot_app.certificate.latency import flash_edges
+from rhot_app.certificate.recordings import FlashStep, PlumbStep, ProtocolFile, RodStep, RulerStep, StaticStep
+from rhot_app.project import Rig
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.movement_page import MovementPage, Movements
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
-from rhot_app.ui.wizards.models.movement import QuietGuide
-from rhot_app.ui.wizards.models.step import SolveStep, StepView
-from rhot_app.ui.wizards.steps.certificate_steps import (
-    CertificateStep,
-    KeepStep,
-    RulerDistances,
-    Statements,
-    propose,
-    report,
-    task_of,
-)
+from rhot_app.ui.wizards.models.movement import MovementStep, QuietGuide, Request
+from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep, StepView
 
 _FLASH_STEP_MS = 4  # a quarter of a 60 Hz screen's frame
 _SEED = 7
@@ -45,36 +40,135 @@ def make_wizard(context: WizardContext) -> Definition:
     said = Statements(context.rig, rod_markers=(ids[0], ids[1 % len(ids)]), flash_marker=ids[0])
 
     folder, recent = movements.folder, movements.states.recent
-
-    def still() -> QuietGuide:
-        return QuietGuide("Hold still.")
-
-    def moving() -> QuietGuide:
-        return QuietGuide("Go on.")
-
-    made = {"static": movements.add(CertificateStep("static", folder, still, recent)),
-            "ruler": movements.add(RulerDistances(folder, still, recent, ids[0])),
-            "rod": movements.add(CertificateStep("rod", folder, moving, recent)),
-            "flash": movements.add(CertificateStep("flash", folder, moving, recent)),
-            "plumb": movements.add(CertificateStep("plumb", folder, still, recent))}
+    made = {"static": movements.add(CertificateStep("static", "Hold still.", folder, recent)),
+            "ruler": movements.add(RulerDistances("Hold still.", folder, recent, ids[0])),
+            "rod": movements.add(CertificateStep("rod", "Go on.", folder, recent)),
+            "flash": movements.add(CertificateStep("flash", "Go on.", folder, recent)),
+            "plumb": movements.add(CertificateStep("plumb", "Hold still.", folder, recent))}
     pages = (StillPage(made["static"], context.connect, movements.states, said),
              RulerPage(made["ruler"], context.connect, movements.states, ids),
              RodPage(made["rod"], context.connect, movements.states, said),
              FlashPage(made["flash"], context.connect, movements.states, said),
              MovementPage(made["plumb"], context.connect, movements.states))
-    solve = SolveStep(lambda: task_of(said, made), report)
-    keep = KeepStep(lambda: propose(solve.result, lambda created: _place(context.rig.name, created)), context.rig_path,
+    def recorded() -> tuple[ProtocolFile] | None:
+        protocol = said.protocol(made)
+        return None if protocol == ProtocolFile(simulated=protocol.simulated) else (protocol,)
+
+    solve = SolveStep(context.calibration, context.now, recorded, "Measuring the recordings …")
+    propose = context.calibration.propose
+    assert propose is not None
+    keep = KeepStep(lambda: None if solve.result is None else propose(solve.result, context.now), context.now.path,
                     "Record a step first.")
-    return Definition(CERTIFICATE.title, (*pages, ChartPage(solve, context.scheme), KeepPage(keep, context.scheme)),
-                      solver="rhot_app.certificate.certify", put_back=movements.end)
+    return Definition((*pages, ChartPage(solve, context.scheme), KeepPage(keep, context.scheme)),
+                      put_back=movements.end)
 
 
-def _place(rig: str, created: str) -> Path:
-    """A folder in the user's documents for a certificate that was `created` then, ISO 8601."""
-    name = "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in rig)
-    made = datetime.fromisoformat(created).astimezone()
-    return user_documents_path() / "RHOT" / "certificates" / f"{name}-{made:%Y%m%d-%H%M%S}"
+# -- steps -------------------------------------------------------------------------------------------------------------
 
+_SENTENCES: dict[str, str] = {
+    "static": "Rest your hand, palm to the cameras, fingers spread; or rest a board. Then press Record.",
+    "ruler": "Hold one marker still, read the ruler, type it, press Record. Eight distances, near to far.",
+    "rod": "Press Record, then move a rod with two markers slowly through the whole volume, turning it every way.",
+    "flash": "Turn the cameras to this screen, darken the room, press Record: the patch flashes for 20 seconds.",
+    "plumb": "Hang the rod from a string. When it is still, press Record.",
+}
+TITLES: dict[str, str] = {"static": "Still", "ruler": "Ruler", "rod": "Rod", "flash": "Flash", "plumb": "Plumb line"}
+
+
+class CertificateStep(MovementStep):
+    """A step of the protocol: a recording that may be left out, which the certificate then says."""
+
+    def __init__(self, name: str, sentence: str, folder: Path, recent: Callable[[], Sequence[Any]]) -> None:
+        """`sentence` is said while it is recorded."""
+        super().__init__(Movement(TITLES[name], _SENTENCES[name], SECONDS[name], lambda: QuietGuide(sentence)), folder,
+                         recent)
+
+    def view(self) -> StepView:
+        """One may always go on, but not while it is recorded."""
+        view = super().view()
+        return dataclasses.replace(view, passable=self.phase in ("waiting", "recorded"))
+
+
+class RulerDistances(CertificateStep):
+    """Many short recordings, one for each distance. `distance_mm` and `marker` are what is recorded next."""
+
+    def __init__(self, sentence: str, folder: Path, recent: Callable[[], Sequence[Any]], marker: str) -> None:
+        super().__init__("ruler", sentence, folder, recent)
+        self.distance_mm = 200.0
+        self.marker = marker
+        self.rows: list[RulerStep] = []
+        self._next = (self.distance_mm, marker)
+
+    def capture(self) -> bool:
+        """Begin, or end; the distance is that of the beginning."""
+        if self.phase in ("waiting", "recorded"):
+            self._next = (self.distance_mm, self.marker)
+        return super().capture()
+
+    def answered(self, request: Request) -> None:
+        """A finished recording is a row."""
+        super().answered(request)
+        if request.kind == "end":
+            self.rows.append(RulerStep(str(request.path), *self._next))
+
+    def undo(self) -> bool:
+        """Take the last row back."""
+        if not self.rows or self.phase not in ("waiting", "recorded"):
+            return False
+        self.rows.pop()
+        return True
+
+    def view(self) -> StepView:
+        """How many there are."""
+        view = super().view()
+        if self.phase != "recorded":
+            return view
+        return dataclasses.replace(view, sentence=f"{len(self.rows)} distances. Type the next one and press Record, or "
+                                   "go on.", done=len(self.rows) >= 4, kept=len(self.rows))
+
+
+@dataclass
+class Statements:
+    """What the operator says of the recordings; the pages fill it in."""
+
+    rig: Rig
+    facing: Literal["palm", "back"] | None = "palm"
+    rod_mm: float = 300.0
+    rod_markers: tuple[str, str] = ("", "")
+    edges: tuple[tuple[int, bool], ...] = ()
+    flash_marker: str = ""
+
+    def protocol(self, steps: dict[str, CertificateStep]) -> ProtocolFile:
+        """The protocol of what was recorded so far."""
+        logs = {name: str(step.log) for name, step in steps.items() if step.log is not None}
+        ruler = steps["ruler"]
+        assert isinstance(ruler, RulerDistances)
+        upper, lower = self.rod_markers
+        return ProtocolFile(
+            static=StaticStep(logs["static"], self.facing) if "static" in logs else None,
+            ruler=tuple(ruler.rows),
+            rod=RodStep(logs["rod"], self.rod_mm, self.rod_markers) if "rod" in logs else None,
+            flash=FlashStep(logs["flash"], self.flash_marker, self.edges) if "flash" in logs else None,
+            plumb=PlumbStep(logs["plumb"], upper, lower) if "plumb" in logs else None,
+            simulated=self.rig.calibration is not None and self.rig.calibration.method == "exact")
+
+
+class KeepStep(AcceptStep):
+    """The last step: the lines, and the folder that they are written to."""
+
+    title = "Keep"
+    use_label = "Write the certificate"
+
+    def _sentence(self) -> str:
+        if self.state == "used" and self.proposal is not None:
+            return "It is written."
+        if self.state == "restored":
+            return "It is deleted."
+        return super()._sentence() if self.state == "under way" or self.proposal is None else (
+            "Write the certificate, or go back and record a step again.")
+
+
+# -- pages -------------------------------------------------------------------------------------------------------------
 
 class StillPage(MovementPage):
     """Which side of a hand it is."""

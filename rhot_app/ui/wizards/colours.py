@@ -22,9 +22,6 @@ from PySide6.QtWidgets import (
 from rhot_app.calibration.colour.colours import ColourReport
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.colour.verdict import OVERLAP
-from rhot_app.calibration.commands.colours import propose
-from rhot_app.calibration.proposal import Proposal
-from rhot_app.calibration.registry import COLOURS
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.models.palette import Scheme
@@ -42,17 +39,18 @@ def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand."""
     cameras = tuple(node.name for node in context.rig.nodes if not node.text_datagrams)
     picks = PickStep(context.rig.markers, cameras)
-    bounds = BoundsStep(picks)
-    apart = SeparationStep(bounds)
+    bounds = BoundsStep(context.calibration, context.now, picks)
+    apart = SeparationStep(context.calibration, context.now, bounds)
 
-    def propose_colours(result: ColourReport) -> Proposal:
+    def judged_now(result: ColourReport) -> ColourReport:
+        """With what the light says since then."""
         assert apart.report is not None
-        return propose(replace(result, verdict=apart.report.verdict), context.rig, context.node_settings)
+        return replace(result, verdict=apart.report.verdict)
 
-    accept = accept_result(context, apart, propose_colours, "Pick the markers' colours first.")
+    accept = accept_result(context, apart, "Pick the markers' colours first.", judged_now)
     pages = (PickPage(picks, context.scheme), BoundsPage(bounds, context.scheme), SeparationPage(apart, context.scheme),
              accept)
-    return Definition(COLOURS.title, pages, solver="rhot_app.calibration.colour.colours")
+    return Definition(pages)
 
 
 # -- the page of the separability --------------------------------------------------------------------------------------

@@ -20,10 +20,8 @@ from PySide6.QtWidgets import (
     QTableWidgetItem,
 )
 
-from rhot_app.calibration.commands.depth import propose, report
 from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthReport, fit_depth, geometry_of, replaced_calibration
 from rhot_app.calibration.depth.table import DepthRow, DepthTable
-from rhot_app.calibration.registry import DEPTH
 from rhot_app.errors import CalibrationError, EngineError
 from rhot_app.project import Rig
 from rhot_app.state import HandState
@@ -43,13 +41,12 @@ def make_wizard(context: WizardContext, clock: Callable[[], float] = time.monoto
         raise EngineError("this window cannot hear the markers; open the wizard from the main window.")
     states, rig = StateFeed(context.listen, clock), context.rig
     distances = DistanceStep(rig, states.recent)
-    law = SolveStep(lambda: None if distances.result is None else Done(distances.result),
-                    lambda result: report(result, rig), "The law",
-                    f"Go back and measure at least {LEAST_ROWS} distances.")
+    law = SolveStep(context.calibration, context.now,
+                    lambda: None if distances.result is None else Done(distances.result), "Fitting the law …",
+                    "The law", f"Go back and measure at least {LEAST_ROWS} distances.")
     law.advice = "The points should lie on the line, inside the band."
-    accept = accept_result(context, law, lambda result: propose(result, rig), "Measure some distances first.")
-    return Definition(DEPTH.title, (DistancePage(distances, states), ChartPage(law, context.scheme), accept),
-                      put_back=states.stop)
+    accept = accept_result(context, law, "Measure some distances first.")
+    return Definition((DistancePage(distances, states), ChartPage(law, context.scheme), accept), put_back=states.stop)
 
 
 # -- the step of the distances -----------------------------------------------------------------------------------------

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PySide6.QtCore import Qt
@@ -20,10 +22,11 @@ from PySide6.QtWidgets import (
     QTableWidgetItem,
 )
 
-from rhot_app.calibration.commands.filters import FilterStage, propose, report, solve_logs
+from rhot_app.calibration.collect import Bar, Movement
 from rhot_app.calibration.filters.meters import BRISK_M_S, MOVING_M_S, FilterMeter, FilterTargets, MeterReading
-from rhot_app.calibration.registry import FILTERS
-from rhot_app.project import Rig
+from rhot_app.calibration.filters.tuning import FilterReport
+from rhot_app.calibration.kinds.filters import FilterStage, report
+from rhot_app.calibration.report import Report
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
@@ -32,7 +35,7 @@ from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, 
 from rhot_app.ui.wizards.framework.movement_page import MovementPage, Movements
 from rhot_app.ui.wizards.framework.page import ChartPage, shrinkable
 from rhot_app.ui.wizards.models.movement import MovementStep
-from rhot_app.ui.wizards.models.step import Bar, SolveStep, StepView, Task
+from rhot_app.ui.wizards.models.step import SolveStep, StepView
 
 STILL_S, FAST_S = 10.0, 15.0
 
@@ -41,18 +44,16 @@ def make_wizard(context: WizardContext) -> Definition:
     """Hold still, move fast, look at the charts, use it."""
     movements, meters = Movements(context), LiveMeters()
 
-    def page(title: str, sentence: str, seconds: float, guide: type[StillGuide] | type[FastGuide]) -> MeterPage:
-        return movements.page_of(lambda step, connect, states: MeterPage(step, connect, states, meters),
-                                 title, sentence, seconds, lambda: guide(meters))
+    def page(movement: Movement) -> MeterPage:
+        return movements.page_of(lambda step, connect, states: MeterPage(step, connect, states, meters), movement)
 
-    still = page("Hold still", "Rest the hand before both cameras, then press Record.", STILL_S, StillGuide)
-    fast = page("Move fast", "Press Record, then wave the hand briskly, 20 cm wide.", FAST_S, FastGuide)
-    still.twin_facts, fast.twin_facts = "Holds still.", "Waves briskly."
-    tune = TuneStep(lambda: (still.movement.log, fast.movement.log), context.rig)
-    accept = accept_result(context, tune, lambda result: propose(result, context.rig, per_marker=tune.per_marker),
-                           "Record both movements first.")
-    return Definition(FILTERS.title, (still, fast, TunePage(tune, context.scheme), accept),
-                      solver="rhot_app.calibration.filters.tuning", put_back=movements.end)
+    still = page(Movement("Hold still", "Rest the hand before both cameras, then press Record.", STILL_S,
+                          lambda: StillGuide(meters), "Holds still."))
+    fast = page(Movement("Move fast", "Press Record, then wave the hand briskly, 20 cm wide.", FAST_S,
+                         lambda: FastGuide(meters), "Waves briskly."))
+    tune = TuneStep(context, lambda: (still.movement.log, fast.movement.log))
+    return Definition((still, fast, TunePage(tune, context.scheme),
+                       accept_result(context, tune, "Record both movements first.")), put_back=movements.end)
 
 
 # -- steps -------------------------------------------------------------------------------------------------------------
@@ -60,20 +61,21 @@ def make_wizard(context: WizardContext) -> Definition:
 class TuneStep(SolveStep):
     """The proposal for what is allowed: `targets`; `stage` says which filter's charts are shown."""
 
-    def __init__(self, logs: Callable[[], tuple[Path | None, Path | None]], rig: Rig) -> None:
+    def __init__(self, context: WizardContext, logs: Callable[[], tuple[Path | None, Path | None]]) -> None:
         """`logs` gives the recordings of the hand held still and moved fast."""
+        super().__init__(context.calibration, context.now, self._recorded, "Trying filters …")
         self.targets = FilterTargets()
         self.per_marker = False
         self.stage: FilterStage = "position"
-        self._rig = rig
         self._logs = logs
-        super().__init__(self._tuning, lambda result: report(result, rig, per_marker=self.per_marker, stage=self.stage))
 
-    def _tuning(self) -> Task | None:
+    def _recorded(self) -> tuple[Any, ...] | None:
         still, fast = self._logs()
-        if still is None or fast is None:
-            return None
-        return Task("Trying filters …", solve_logs, (still, fast, self._rig, self.targets))
+        return None if still is None or fast is None else (still, fast, self.targets, False)
+
+    def describe(self, result: FilterReport) -> Report:
+        """With the charts of one filter."""
+        return report(result, self._now, self.stage)
 
     def set_targets(self, jitter_mm: float, lag_ms: float) -> None:
         """Other figures to keep to: another proposal."""
@@ -88,7 +90,12 @@ class TuneStep(SolveStep):
     def set_per_marker(self, on: bool) -> None:
         """Settings for each marker, or the same for all."""
         self.per_marker = on
-        self.report_again()
+        if self.result is not None:
+            self.take_result(self.result)
+
+    def take_result(self, result: FilterReport) -> None:
+        """As it was asked for."""
+        super().take_result(replace(result, per_marker=self.per_marker))
 
 
 # -- Jitter and lag of every marker ------------------------------------------------------------------------------------

@@ -6,7 +6,6 @@ import contextlib
 
 from PySide6.QtWidgets import QPushButton
 
-from rhot_app.calibration.registry import FOREGROUND
 from rhot_app.errors import RhotError
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
@@ -17,7 +16,7 @@ from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, LearningStep, 
 
 def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand."""
-    cameras = {node.name: node.node_id for node in context.rig.nodes if node.node_id in context.node_settings}
+    cameras = {node.name: node.node_id for node in context.rig.nodes if node.node_id in context.now.node_settings}
     empty, skin = EmptyStep(cameras), SkinStep(cameras, context.connect)
     last = accept_page(context, lambda: propose(empty, skin), "Learn the empty scene and your hand first.")
     pages = (LearnPage(empty, context, "Learn the empty scene"), LearnPage(skin, context, "Learn my skin"),
@@ -33,7 +32,7 @@ def make_wizard(context: WizardContext) -> Definition:
                     with contextlib.suppress(RhotError):  # a node that is gone has forgotten it anyway
                         ask_node(asker.command, node_id, "revert_foreground")
 
-    return Definition(FOREGROUND.title, pages, put_back=put_back)
+    return Definition(pages, put_back=put_back)
 
 
 class LearnPage(Page):

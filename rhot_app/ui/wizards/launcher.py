@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QAction, QIcon
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QMenu, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 
 from rhot_app import rig_history
-from rhot_app.calibration.proposal import Proposal, rows_of
-from rhot_app.errors import EngineError, RhotError
+from rhot_app.calibration.proposal import Proposal
+from rhot_app.calibration.registry import Calibration, InForce, calibrations
+from rhot_app.errors import EngineError
 from rhot_app.project import Rig, parse_rig
-from rhot_app.rig_history import Version
 from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import shape_icon
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.models.proposal import set_rig
-from rhot_app.ui.wizards.framework.definition import WIZARDS, SettingsStore, Wizard, WizardContext
-from rhot_app.ui.wizards.framework.page import RowTable
+from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext
 from rhot_app.ui.wizards.framework.window import WizardWindow
+from rhot_app.ui.wizards.versions_dialog import VersionsDialog
 
 if TYPE_CHECKING:  # they compile numerical code, which waits until it is wanted
     from rhot_app.handfit.session import HandFit
@@ -38,13 +36,15 @@ if TYPE_CHECKING:  # they compile numerical code, which waits until it is wanted
 _END_S = 5.0
 
 
-@dataclass(frozen=True, slots=True)
-class RigNow:
-    """The engine's rig and its file, and the settings of the nodes that answered."""
+def module_of(calibration: Calibration) -> str:
+    """The module that has ``make_wizard(context)``: of what the calibration collects, or of its name."""
+    return f"{__package__}.framework.collecting" if calibration.collect else f"{__package__}.{calibration.name}"
 
-    rig: Rig
-    path: Path | None
-    node_settings: dict[int, dict[str, Any]]
+
+def make_wizard(context: WizardContext) -> Definition:
+    """The pages of the context's calibration for the rig at hand."""
+    made: Definition = importlib.import_module(module_of(context.calibration)).make_wizard(context)
+    return made
 
 
 class Launcher(QObject):
@@ -70,16 +70,16 @@ class Launcher(QObject):
         self.fit: HandFitWindow | None = None
 
     def show_ages(self, actions: list[QAction], path: str) -> None:
-        """A tick and the age of what is in force, for each wizard's action in the order of `WIZARDS`; titles alone
-        without a rig."""
+        """A tick and the age of what is in force, for each wizard's action in the order of `calibrations`; titles
+        alone without a rig."""
         if not path:
-            for action, wizard in zip(actions, WIZARDS, strict=True):
+            for action, wizard in zip(actions, calibrations(), strict=True):
                 action.setIcon(QIcon())
                 action.setText(f"{wizard.title} …")
             return
         when = self.in_force(path)
         scheme = self._scheme()
-        for action, wizard in zip(actions, WIZARDS, strict=True):
+        for action, wizard in zip(actions, calibrations(), strict=True):
             done = max((at for reason, at in when.items() if reason.startswith(wizard.reason)), default=None)
             shape, tone = ("tick", scheme.good) if done is not None else ("ring", scheme.neutral)
             action.setIcon(shape_icon(shape, tone))
@@ -89,7 +89,7 @@ class Launcher(QObject):
         """When each thing of the rig at `path` was made that is in force, by its reason."""
         return {**self._noted(path), **rig_history.in_force(Path(path))} if path else {}
 
-    def open(self, wizard: Wizard) -> None:
+    def open(self, wizard: Calibration) -> None:
         """Ask engine and nodes how things stand, then show the wizard."""
         if self._job is None and self.wizard is None:
             self._job = Job(lambda progress: self._look(wizard), lambda now: self._show(wizard, now), self._not_opened,
@@ -113,21 +113,21 @@ class Launcher(QObject):
         if self.fit is not None:
             self.fit.end().wait(_END_S)
 
-    def _look(self, wizard: Wizard | None) -> RigNow:
+    def _look(self, wizard: Calibration | None) -> InForce:
         if wizard is not None:
-            wizard.load()
+            importlib.import_module(module_of(wizard))  # takes a moment the first time
         with contextlib.closing(self._connect()) as asker:
             answer = asker.command("rig")
             path = str(answer.get("path", ""))
             rig = parse_rig(msgspec.json.encode(answer["document"]), path or "the engine's rig")
             settings = _node_settings(asker, rig) if wizard is not None else {}
-        return RigNow(rig, Path(path) if path else None, settings)
+        return InForce(rig, Path(path) if path else None, settings)
 
-    def _show(self, wizard: Wizard, now: RigNow) -> None:
+    def _show(self, wizard: Calibration, now: InForce) -> None:
         self._job = None
-        context = WizardContext(now.rig, now.path, self._connect, self._scheme(), self._memory, now.node_settings,
-                  self._listen, self._make_solver)
-        self.wizard = WizardWindow(wizard.make_wizard(context), context, self._window)
+        context = WizardContext(wizard, now, self._connect, self._scheme(), self._memory, self._listen,
+                                self._make_solver)
+        self.wizard = WizardWindow(make_wizard(context), context, self._window)
         self.wizard.rig_used.connect(lambda rig: self.rig_used.emit())
         self.wizard.used.connect(lambda proposal, on: self._note(proposal, str(now.path or ""), on=on))
         self.wizard.finished.connect(self._forget)
@@ -141,7 +141,7 @@ class Launcher(QObject):
 
     def _noted(self, path: str) -> dict[str, datetime]:
         found = {}
-        for wizard in WIZARDS:
+        for wizard in calibrations():
             with contextlib.suppress(ValueError):
                 found[wizard.reason] = datetime.fromisoformat(self._memory.remembered(f"{wizard.reason} {path}"))
         return found
@@ -151,7 +151,7 @@ class Launcher(QObject):
             dispose(self.wizard)
             self.wizard = None
 
-    def _show_versions(self, now: RigNow) -> None:
+    def _show_versions(self, now: InForce) -> None:
         self._job = None
         if now.path is None:
             self.failed.emit("This rig came from no file, so there are no earlier versions of it. Save it first.")
@@ -166,7 +166,7 @@ class Launcher(QObject):
             dispose(self.versions)
             self.versions = None
 
-    def _begin_fit(self) -> tuple[RigNow, HandFit]:
+    def _begin_fit(self) -> tuple[InForce, HandFit]:
         from rhot_app.handfit.session import HandFit, warm_up
 
         now = self._look(None)
@@ -174,7 +174,7 @@ class Launcher(QObject):
         warm_up(now.rig)
         return now, fit
 
-    def _show_fit(self, begun: tuple[RigNow, HandFit]) -> None:
+    def _show_fit(self, begun: tuple[InForce, HandFit]) -> None:
         from rhot_app.ui.handfit.live import fit_live
 
         self._job = None
@@ -205,107 +205,6 @@ def _node_settings(asker: Asker, rig: Rig) -> dict[int, dict[str, Any]]:
             except (EngineError, KeyError):
                 continue
     return found
-
-
-# -- Earlier versions of the rig file ----------------------------------------------------------------------------------
-
-class VersionsDialog(QDialog):
-    """`rig_used` gives the rig that was brought back. Bringing back keeps what was there, so it can be undone here."""
-
-    rig_used = Signal(object)
-
-    def __init__(self, path: Path, rig: Rig, connect: Callable[[], Asker], scheme: Scheme,
-                 parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Earlier calibrations")
-        self.setProperty("guide", "calibration")
-        self.resize(1000, 560)
-        self._path = path
-        self._rig = rig
-        self._connect = connect
-        self._versions: list[Version] = []
-        self._job: Job | None = None
-        self.list = QListWidget()
-        self.list.setFixedWidth(300)
-        self.list.setSpacing(4)
-        self.list.setWordWrap(True)
-        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.list.currentRowChanged.connect(self._show_version)
-        self.table = RowTable(scheme, ("", "now", "then"))
-        self.sentence = Sentence(2)
-        self.back_button = QPushButton("Bring it back")
-        self.back_button.setToolTip("Puts the chosen version into force. What is there now is kept, and can be brought "
-                                    "back the same way.")
-        self.back_button.clicked.connect(self.bring_back)
-        close = QPushButton("Close")
-        close.setAutoDefault(False)
-        close.clicked.connect(self.reject)
-        middle, buttons = QHBoxLayout(), QHBoxLayout()
-        middle.addWidget(self.list)
-        middle.addWidget(self.table, 1)
-        buttons.addWidget(self.sentence, 1)
-        buttons.addWidget(close)
-        buttons.addWidget(self.back_button)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 16, 16, 16)
-        layout.setSpacing(16)
-        layout.addLayout(middle, 1)
-        layout.addLayout(buttons)
-        self._list_versions()
-
-    def _list_versions(self) -> None:
-        self._versions = rig_history.versions(self._path)
-        self.list.clear()
-        for version in self._versions:
-            self.list.addItem(f"{version.replaced_at.astimezone():%d %B %Y, %H:%M}\nbefore {version.replaced_by}")
-        self.back_button.setEnabled(bool(self._versions))
-        if self._versions:
-            self.list.setCurrentRow(0)
-        else:
-            self.sentence.setText("Nothing has been replaced yet: there is no earlier calibration of this rig.")
-
-    def _show_version(self, number: int) -> None:
-        if not 0 <= number < len(self._versions):
-            return
-        try:
-            rows = rows_of(self._rig, rig_history.load_version(self._path, self._versions[number]))
-        except RhotError as exc:
-            self.table.show_rows(())
-            self.sentence.setText(str(exc))
-            self.back_button.setEnabled(False)
-            return
-        self.table.show_rows(rows)
-        self.back_button.setEnabled(bool(rows))
-        self.sentence.setText("" if rows else "This version says the same as the rig does now.")
-
-    def bring_back(self) -> None:
-        """Put the chosen version into force, in a worker."""
-        number = self.list.currentRow()
-        if self._job is None and 0 <= number < len(self._versions):
-            version = self._versions[number]
-            self.back_button.setEnabled(False)
-            self._job = Job(lambda progress: self._restore(version), self._restored, self._failed, None, self).start()
-
-    def _restore(self, version: Version) -> Rig:
-        with contextlib.closing(self._connect()) as asker:
-            set_rig(asker.command, rig_history.load_version(self._path, version))
-            try:
-                return rig_history.restore(self._path, version)
-            except RhotError:
-                set_rig(asker.command, self._rig)
-                raise
-
-    def _restored(self, rig: Rig) -> None:
-        self._job = None
-        self._rig = rig
-        self._list_versions()
-        self.sentence.setText("It is back in force. What was there before stands first in the list now.")
-        self.rig_used.emit(rig)
-
-    def _failed(self, sentence: str) -> None:
-        self._job = None
-        self.back_button.setEnabled(True)
-        self.sentence.setText(sentence)
 
 
 def age_text(when: datetime, now: datetime | None = None) -> str:

@@ -11,11 +11,8 @@ from PySide6.QtWidgets import QCheckBox, QComboBox
 from rhot_app.calibration.board.boards import Board, same_pattern
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.shared_views import BoardShot
-from rhot_app.calibration.commands.intrinsics import propose, report, solve_shown
 from rhot_app.calibration.lens.coverage import CaptureGuide, Coverage
 from rhot_app.calibration.lens.intrinsics import IntrinsicsReport
-from rhot_app.calibration.proposal import Proposal
-from rhot_app.calibration.registry import LENS
 from rhot_app.project import Intrinsics
 from rhot_app.ui.backend.feed import Image, Picture
 from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
@@ -32,7 +29,7 @@ from rhot_app.ui.wizards.models.board_form import (
 )
 from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Mark, Overlay, Tag
 from rhot_app.ui.wizards.models.films import FilmedStep, Films
-from rhot_app.ui.wizards.models.step import Bar, Pictures, SolveStep, StepView, Task
+from rhot_app.ui.wizards.models.step import Bar, Pictures, SolveStep, StepView
 
 LAST = "lens camera"
 
@@ -43,15 +40,16 @@ def make_wizard(context: WizardContext) -> Definition:
     board = LensBoardStep(fields_from(context.memory.remembered(MEMORY)), cameras,
                           _next(cameras, context.memory.remembered(LAST)))
     show = LensShowStep(board)
-    solve = LensSolveStep(show)
+    solve = LensSolveStep(context, show)
 
-    def propose_lens(result: IntrinsicsReport) -> Proposal:
-        context.memory.remember(LAST, board.camera)
-        return propose(result, context.rig, board.camera)
+    def chosen(result: IntrinsicsReport) -> IntrinsicsReport:
+        """The next run begins with the camera after it."""
+        context.memory.remember(LAST, result.camera)
+        return result
 
     pages = (LensBoardPage(board, context.memory), FilmsPage(show), LensResultPage(solve),
-             accept_result(context, solve, propose_lens))
-    return Definition(LENS.title, pages, solver="rhot_app.calibration.lens.intrinsics")
+             accept_result(context, solve, completed=chosen))
+    return Definition(pages)
 
 
 def _next(cameras: tuple[str, ...], done: str) -> str:
@@ -223,16 +221,13 @@ class LensSolveStep(SolveStep):
     watches = True
     result: IntrinsicsReport | None
 
-    def __init__(self, show: LensShowStep) -> None:
-        super().__init__(self._solving, report)
+    def __init__(self, context: WizardContext, show: LensShowStep) -> None:
+        super().__init__(context.calibration, context.now,
+                         lambda: (show.views, show.board, show.camera, self.square_pixels), "Estimating the intrinsics")
         self._show = show
         self._straight: dict[str, Picture] = {}
         self.straighten = False
         self.square_pixels = False
-
-    def _solving(self) -> Task:
-        return Task("Estimating the intrinsics", solve_shown, (self._show.views, self._show.board),
-                    {"square_pixels": self.square_pixels})
 
     def set_square_pixels(self, on: bool) -> None:
         """Force fx = fy, and solve again."""

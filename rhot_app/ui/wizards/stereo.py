@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,7 @@ import numpy as np
 from rhot_app.calibration.board.boards import Board, same_pattern
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
-from rhot_app.calibration.commands.stereo import propose, report, solve_shown
-from rhot_app.calibration.registry import STEREO
+from rhot_app.calibration.kinds.stereo import StereoViews
 from rhot_app.calibration.stereo.calibrate import lens_of
 from rhot_app.calibration.stereo.collector import Guidance, Offer, StereoCollector
 from rhot_app.calibration.stereo.report import StereoReport
@@ -24,7 +24,7 @@ from rhot_app.ui.wizards.known_length import LengthsPage, LengthsStep
 from rhot_app.ui.wizards.models.board_form import OTHER_BOARD, BoardObservation, BoardSearch, BoardStep, fields_from
 from rhot_app.ui.wizards.models.drawing import Dots, Overlay
 from rhot_app.ui.wizards.models.films import FilmedStep, Films
-from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Pictures, SolveStep, Step, StepView, Task
+from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Pictures, SolveStep, Step, StepView
 
 
 def make_wizard(context: WizardContext) -> Definition:
@@ -35,12 +35,12 @@ def make_wizard(context: WizardContext) -> Definition:
     board = BoardStep(fields_from(context.memory.remembered(MEMORY)), cameras)
     show = ShowStep(board, cameras)
     known = LengthsStep(cameras)
-    solve = SolveStep(lambda: Task("Calibrating the cameras", solve_shown, (show.views, lenses),
-                                   {"known": known.known}), report)
+    solve = SolveStep(context.calibration, context.now, lambda: (StereoViews(show.views, known.known, lenses),),
+                      "Calibrating the cameras")
     table = TableStep(board, solve, cameras)
-    accept = accept_result(context, solve, lambda result: propose(result, context.rig, table.world))
+    accept = accept_result(context, solve, completed=lambda result: replace(result, table=table.world))
     pages = (BoardPage(board, context.memory), FilmsPage(show), LengthsPage(known), Page(solve), Page(table), accept)
-    return Definition(STEREO.title, pages, solver="rhot_app.calibration.stereo.calibrate")
+    return Definition(pages)
 
 
 # -- steps: captures, world frame --------------------------------------------------------------------------------------

@@ -134,4 +134,4 @@ def make_wizard(context: WizardContext, steps: int = 3) -> Definition:
                         context.rig, after)
 
     form, collect = FormPage(FormStep()), Page(CollectStep())
-    return Definition("Sample", (form, collect, Page(solve), accept_page(context, propose)))
+    return Definition((form, collect, Page(solve), accept_page(context, propose)))

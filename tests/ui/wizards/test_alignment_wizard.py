@@ -14,15 +14,17 @@ from patience import eventually
 from PySide6.QtCore import Qt
 from wizard_hand import RecordingAsker
 
+from rhot_app.calibration.kinds.alignment import propose, solve
+from rhot_app.calibration.registry import InForce
 from rhot_app.calibration.verdict import Grade
 from rhot_app.geometry.transforms import inverse
 from rhot_app.objects.alignment.alignment_file import alignment_path, load_alignment, save_alignment
-from rhot_app.objects.alignment.calibration import propose, solve_recording
+from rhot_app.objects.alignment.fit import SEARCH_S
 from rhot_app.sources.poses.open_source import open_source
 from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.models.proposal import use_all
 from rhot_app.ui.wizards import alignment
-from rhot_app.ui.wizards.alignment import TogetherStep, in_use
+from rhot_app.ui.wizards.alignment import TogetherStep
 from rhot_app.ui.wizards.models.step import AcceptStep
 
 MARKERS = synthetic_rig().markers.ids
@@ -31,8 +33,8 @@ MARKERS = synthetic_rig().markers.ids
 def test_from_another_tracker_to_a_file_beside_the_rig_and_back(open_wizard):
     tracker = MovedTracker()
     poses = PoseFeed(lambda name, body: tracker if name == "udp:5000" else open_source(name, body))
-    hands = open_wizard(lambda context: alignment.make_wizard(context, poses, tracker.now_ns),
-                        RecordingAsker(synthetic_rig(), write=lambda log: None), listen=tracker.listen)
+    hands = open_wizard("alignment", RecordingAsker(synthetic_rig(), write=lambda log: None), listen=tracker.listen,
+                        make=lambda context: alignment.make_wizard(context, poses, tracker.now_ns))
     page, path = hands.window.page, alignment_path(hands.path)
     assert [page.kind.itemText(row) for row in range(page.kind.count())][:2] == ["SteamVR", "libsurvive"]
     page.kind.setCurrentText("Program")
@@ -98,10 +100,9 @@ class Movement:
 
     def solve(self, rig_path):
         """The result, and what is proposed for the file beside the rig."""
-        path = None if rig_path is None else alignment_path(rig_path)
-        before = in_use(path)
-        result = solve_recording(self.step.recording, before, progress=lambda text, fraction: None)
-        return result, propose(result, before, path), path
+        now = InForce(synthetic_rig(), rig_path)
+        result = solve(self.step.recording, SEARCH_S, now, progress=lambda text, fraction: None)
+        return result, propose(result, now), None if rig_path is None else alignment_path(rig_path)
 
 
 def test_parallel_motion_is_refused_with_the_reason():
@@ -120,7 +121,7 @@ def test_an_alignment_that_holds_no_longer_is_called_stale(tmp_path):
     movement.record(9.0)
     result, proposal, path = movement.solve(tmp_path / "desk.json")
     assert result.drift is None
-    step = AcceptStep(lambda: propose(result, None, path), None)
+    step = AcceptStep(lambda: propose(result, InForce(synthetic_rig(), tmp_path / "desk.json")), None)
     step.enter()
     entered_s = time.time()
     eventually(lambda: int(time.time()) > int(entered_s))  # files are stamped to the second

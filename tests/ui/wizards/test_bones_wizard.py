@@ -15,13 +15,14 @@ from PySide6.QtTest import QTest
 from synthetic_rig import WIDE, Viewing, make_rig, observe
 from wizard_hand import HeldMarker, RecordingAsker
 
-from rhot_app.calibration.commands.bones import propose
 from rhot_app.calibration.hand.bones import solve_bones
 from rhot_app.calibration.hand.marker_places import tracks_of
+from rhot_app.calibration.kinds.bones import propose
+from rhot_app.calibration.registry import InForce
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import load_rig
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
-from rhot_app.ui.wizards.bones import SweepGuide, make_guide, make_wizard
+from rhot_app.ui.wizards.bones import SweepGuide, make_guide
 from rhot_app.ui.wizards.models.movement import QuietGuide
 from rhot_app.ui.wizards.models.step import Bar
 
@@ -43,7 +44,7 @@ def write_movement(rig, path):
 @pytest.fixture
 def hands(open_wizard):
     rig = make_rig()
-    return open_wizard(make_wizard, RecordingAsker(rig, write=lambda log: write_movement(rig, log)),
+    return open_wizard("bones", RecordingAsker(rig, write=lambda log: write_movement(rig, log)),
                        listen=HeldMarker(FakeEngine()).connect)
 
 
@@ -145,5 +146,5 @@ def test_bones_by_landmarks_are_proposed():
     places = moving_hand(rig, "grasp", 4.0, 30.0, 1, 0.05).joints()
     roles = {marker.id: marker.role for marker in rig.markers.markers}
     report = solve_bones(tracks_of(np.arange(len(places)) / 30.0, places, rig.markers.ids, roles), rig.hand)
-    proposal = propose(report, rig)
+    proposal = propose(report, InForce(rig))
     assert "landmarks" in proposal.rig.hand.name and proposal.rig.hand.fingers == report.hand.fingers

@@ -11,6 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMessageBox
 from wizard_rig import FakeRigAsker, FakeSettingsStore
 
+from rhot_app.calibration.registry import InForce, calibration
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.wizards.camera import make_wizard
@@ -57,7 +58,7 @@ def asker():
 
 @pytest.fixture
 def hands(open_wizard, asker):
-    return open_wizard(make_wizard, asker, in_file=False)
+    return open_wizard("camera", asker, in_file=False)
 
 
 def row(hands, field):
@@ -223,7 +224,7 @@ def test_choices_say_only_what_differs(asker):
 
 
 def test_a_silent_node_has_no_knobs(themed, asker, qtbot):
-    context = WizardContext(asker.rig, None, asker.connect, DARK, FakeSettingsStore())
+    context = WizardContext(calibration("camera"), InForce(asker.rig), asker.connect, DARK, FakeSettingsStore())
     plan = make_wizard(context)
     view = plan.pages[0].step.view()
     assert "No camera" in view.sentence and not view.may_go_on

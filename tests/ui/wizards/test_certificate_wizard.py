@@ -11,6 +11,7 @@ from fake_engine import FakeEngine
 from simulated_protocol import recorded
 from wizard_hand import HeldMarker, RecordingAsker
 
+from rhot_app.calibration.kinds import certificate as kinds_certificate
 from rhot_app.certificate.certify import certify
 from rhot_app.certificate.document import read_certificate
 from rhot_app.certificate.recordings import ProtocolFile, read_protocol
@@ -32,7 +33,7 @@ def made(tmp_path_factory):
 @pytest.fixture
 def hands(open_wizard, made, tmp_path, monkeypatch):
     """The wizard before an engine whose recordings are those; of the patch, as it really flashed by a quick clock."""
-    monkeypatch.setattr(certificate_wizard, "user_documents_path", lambda: tmp_path / "documents")
+    monkeypatch.setattr(kinds_certificate, "user_documents_path", lambda: tmp_path / "documents")
     protocol = made.protocol
 
     def write(log):
@@ -45,7 +46,7 @@ def hands(open_wizard, made, tmp_path, monkeypatch):
                   min(protocol.ruler, key=lambda row: abs(row.distance_mm - hands.window.page.distance.value())))
         shutil.copyfile(made.folder / source.log, log)
 
-    hands = open_wizard(certificate_wizard.make_wizard, RecordingAsker(made.rig, write=write),
+    hands = open_wizard("certificate", RecordingAsker(made.rig, write=write),
                         listen=HeldMarker(FakeEngine()).connect)
     flash = next(page for page in hands.window.definition.pages if isinstance(page, certificate_wizard.FlashPage))
     flash.clock = itertools.count(T0_MASTER_NS, STEP_NS).__next__

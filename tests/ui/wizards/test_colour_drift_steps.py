@@ -12,8 +12,8 @@ from colour_scenes import PAINTS, picture
 from fake_engine import synthetic_rig
 from paint_scene import PaintScene
 
-from rhot_app.calibration.colour.colours import solve_colours
-from rhot_app.calibration.commands.colours import propose
+from rhot_app.calibration.kinds.colours import propose
+from rhot_app.calibration.registry import InForce, calibration
 from rhot_app.calibration.verdict import Grade
 from rhot_app.project import Rig
 from rhot_app.ui.backend.feed import Picture
@@ -21,6 +21,8 @@ from rhot_app.ui.wizards.steps.colour_pick import PickStep
 from rhot_app.ui.wizards.steps.colour_result import BoundsStep, SeparationStep
 from rhot_node.detect.illuminant import gains_of
 from rhot_node.detect.image import to_bgr
+
+COLOURS = calibration("colours"), InForce(synthetic_rig())
 
 COLDER = (("gains", tuple(gains_of(-0.35))),)
 EMPTY: tuple = ("nothing",)
@@ -53,12 +55,12 @@ def steps(rig: Rig) -> tuple[BoundsStep, SeparationStep]:
         x, y = PaintScene.where(name)
         picks.chosen = name
         assert picks.pick(picks.masked["left"].picture, x, y, 0.0, 0.0), picks.problem
-    bounds = BoundsStep(picks)
+    bounds = BoundsStep(*COLOURS, picks)
     bounds.enter()
     task = bounds.task()
-    assert task is not None and task.function is solve_colours
-    bounds.take_result(task.function(*task.arguments, **task.options))
-    return bounds, SeparationStep(bounds)
+    assert task is not None and task.function is calibration("colours").solve
+    bounds.take_result(task.function(*task.arguments, progress=lambda text, fraction: None))
+    return bounds, SeparationStep(*COLOURS, bounds)
 
 
 @pytest.mark.parametrize(("light", "word"), [((), None), (COLDER, "colder")])
@@ -87,7 +89,7 @@ def test_a_light_that_has_changed_since_the_picking_is_said_on_the_mask_and_in_t
     assert verdict.grade is Grade.FAIR and "6 colours" in verdict.sentence
     (finding,) = [one for one in verdict.findings if one.code == "temperature"]
     assert "left" in finding.figure and "colder" in finding.figure
-    proposal = propose(replace(apart.result, verdict=verdict), rig, {})
+    proposal = propose(replace(apart.result, verdict=verdict), InForce(rig))
     assert proposal is not None and proposal.verdict == verdict
     look(apart, 2 * MOST)  # the colder pictures are remembered for a while
     assert apart.view().verdict == calm
@@ -101,7 +103,7 @@ def test_a_light_that_has_changed_since_the_picking_is_said_on_the_mask_and_in_t
 ], ids=["seen", "gone", "pale", "twice"])
 def test_the_masks_page_says_why_the_chosen_marker_is_not_found_or_in_doubt(
         steps: tuple[BoundsStep, SeparationStep], change: dict, said: tuple) -> None:
-    bounds = BoundsStep(steps[0].picks)
+    bounds = BoundsStep(*COLOURS, steps[0].picks)
     bounds.enter()
     bounds.take_result(steps[0].result)
     bounds.chosen = "ring"

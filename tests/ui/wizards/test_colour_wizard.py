@@ -14,17 +14,20 @@ from PySide6.QtTest import QTest
 from wizard_rig import FakeRigAsker
 
 from rhot_app.calibration.colour.separability import SKIN
-from rhot_app.calibration.commands.colours import hue_chart, propose
+from rhot_app.calibration.kinds.colours import hue_chart, propose
+from rhot_app.calibration.registry import InForce, calibration
 from rhot_app.project import load_rig
 from rhot_app.ui.common.theme import apply_theme
 from rhot_app.ui.models.palette import DARK, SCHEMES, contrast
-from rhot_app.ui.wizards.colours import MaskChoice, make_wizard
+from rhot_app.ui.wizards.colours import MaskChoice
 from rhot_app.ui.wizards.framework.picture_painter import callout_boxes, fit
 from rhot_app.ui.wizards.models.drawing import Callout, Layer
 from rhot_app.ui.wizards.steps.colour_pick import PickStep
 from rhot_app.ui.wizards.steps.colour_result import BoundsStep, SeparationStep
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
+
+COLOURS = calibration("colours"), InForce(synthetic_rig())
 
 NAMES = list(PAINTS)
 
@@ -44,7 +47,7 @@ def rig():
 
 @pytest.fixture(scope="module")
 def shared(open_shared, scene, rig):
-    return open_shared(make_wizard, FakeRigAsker(rig, scene.draw))
+    return open_shared("colours", FakeRigAsker(rig, scene.draw))
 
 
 @pytest.fixture
@@ -289,12 +292,12 @@ def test_clicks_one_finger_too_far_are_refused_with_the_skin_and_the_exchanged_c
     assert picks.doubt("index") == "as skin" and picks.doubt("middle") == "was index's"
     for name, other in zip(NAMES[3:], NAMES[2:], strict=False):
         pick(picks, name, PaintScene.where(other))
-    apart = learnt(SeparationStep(learnt(BoundsStep(picks))))
+    apart = learnt(SeparationStep(*COLOURS, learnt(BoundsStep(*COLOURS, picks))))
     verdict = apart.view().verdict
     assert not verdict.acceptable and "index has the colour of skin" in said(verdict)
     for name, other in zip(NAMES[2:], NAMES[1:], strict=False):
         assert f"{name} now has the colour that {other} had" in said(verdict)
-    assert not propose(apart.result, rig, {}).verdict.acceptable
+    assert not propose(apart.result, InForce(rig)).verdict.acceptable
 
 
 def test_two_markers_of_one_colour_are_refused_and_undo_mends_it(picks):
@@ -352,7 +355,7 @@ def test_alike_paints_are_said_to_be_alike(rig):
     picks = PickStep(rig.markers, ("left", "right"))
     look(picks, alike)
     pick_all(picks)
-    apart = learnt(SeparationStep(learnt(BoundsStep(picks))))
+    apart = learnt(SeparationStep(*COLOURS, learnt(BoundsStep(*COLOURS, picks))))
     assert not apart.view().verdict.acceptable
     bands = [curve for curve in hue_chart(apart.result).curves if curve.style == "band"]
     assert {curve.name for curve in bands if curve.name} == set(PAINTS)

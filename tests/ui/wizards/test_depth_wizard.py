@@ -44,7 +44,7 @@ def marker():
 
 def test_from_distances_to_a_rig_that_uses_them(open_wizard, marker):
     rig = msgspec.structs.replace(synthetic_rig(), calibration=CameraCalibration("exact"))
-    hands = open_wizard(lambda context: depth.make_wizard(context, marker.clock), FakeRigAsker(rig),
+    hands = open_wizard("depth", FakeRigAsker(rig), make=lambda context: depth.make_wizard(context, marker.clock),
                         listen=marker.connect)
     page = hands.window.page
     hands.until(lambda: "calibrated cameras" in hands.hint)

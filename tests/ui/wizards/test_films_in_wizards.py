@@ -73,7 +73,8 @@ def choose(monkeypatch):
 
 def at_show_step(open_wizard, module, rig, **options):
     """The wizard where the board is shown; the live cameras see none."""
-    hands = open_wizard(module.make_wizard, FakeRigAsker(rig, BoardScene(rig, STANDARD_BOARD).draw), **options)
+    hands = open_wizard(module.__name__.rpartition(".")[2], FakeRigAsker(rig, BoardScene(rig, STANDARD_BOARD).draw),
+                        **options)
     hands.type(hands.window.page.square, "25")
     hands.next()
     return hands
@@ -111,7 +112,7 @@ def test_wrong_films_are_a_sentence_and_the_live_camera_comes_back(open_wizard, 
 
 def test_a_board_that_is_larger_than_the_form_says_is_named(open_wizard, films, choose):
     scene = BoardScene(synthetic_rig(), STANDARD_BOARD)
-    hands = open_wizard(lens.make_wizard, FakeRigAsker(synthetic_rig(), scene.draw))
+    hands = open_wizard("lens", FakeRigAsker(synthetic_rig(), scene.draw))
     hands.window.page.cols.setValue(8)
     hands.type(hands.window.page.square, "25")
     hands.next()

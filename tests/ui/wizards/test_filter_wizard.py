@@ -17,7 +17,7 @@ from waving import waving
 from wizard_hand import RecordingAsker
 
 from rhot_app.project import FilterSettings, OneEuroSettings, load_rig
-from rhot_app.ui.wizards.filters import FastGuide, LiveMeters, StillGuide, make_wizard
+from rhot_app.ui.wizards.filters import FastGuide, LiveMeters, StillGuide
 
 SECONDS = 5.0
 LAZY = FilterSettings(pixel=OneEuroSettings(0.3, 0.0001, 1.0), position=OneEuroSettings(0.3, 0.001, 1.0))
@@ -53,7 +53,7 @@ def write_movement(rig, path):
 def hands(open_wizard):
     rig = msgspec.structs.replace(make_rig(), filters=LAZY)
     hand = MovingHand(FakeEngine())
-    hands = open_wizard(make_wizard, RecordingAsker(rig, write=lambda log: write_movement(rig, log)),
+    hands = open_wizard("filters", RecordingAsker(rig, write=lambda log: write_movement(rig, log)),
                         listen=hand.connect)
     hands.hand = hand
     return hands

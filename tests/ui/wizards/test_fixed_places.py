@@ -18,14 +18,16 @@ from PySide6.QtWidgets import (
 )
 from wizard_rig import FakeRigAsker, FakeSettingsStore
 
+from rhot_app.calibration.registry import InForce, calibration, calibrations
 from rhot_app.project import load_rig
 from rhot_app.ui import wizards
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.simulated_rig_menus import FIRST, THINGS
 from rhot_app.ui.wizards import framework, models, steps
-from rhot_app.ui.wizards.framework.definition import WIZARDS, WizardContext, wizard_named
+from rhot_app.ui.wizards.framework.definition import WizardContext
 from rhot_app.ui.wizards.framework.frame import WizardFrame
 from rhot_app.ui.wizards.framework.work import Work
+from rhot_app.ui.wizards.launcher import make_wizard
 from rhot_app.ui.wizards.models.step import StepView
 from rhot_node.files import resource_path
 
@@ -53,8 +55,9 @@ def frame_of(themed):
         rig = load_rig(resource_path("rigs", "two_pis.json"))
         asker = FakeRigAsker(rig)
         asker.answers = {name: {"known": False} for name in ("refined", "adapted", "measured")}
-        context = WizardContext(rig, None, asker.connect, DARK, FakeSettingsStore(), asker.told, Silence)
-        definition, window = wizard_named(module).make_wizard(context), QWidget()
+        context = WizardContext(calibration(module), InForce(rig, None, asker.told), asker.connect, DARK,
+                                FakeSettingsStore(), Silence)
+        definition, window = make_wizard(context), QWidget()
         cameras = tuple(node.name for node in rig.nodes)
         frame = WizardFrame(definition, cameras, Work(InProcessSolver(), window), DARK, window)
         window.resize(*size)
@@ -79,7 +82,7 @@ def places(window):
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-@pytest.mark.parametrize("module", [one.name for one in WIZARDS])
+@pytest.mark.parametrize("module", [one.name for one in calibrations()])
 def test_nothing_moves_when_the_sentences_change(module, size, frame_of):
     window, frame, definition = frame_of(module, size)
     frame.offer_twin(QMenu(window))
@@ -112,7 +115,7 @@ def known_sentences():
 
 def test_every_sentence_is_seen_whole_in_a_small_window(frame_of):
     sentences = set(known_sentences())
-    for one in WIZARDS:
+    for one in calibrations():
         *_, definition = frame_of(one.name, SIZES[-1])
         sentences |= {page.step.view().sentence for page in definition.pages}
     assert len(sentences) > 60
@@ -142,7 +145,7 @@ def test_the_simulated_rig_says_what_a_person_would_measure(frame_of):
     """Sizes of board and ruler, and entries of the menu that there are."""
     entries = {*FIRST.values(), *(text for _, text, _ in THINGS), "Shows one marker at"}
     told = {}
-    for one in WIZARDS:
+    for one in calibrations():
         window, frame, definition = frame_of(one.name, SIZES[-1])
         for number, page in enumerate(definition.pages):
             frame.show_page(page, number)

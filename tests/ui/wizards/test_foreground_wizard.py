@@ -11,7 +11,6 @@ from wizard_rig import FakeRigAsker
 
 from rhot_app.errors import EngineError
 from rhot_app.ui.models.proposal import restore_all, use_all
-from rhot_app.ui.wizards.foreground import make_wizard
 from rhot_app.ui.wizards.steps import foreground_steps
 from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, SceneWatch, SkinStep, findings_of, mask_of, propose
 from rhot_node.foreground_store import ForegroundStore
@@ -81,7 +80,7 @@ def nodes(tmp_path, monkeypatch):
 
 @pytest.fixture
 def hands(open_wizard, nodes):
-    return open_wizard(make_wizard, nodes, in_file=False)
+    return open_wizard("foreground", nodes, in_file=False)
 
 
 def test_from_an_empty_scene_to_what_the_nodes_keep(hands, nodes):

@@ -10,9 +10,9 @@ from fake_engine import synthetic_rig
 from wizard_rig import FakeRigAsker
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
-from rhot_app.calibration.commands.intrinsics import what_follows
+from rhot_app.calibration.kinds.lens import what_follows
 from rhot_app.project import Intrinsics, Rig, RigNode, load_rig
-from rhot_app.ui.wizards.lens import LAST, LensBoardStep, LensShowStep, make_wizard, straightened
+from rhot_app.ui.wizards.lens import LAST, LensBoardStep, LensShowStep, straightened
 from rhot_app.ui.wizards.models.board_form import BoardFields
 from rhot_app.ui.wizards.models.drawing import Cells, Line
 
@@ -42,7 +42,7 @@ def hands(open_wizard, scene):
     lens = msgspec.structs.replace(truth.nodes[0].intrinsics, fx=572.0, fy=572.0)
     rig = msgspec.structs.replace(truth, nodes=tuple(msgspec.structs.replace(node, intrinsics=lens)
                                                      for node in truth.nodes))
-    return open_wizard(make_wizard, FakeRigAsker(rig, scene.draw))
+    return open_wizard("lens", FakeRigAsker(rig, scene.draw))
 
 
 def test_from_the_board_to_a_saved_lens(hands, scene):

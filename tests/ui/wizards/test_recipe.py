@@ -1,47 +1,36 @@
-"""The recipe in `rhot_app.ui.wizards` is true: a toy calibration made by it is opened, clicked through and used."""
+"""A calibration is one file: a toy by the recipe in `rhot_app.ui.wizards` is in menu, command, history and health."""
 
 from __future__ import annotations
 
+import json
+import math
 import pkgutil
 import re
-import sys
 
 import pytest
-import toy
-import toy_calibration
 from PySide6.QtCore import Qt
 from wizard_hands import Hands
 from wizard_rig import RigBackend
 
 from rhot_app import rig_history
+from rhot_app.__main__ import main
+from rhot_app.calibration.check.health import HealthFigures, MarkerQuality, findings_of
+from rhot_app.calibration.registry import calibration
 from rhot_app.project import load_rig
-from rhot_app.ui import actions, main_window, wizards
-from rhot_app.ui.wizards import launcher
-from rhot_app.ui.wizards.framework import definition
-from rhot_app.ui.wizards.framework.definition import WIZARDS, Wizard
+from rhot_app.ui import wizards
 
-ROW = Wizard(*toy_calibration.TOY)
+FIGURES = HealthFigures((math.nan,) * 3, "", (), (), (MarkerQuality("left", "index", 0.05, 0.0),))
 
 
-@pytest.fixture
-def bench(make_bench, tmp_path, monkeypatch):
-    """The main window with the toy's row at the end of the menu."""
-    monkeypatch.setitem(sys.modules, "rhot_app.ui.wizards.toy", toy)
-    for module in (actions, main_window, launcher, definition):
-        monkeypatch.setattr(module, "WIZARDS", (*WIZARDS, ROW))
+@pytest.fixture(autouse=True)
+def toy(new_kinds):
+    """Its record."""
+    return calibration("toy")
+
+
+def test_it_is_in_the_menu_and_its_wizard_works(toy, make_bench, tmp_path):
     bench = make_bench(RigBackend(tmp_path / "desk.json"))
     bench.track()
-    return bench
-
-
-def test_a_step_is_tested_without_a_window():
-    step = toy.GreyStep()
-    step.accept_observation(80.0)
-    assert [step.capture() for _ in range(3)] == [True] * 3
-    assert step.view().done and toy_calibration.mean_level(step.levels, progress=lambda text, fraction: None) == 80.0
-
-
-def test_a_calibration_by_the_recipe_is_in_the_menu_and_works(bench):
     window = bench.window
     action = window.actions_.wizards[-1]
     window.menus.calibrate.aboutToShow.emit()
@@ -49,8 +38,9 @@ def test_a_calibration_by_the_recipe_is_in_the_menu_and_works(bench):
     action.trigger()
     bench.until(lambda: window.wizards.wizard is not None)
     hands = Hands(window.wizards.wizard)
-    hands.until(lambda: hands.window.step.now is not None)
-    for _ in range(toy.ENOUGH):
+    assert hands.window.windowTitle() == "Toy"
+    for _ in range(3):
+        hands.until(lambda: hands.window.step._newest is not None)
         hands.key(Qt.Key.Key_Space)
     hands.next()
     level = hands.solved()
@@ -63,16 +53,28 @@ def test_a_calibration_by_the_recipe_is_in_the_menu_and_works(bench):
     window.menus.calibrate.aboutToShow.emit()
     assert action.text() == "Toy …\ttoday"
     assert load_rig(bench.backend.path).name == f"grey {level:.0f}"
-    assert [one.replaced_by for one in rig_history.versions(bench.backend.path)] == [toy_calibration.TOY.reason]
+    assert [one.replaced_by for one in rig_history.versions(bench.backend.path)] == [toy.reason]
 
 
-def test_what_the_wizard_shows_is_what_a_command_would_print():
-    said = toy_calibration.report(80.0)
-    assert said.lines() == ["grey level  80"] and said.to_json()["level"] == 80.0
-    assert said.to_json()["verdict"] == "Good: grey level 80"
+def test_it_is_a_command(toy, wizard_rig_file, capsys):
+    arguments = ["calibrate", "toy", "--level", "70", "90", "--rig", str(wizard_rig_file)]
+    assert main([*arguments, "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["level"] == 80.0 and said["verdict"] == "Good: grey level 80" and said["written"] is None
+    assert main([*arguments, "--out", str(wizard_rig_file)]) == 0
+    assert "grey level  80" in capsys.readouterr().out
+    assert load_rig(wizard_rig_file).name == "grey 80"
+    assert [one.replaced_by for one in rig_history.versions(wizard_rig_file)] == [toy.reason]
+    assert main(["calibrate"]) == 2
+    assert "how bright pictures are" in capsys.readouterr().err
 
 
-def test_every_module_and_class_of_the_recipe_is_there():
+def test_health_names_it_as_the_calibration_that_mends(toy):
+    assert [(one.mender, one.finding.code) for one in findings_of(FIGURES) if one.mender == toy.name] == [
+        ("toy", "dark")]
+
+
+def test_every_module_and_class_that_the_recipe_names_is_there():
     names = re.findall(r"(?<!`)`((?:rhot_app|models|framework)\.[\w.]+)`", wizards.__doc__)
     assert len(names) > 8
     for name in names:

@@ -13,15 +13,15 @@ from knocked_rig import moved
 from wizard_hands import Hands
 from wizard_rig import FakeRigAsker, RigBackend
 
-from rhot_app.calibration.tracked_results import propose_hand, propose_poses
+from rhot_app.calibration.kinds.tracked import MEASURED, REFINED, propose_hand, propose_poses
+from rhot_app.calibration.registry import InForce
 from rhot_app.calibration.verdict import Finding, Grade, judge
 from rhot_app.engine.status import Advice
 from rhot_app.project import load_rig
 from rhot_app.rig_history import versions
 from rhot_app.ui.status_words import _advice_notice
-from rhot_app.ui.wizards import adapted, measured, refined
 from rhot_app.ui.wizards.framework.definition import OPEN_WIZARD
-from rhot_app.ui.wizards.refined import EngineFeed, MoveStep, ShowBonesStep
+from rhot_app.ui.wizards.framework.while_tracking import EngineFeed, MoveStep, ask_engine
 
 
 class RefiningAsker(FakeRigAsker):
@@ -50,11 +50,12 @@ def hand_answer(rig, grade=Grade.GOOD):
             "document": msgspec.to_builtins(msgspec.structs.replace(rig, hand=hand))}
 
 
-@pytest.fixture(params=[refined])
+@pytest.fixture(params=["refined"])
 def hands(open_wizard, request):
     asker = RefiningAsker(synthetic_rig())
     asker.answer = {"known": False}
-    return open_wizard(lambda context: request.param.make_wizard(context, ask_s=0.02), asker)
+    return open_wizard(request.param, asker, make=lambda context: ask_engine(
+        context, context.calibration.collect[0], ask_s=0.02))
 
 
 def test_it_is_used_only_when_asked_and_can_be_taken_back(hands):
@@ -73,7 +74,7 @@ def test_it_is_used_only_when_asked_and_can_be_taken_back(hands):
 def test_what_holds_or_is_not_determined_leads_nowhere(stale, grade):
     asker = RefiningAsker(synthetic_rig())
     feed = EngineFeed(asker.connect, "refined")
-    step = MoveStep(feed)
+    step = MoveStep(REFINED.collect[0], feed)
     asker.answer = answer_of(asker.rig, stale=stale, grade=grade)
     feed.step(asker)
     view = step.view()
@@ -83,11 +84,11 @@ def test_what_holds_or_is_not_determined_leads_nowhere(stale, grade):
 def test_only_poses_are_proposed():
     rig = synthetic_rig()
     edited = msgspec.structs.replace(rig, name="edited since")
-    proposal = propose_poses(answer_of(rig), edited)
+    proposal = propose_poses(answer_of(rig), InForce(edited))
     assert proposal is not None and proposal.rig is not None
     assert proposal.rig.name == "edited since" and proposal.rows[0].after == "0.02 px"
-    assert propose_poses({"known": False}, rig) is None
-    assert propose_poses(answer_of(rig, stale=False), rig) is None
+    assert propose_poses({"known": False}, InForce(rig)) is None
+    assert propose_poses(answer_of(rig, stale=False), InForce(rig)) is None
 
 
 def test_the_engines_sentence_has_the_button():
@@ -95,8 +96,8 @@ def test_the_engines_sentence_has_the_button():
     assert notice.action == "Use refined calibration …" and notice.key == f"{OPEN_WIZARD}refined"
 
 
-@pytest.mark.parametrize(("hands", "reason"), [(adapted, "hand adapted while it was tracked"),
-                                               (measured, "bones measured while the hand was tracked")],
+@pytest.mark.parametrize(("hands", "reason"), [("adapted", "hand adapted while it was tracked"),
+                                               ("measured", "bones measured while the hand was tracked")],
                          indirect=["hands"])
 def test_a_learnt_hand_is_used_only_when_asked(hands, reason):
     assert not hands.frame.next_button.isEnabled()
@@ -113,16 +114,16 @@ def test_a_learnt_hand_is_used_only_when_asked(hands, reason):
 def test_only_the_hand_is_proposed():
     rig = synthetic_rig()
     edited = msgspec.structs.replace(rig, name="edited since")
-    proposal = propose_hand(hand_answer(rig), edited, "by contours")
+    proposal = propose_hand(hand_answer(rig), InForce(edited), "by contours")
     assert proposal is not None and proposal.rig is not None
     assert proposal.rig.name == "edited since" and proposal.rig.nodes == rig.nodes and proposal.rig.hand != rig.hand
-    assert propose_hand({"known": False}, rig, "by contours") is None
+    assert propose_hand({"known": False}, InForce(rig), "by contours") is None
 
 
 def test_bones_that_must_not_be_used_lead_nowhere():
     asker = RefiningAsker(synthetic_rig())
     feed = EngineFeed(asker.connect, "measured")
-    step = ShowBonesStep(feed)
+    step = MoveStep(MEASURED.collect[0], feed)
     asker.answer = hand_answer(asker.rig, Grade.POOR)
     feed.step(asker)
     view = step.view()

@@ -16,7 +16,8 @@ from wizard_rig import FakeRigAsker
 from rhot_app.calibration.board.boards import STANDARD_BOARD, Chessboard
 from rhot_app.calibration.board.size_check import Beyond
 from rhot_app.calibration.check.checks import check_rig
-from rhot_app.calibration.commands.stereo import propose, solve_shown
+from rhot_app.calibration.kinds.stereo import StereoViews, propose, solve
+from rhot_app.calibration.registry import InForce
 from rhot_app.calibration.stereo.calibrate import lens_of
 from rhot_app.estimation.se3 import rotation_from_quaternion
 from rhot_app.project import CameraPose, load_rig
@@ -24,7 +25,7 @@ from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards.framework.definition import Definition
 from rhot_app.ui.wizards.known_length import LengthsPage, LengthsStep
 from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep
-from rhot_app.ui.wizards.stereo import ShowStep, make_wizard
+from rhot_app.ui.wizards.stereo import ShowStep
 
 CAMERAS = ("left", "right")
 replace_fields = msgspec.structs.replace
@@ -61,7 +62,7 @@ def scene():
 @pytest.fixture
 def hands(open_wizard, wrong_rig, scene):
     """The wizard on a rig file, before drawn boards."""
-    return open_wizard(make_wizard, FakeRigAsker(wrong_rig, scene.draw))
+    return open_wizard("stereo", FakeRigAsker(wrong_rig, scene.draw))
 
 
 def test_from_the_board_to_a_saved_rig(hands, scene):
@@ -127,8 +128,8 @@ def test_nobody_gets_past_the_board_without_measuring_it(hands, scene):
 
 
 def test_the_ruler_is_clicked_in_held_pictures(open_wizard, wrong_rig):
-    hands = open_wizard(lambda context: Definition("Ruler", (LengthsPage(LengthsStep(CAMERAS)),)),
-                        FakeRigAsker(wrong_rig))
+    hands = open_wizard("Ruler", FakeRigAsker(wrong_rig),
+                        make=lambda context: Definition((LengthsPage(LengthsStep(CAMERAS)),)))
     page, step = hands.window.page, hands.window.step
     assert not page.hold.isEnabled()
     page.ruler.setValue(240.0)
@@ -160,8 +161,8 @@ def shown(compiled):
 def solved(shown, rig, known, board=STANDARD_BOARD):
     """The result of the shots; `board` is what the person says of the squares."""
     lenses = [None if node.intrinsics.nominal else lens_of(node) for node in rig.nodes]
-    return solve_shown(replace(shown.views, board=board), lenses, known=known.known,
-                       progress=lambda text, fraction: None)
+    views = StereoViews(replace(shown.views, board=board), known.known, tuple(lenses))
+    return solve(views, InForce(rig), progress=lambda text, fraction: None)
 
 
 def test_a_corrected_square_keeps_the_shots(compiled):
@@ -199,7 +200,7 @@ def test_a_length_check_is_skipped_knowingly_and_the_rig_says_so(shown, wrong_ri
     assert known.view().passable and not known.view().done and "unproven" in known.view().sentence
     result = solved(shown, wrong_rig, known)
     assert "lengths_unproven" in result.verdict.codes
-    proposal = propose(result, wrong_rig)
+    proposal = propose(result, InForce(wrong_rig))
     assert any("never checked" in row.after for row in proposal.rows)
     assert (proposal.rig.calibration.method, proposal.rig.calibration.lengths) == ("board", "skipped")
     assert "lengths_unproven" in check_rig(proposal.rig).verdict.codes
@@ -210,7 +211,7 @@ def test_a_wrong_square_size_is_found_by_the_baseline_and_writes_nothing(shown, 
     known.set_lengths(75.0, 0.0)
     result = solved(shown, wrong_rig, known, Chessboard(9, 6, 0.025 / 1.1))  # printed too large, and not measured
     assert not result.verdict.acceptable and "baseline" in result.verdict.codes
-    assert propose(result, wrong_rig).save(tmp_path / "desk.json") == "" and not list(tmp_path.iterdir())
+    assert propose(result, InForce(wrong_rig)).save(tmp_path / "desk.json") == "" and not list(tmp_path.iterdir())
 
 
 def test_undo_forgets_the_last_shot_and_another_board_all(scene):

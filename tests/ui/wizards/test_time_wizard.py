@@ -13,8 +13,8 @@ from PySide6.QtCore import Qt
 from waving import see, waving
 from wizard_hand import HeldMarker, RecordingAsker
 
+from rhot_app.calibration.registry import InForce
 from rhot_app.project import load_rig
-from rhot_app.ui.wizards.time import make_wizard
 
 LATE_S = 0.006
 ROW_NS = 48_000
@@ -29,7 +29,7 @@ def hands(open_wizard):
                      said_ns=(ROW_NS, ROW_NS))
         write_log(Path(log), rig, frames)
 
-    return open_wizard(make_wizard, RecordingAsker(rig, write=write), listen=HeldMarker(FakeEngine()).connect)
+    return open_wizard("time", RecordingAsker(rig, write=write), listen=HeldMarker(FakeEngine()).connect)
 
 
 def test_from_waving_to_a_rig_that_knows_the_delay(hands):
@@ -64,7 +64,7 @@ def test_closing_while_it_records_ends_the_recording(hands):
 
 
 def test_a_wrong_row_time_is_told_to_its_node():
-    from rhot_app.calibration.commands.time import propose
+    from rhot_app.calibration.kinds.time import propose
     from rhot_app.calibration.observations import ObservationCollector
     from rhot_app.calibration.proposal import NodeChange
     from rhot_app.calibration.time.offset import calibrate_times
@@ -73,7 +73,7 @@ def test_a_wrong_row_time_is_told_to_its_node():
     collector = ObservationCollector(tuple(node.name for node in rig.nodes), rig.markers.ids)
     for frame in see(rig, waving(rig, 12.0), 12.0, late_s=(0.0, LATE_S), row_times_ns=(ROW_NS, ROW_NS), said_ns=(0, 0)):
         collector.add(frame)
-    proposal = propose(calibrate_times(collector.table(), rig), rig, {1: {}, 2: {}})
+    proposal = propose(calibrate_times(collector.table(), rig), InForce(rig, node_settings={1: {}, 2: {}}))
     assert proposal is not None
     told = [change for change in proposal.changes if isinstance(change, NodeChange)]
     assert [change.node_id for change in told] == [1, 2]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 
 import msgspec
@@ -20,30 +21,12 @@ from rhot_app.calibration.proposal import rows_of
 from rhot_app.calibration.rig_figures import place_figures
 from rhot_app.engine.status import Advice
 from rhot_app.project import CameraPose, load_rig
-from rhot_app.ui import actions, main_window
-from rhot_app.ui.wizards import launcher
-from rhot_app.ui.wizards.framework import definition
-from rhot_app.ui.wizards.framework.definition import Wizard
-
-
-class SampleWizard(Wizard):
-    """The tests' own wizard, which stands in no module of the app."""
-
-    def load(self):
-        """Nothing to import."""
-
-    def make_wizard(self, context):
-        return sample_wizard.make_wizard(context)
-
-
-SAMPLE = (SampleWizard("sample", "Sample", "A small wizard.", "lens calibration"),)
 
 
 @pytest.fixture
-def bench(make_bench, tmp_path, monkeypatch):
+def bench(make_bench, tmp_path, monkeypatch, new_kinds):
     """The main window on a rig with a file, and the sample wizard in its menu."""
-    for module in (actions, main_window, launcher):
-        monkeypatch.setattr(module, "WIZARDS", SAMPLE)
+    monkeypatch.setitem(sys.modules, "rhot_app.ui.wizards.sample", sample_wizard)
     bench = make_bench(RigBackend(tmp_path / "desk.json"))
     bench.track()
     return bench
@@ -51,7 +34,7 @@ def bench(make_bench, tmp_path, monkeypatch):
 
 def test_a_wizard_opens_over_the_window_and_its_age_stands_in_the_menu(bench):
     window = bench.window
-    action = window.actions_.wizards[0]
+    action = window.actions_.wizards[-2]
     window.menus.calibrate.aboutToShow.emit()
     assert action.text() == "Sample …\tnot yet"
     window.wizards.show_ages(window.actions_.wizards, "")
@@ -76,22 +59,21 @@ def test_a_wizard_opens_over_the_window_and_its_age_stands_in_the_menu(bench):
 
 def test_a_wizard_that_cannot_open_says_why(bench):
     bench.backend.rig_asker.refuse = "The engine does not answer."
-    bench.window.actions_.wizards[0].trigger()
+    bench.window.actions_.wizards[-2].trigger()
     bench.until(lambda: bench.said(bench.backend.rig_asker.refuse))
     assert bench.window.wizards.wizard is None
 
 
-def test_a_stale_calibration_offers_the_wizard_that_mends_it(bench, monkeypatch):
-    monkeypatch.setattr(definition, "WIZARDS", SAMPLE)
+def test_a_stale_calibration_offers_the_wizard_that_mends_it(bench):
     bench.backend.engine.advice = (Advice("warning", "The cameras' rays miss each other.", "sample"),)
     bench.until(lambda: bench.said("rays miss"))
     bench.click(bench.window.advice.buttons["Sample …"])
     bench.until(lambda: bench.window.wizards.wizard is not None)
-    assert bench.window.wizards.wizard.definition.title == "Sample"
+    assert bench.window.wizards.wizard.windowTitle() == "Sample"
 
 
 def test_closing_the_app_ends_an_open_wizard_without_a_question(bench):
-    bench.window.actions_.wizards[0].trigger()
+    bench.window.actions_.wizards[-2].trigger()
     bench.until(lambda: bench.window.wizards.wizard is not None)
     bench.window.close()
     eventually(lambda: not any("pictures of" in thread.name for thread in threading.enumerate()))

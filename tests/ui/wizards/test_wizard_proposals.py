@@ -11,6 +11,7 @@ from wizard_rig import FakeRigAsker
 
 from rhot_app import rig_history
 from rhot_app.calibration.proposal import NodeChange, Proposal, Row
+from rhot_app.calibration.registry import Calibration
 from rhot_app.calibration.report import Report
 from rhot_app.calibration.verdict import Finding, Grade, judge
 from rhot_app.errors import EngineError, RigError
@@ -120,7 +121,8 @@ def test_no_step_is_done_or_says_next_beside_a_verdict_that_forbids(grade):
     verdict = judge("rms 9 px", [Finding("rms", grade, "rms 9 px")])
     view = StepView("Enough: press Next.", done=True, verdict=verdict)
     assert view.done == view.may_go_on == ("Next" in view.sentence) == verdict.acceptable
-    solve = SolveStep(lambda: None, lambda result: Report(verdict))
+    sample = Calibration("sample", "Sample", "", "sample", report=lambda result, now: Report(verdict))
+    solve = SolveStep(sample, None, lambda: None, "…")
     solve.take_result(object())
     assert solve.view().done == ("go on" in solve.view().sentence) == verdict.acceptable
 

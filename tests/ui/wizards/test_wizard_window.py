@@ -16,12 +16,12 @@ from sample_wizard import brightest
 from wizard_rig import FakeRigAsker
 
 from rhot_app import rig_history
+from rhot_app.calibration.registry import calibrations
 from rhot_app.project import load_rig
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.guide import page_path
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.framework.definition import WIZARDS
 from rhot_app.ui.wizards.framework.picture_view import PictureGrid
 from rhot_app.ui.wizards.models.drawing import Cells, Dots, Tag
 from rhot_app.ui.wizards.models.step import AnnotatedPicture, StepView
@@ -35,8 +35,8 @@ def asker():
 @pytest.fixture
 def open_sample(open_wizard, asker):
     """Opens the sample wizard on a rig file."""
-    return lambda steps=3, **options: open_wizard(lambda context: sample_wizard.make_wizard(context, steps), asker,
-                                                  **options)
+    return lambda steps=3, **options: open_wizard(
+        "Sample", asker, make=lambda context: sample_wizard.make_wizard(context, steps), **options)
 
 
 @pytest.fixture
@@ -222,8 +222,8 @@ def test_a_failure_to_save_is_said_and_changes_nothing(open_sample, asker):
 
 def test_every_wizard_has_its_section_in_the_guide():
     headings = [line.removeprefix("## ") for line in page_path("calibration").read_text().splitlines()]
-    assert [heading for heading in headings if heading in {wizard.title for wizard in WIZARDS}] == [
-        wizard.title for wizard in WIZARDS], "in the order of the menu"
+    assert [heading for heading in headings if heading in {wizard.title for wizard in calibrations()}] == [
+        wizard.title for wizard in calibrations()], "in the order of the menu"
 
 
 def test_f1_opens_the_guide_beside_the_wizard(open_sample):

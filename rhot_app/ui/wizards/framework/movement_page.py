@@ -11,13 +11,14 @@ from typing import TypeVar
 
 from PySide6.QtWidgets import QLabel, QPushButton
 
+from rhot_app.calibration.collect import Movement
 from rhot_app.errors import EngineError
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.wizards.framework.definition import WizardContext
 from rhot_app.ui.wizards.framework.page import Page
-from rhot_app.ui.wizards.models.movement import Guide, MovementStep, Request
+from rhot_app.ui.wizards.models.movement import MovementStep, Request
 from rhot_app.ui.wizards.models.step import StepView
 
 _LABELS = {"waiting": "Record", "beginning": "Record", "recording": "Stop", "ending": "Stop",
@@ -97,15 +98,16 @@ class Movements:
         self.folder = Path(tempfile.mkdtemp(prefix="rhot-wizard-"))
         self._steps: list[MovementStep] = []
 
-    def page(self, title: str, sentence: str, seconds: float, guide: Callable[[], Guide]) -> MovementPage:
-        """A page that records `seconds` of a movement; see `MovementStep`."""
-        return self.page_of(MovementPage, title, sentence, seconds, guide)
+    def page(self, movement: Movement) -> MovementPage:
+        """A page that records a movement."""
+        return self.page_of(MovementPage, movement)
 
-    def page_of(self, make: Callable[[MovementStep, Callable[[], Asker], StateFeed], PageT], title: str, sentence: str,
-                seconds: float, guide: Callable[[], Guide]) -> PageT:
+    def page_of(self, make: Callable[[MovementStep, Callable[[], Asker], StateFeed], PageT],
+                movement: Movement) -> PageT:
         """The same on a page that shows more."""
-        step = self.add(MovementStep(title, sentence, seconds, self.folder, guide, self.states.recent))
-        return make(step, self._connect, self.states)
+        page = make(self.add(MovementStep(movement, self.folder, self.states.recent)), self._connect, self.states)
+        page.twin_facts = movement.simulated
+        return page
 
     def add(self, step: StepT) -> StepT:
         """A step made elsewhere, which `end` shall end as well; it writes into `folder`."""

@@ -15,7 +15,8 @@ from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.frame import WizardFrame
 from rhot_app.ui.wizards.framework.page import AcceptPage
-from rhot_app.ui.wizards.framework.work import PictureWorker, Work
+from rhot_app.ui.wizards.framework.picture_worker import PictureWorker
+from rhot_app.ui.wizards.framework.work import Work
 from rhot_app.ui.wizards.models.step import AcceptStep, State, Step
 
 TICK_MS = 16
@@ -32,7 +33,8 @@ class WizardWindow(ToolWindow):
     used = Signal(object, bool)
 
     def __init__(self, definition: Definition, context: WizardContext, parent: QWidget | None = None) -> None:
-        super().__init__(definition.title, definition.guide, parent, section=definition.title)
+        title = context.calibration.title
+        super().__init__(title, "calibration", parent, section=title)
         self.definition = definition
         self._context = context
         self.feed = LiveFeed({node.name: node.node_id for node in context.rig.nodes if not node.text_datagrams},
@@ -49,8 +51,8 @@ class WizardWindow(ToolWindow):
         self._go_to(0)
         self.feed.start()
         self.picture_worker.start()
-        if definition.solver:
-            self.work.solver.prepare(definition.solver)
+        if context.calibration.solver:
+            self.work.solver.prepare(context.calibration.solver)
         self.start(TICK_MS, {"Alt+Left": self.back}, self._capture)
 
     def _connect_everything(self) -> None:

@@ -6,10 +6,11 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
+from rhot_app.calibration.collect import Bar, Guide, Movement
 from rhot_app.state import HandState
-from rhot_app.ui.wizards.models.step import Bar, Step, StepView
+from rhot_app.ui.wizards.models.step import Step, StepView
 
 Phase = Literal["waiting", "beginning", "recording", "ending", "recorded"]
 """``beginning`` and ``ending`` are while the engine is asked; the page's worker does that."""
@@ -23,44 +24,23 @@ class Request:
     path: Path
 
 
-class Guide(Protocol):
-    """Watches the movement while it is recorded; a new one is made for every recording."""
-
-    def watch(self, states: Sequence[HandState]) -> None:
-        """See the newest states; called many times a second."""
-        ...
-
-    def bars(self) -> tuple[Bar, ...]:
-        """What has been seen so far."""
-        ...
-
-    def sentence(self) -> str:
-        """What to do now."""
-        ...
-
-    def shortfall(self) -> str:
-        """What is missing in what was seen so far, as a sentence; "" when nothing is."""
-        ...
-
-
 class MovementStep(Step):
     """Space or the button begins, and ends. `log` is the finished recording; recording again forgets it."""
 
     captures = True
 
-    def __init__(self, title: str, sentence: str, seconds: float, folder: Path, guide: Callable[[], Guide],
-                 recent: Callable[[], Sequence[HandState]]) -> None:
-        """`sentence` says what to do before it begins; it ends by itself after `seconds`. `recent` gives the states of
-        the last seconds; logs are written into `folder`. `unneeded` may be set to say why nothing need be recorded."""
-        self.title = title
-        self.seconds = seconds
+    def __init__(self, movement: Movement, folder: Path, recent: Callable[[], Sequence[HandState]]) -> None:
+        """It ends by itself after the movement's seconds. `recent` gives the states of the last seconds; logs are
+        written into `folder`. `unneeded` may be set to say why nothing need be recorded."""
+        self.title = movement.title
+        self.seconds = movement.seconds
         self.phase: Phase = "waiting"
         self.problem = ""
         self.log: Path | None = None
         self.unneeded: Callable[[], str] = lambda: ""
-        self._sentence = sentence
+        self._sentence = movement.sentence
         self._folder = folder
-        self._make_guide = guide
+        self._make_guide = movement.guide
         self._guide: Guide | None = None
         self._recent = recent
         self._number = 0

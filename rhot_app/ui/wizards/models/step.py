@@ -11,7 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from rhot_app.calibration.collect import Bar
 from rhot_app.calibration.proposal import Change, Command, Proposal
+from rhot_app.calibration.registry import Calibration, InForce
 from rhot_app.calibration.report import Report
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.charts import Chart
@@ -21,20 +23,6 @@ from rhot_app.ui.wizards.models.drawing import Overlay
 
 Pictures = Mapping[str, Picture]
 """One picture per camera's name, taken as nearly at the same time as the nodes deliver them."""
-
-
-@dataclass(frozen=True, slots=True)
-class Bar:
-    """One bar of progress: its name, how full it is (0..1), and what it means."""
-
-    name: str
-    fraction: float
-    meaning: str = ""
-
-    @property
-    def full(self) -> bool:
-        """Whether nothing is missing."""
-        return self.fraction >= 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,24 +145,40 @@ class Done:
 
 
 class SolveStep(ChartedStep):
-    """Does the work that `make_work` asks for whenever the step is entered with other input than before.
+    """Solves a calibration whenever the step is entered with other observations than before.
 
     `result` is what came of it, `report` what the calibration says of it. Subclasses show it over pictures.
     """
 
     advice = "Look at the result, then go on."
 
-    def __init__(self, make_work: Callable[[], Task | Done | None], report_of: Callable[[Any], Report],
-                 title: str = "Result", missing: str = "Go back: nothing was recorded yet.") -> None:
-        """`make_work` gives None while something is `missing`; tasks with equal arguments are the same work."""
+    def __init__(self, calibration: Calibration, now: InForce,
+                 observations: Callable[[], tuple[Any, ...] | Done | None], working: str, title: str = "Result",
+                 missing: str = "Go back: nothing was recorded yet.") -> None:
+        """`observations` are the arguments of ``calibration.solve``, None while something is `missing`; equal ones are
+        not solved again. `working` is said meanwhile."""
         self.title = title
+        self.working = working
         self.result: Any = None
         self.report: Report | None = None
-        self._make_work = make_work
-        self._report_of = report_of
+        self._calibration = calibration
+        self._now = now
+        self._observations = observations
         self._missing = missing
         self._work: Task | Done | None = None
         self._problem = ""
+
+    def describe(self, result: Any) -> Report:
+        """What the calibration says of a result."""
+        assert self._calibration.report is not None
+        return self._calibration.report(result, self._now)
+
+    def _make_work(self) -> Task | Done | None:
+        found = self._observations()
+        if found is None or isinstance(found, Done):
+            return found
+        assert self._calibration.solve is not None
+        return Task(self.working, self._calibration.solve, (*found, self._now))
 
     @property
     def charts(self) -> tuple[Chart, ...]:
@@ -203,12 +207,12 @@ class SolveStep(ChartedStep):
 
     def take_result(self, result: Any) -> None:
         """What came of it."""
-        self.result, self.report, self._problem = result, self._report_of(result), ""
+        self.result, self.report, self._problem = result, self.describe(result), ""
 
     def report_again(self) -> None:
         """The same result is to be said in another way."""
         if self.result is not None:
-            self.report = self._report_of(self.result)
+            self.report = self.describe(self.result)
 
     def take_failure(self, sentence: str) -> None:
         """Why there is none."""

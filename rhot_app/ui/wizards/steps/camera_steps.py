@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.check.camera_advice import CameraAdvice, CameraAdvisor
 from rhot_app.calibration.check.exposure import BRIGHT, DARK
+from rhot_app.calibration.kinds.wizard_only import CAMERA
 from rhot_app.calibration.proposal import NodeChange, Proposal, Row
-from rhot_app.calibration.registry import CAMERA
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.project import RigNode
@@ -72,7 +73,7 @@ CONTROLS: tuple[Control, ...] = (
 class CameraChoices:
     """The settings of all cameras: as they were, and as they are being tried out; the way back step by step."""
 
-    def __init__(self, nodes: tuple[RigNode, ...], node_settings: dict[int, dict[str, Any]]) -> None:
+    def __init__(self, nodes: tuple[RigNode, ...], node_settings: Mapping[int, dict[str, Any]]) -> None:
         """`node_settings` by node id, as the nodes gave them; cameras whose node gave none cannot be set."""
         self.nodes = tuple(node for node in nodes if node.node_id in node_settings)
         self.before = {node.node_id: msgspec.convert(node_settings[node.node_id]["camera"], CameraSettings)

@@ -8,10 +8,10 @@ from typing import Any
 
 import msgspec
 
-from rhot_app.calibration.colour.colours import ColourReport, solve_colours
-from rhot_app.calibration.commands.colours import report
+from rhot_app.calibration.colour.colours import ColourReport
+from rhot_app.calibration.registry import Calibration, InForce
 from rhot_app.calibration.verdict import Finding, with_findings
-from rhot_app.ui.wizards.models.step import Done, Pictures, SolveStep, StepView, Task
+from rhot_app.ui.wizards.models.step import Done, Pictures, SolveStep, StepView
 from rhot_app.ui.wizards.steps.camera_steps import Control
 from rhot_app.ui.wizards.steps.colour_pick import (
     MaskedPictures,
@@ -44,9 +44,10 @@ class BoundsStep(SolveStep):
 
     watches = True
 
-    def __init__(self, picks: PickStep) -> None:
-        super().__init__(lambda: learning(picks, {}, "Learning the colours …") if picks.gathering.names else None,
-                         report, "Check the mask", "Go back and pick a colour.")
+    def __init__(self, calibration: Calibration, now: InForce, picks: PickStep) -> None:
+        super().__init__(calibration, now,
+                         lambda: observations(picks, {}) if picks.gathering.names else None,
+                         "Learning the colours …", "Check the mask", "Go back and pick a colour.")
         self.cameras = picks.cameras
         self.picks = picks
         self.given: dict[str, ChromaModel] = {}
@@ -156,11 +157,11 @@ class BoundsStep(SolveStep):
                         annotated=annotated_by_masks(self._masked, self.markers, chosen, self.show))
 
 
-def learning(picks: PickStep, given: dict[str, ChromaModel], title: str) -> Task:
-    """The work of learning and judging; `given`: bounds that a person has set."""
+def observations(picks: PickStep, given: dict[str, ChromaModel]) -> tuple[Any, ...]:
+    """What colours are learnt from; `given`: bounds that a person has set."""
     gathering = picks.gathering
-    return Task(title, solve_colours, (gathering.samples, gathering.views),
-                {"skin": gathering.skin, "base": picks.base, "given": given, "before": gathering.earlier})
+    return gathering.samples, gathering.views, {"skin": gathering.skin, "base": picks.base, "given": given,
+                                                "before": gathering.earlier}
 
 
 # -- Step: separability of the colours, and what is proposed -----------------------------------------------------------
@@ -171,20 +172,20 @@ class SeparationStep(SolveStep):
     watches = True
     advice = "Read what may be mistaken for a marker, then go on."
 
-    def __init__(self, bounds: BoundsStep) -> None:
-        super().__init__(self._judging, report, "Tell them apart", "Go back and pick a colour.")
+    def __init__(self, calibration: Calibration, now: InForce, bounds: BoundsStep) -> None:
+        super().__init__(calibration, now, self._judging, "Trying the new bounds …", "Tell them apart",
+                         "Go back and pick a colour.")
         self.cameras = bounds.cameras
         self._bounds = bounds
         self._learnt: ColourReport | None = None
         self._given: Mapping[str, ChromaModel] = {}
         self._maker = MaskMaker()
 
-    def _judging(self) -> Task | Done | None:
+    def _judging(self) -> tuple[Any, ...] | Done | None:
         """Untouched bounds were judged as they were learnt."""
         if self._learnt is None:
             return None
-        return learning(self._bounds.picks, dict(self._given), "Trying the new bounds …") if self._given else \
-            Done(self._learnt)
+        return observations(self._bounds.picks, dict(self._given)) if self._given else Done(self._learnt)
 
     def enter(self) -> None:
         """Other bounds, another judgement."""

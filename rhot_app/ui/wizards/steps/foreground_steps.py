@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.kinds.wizard_only import FOREGROUND
 from rhot_app.calibration.proposal import Command, Proposal, Row
-from rhot_app.calibration.registry import FOREGROUND
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, told_apart, with_findings
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.ui.backend.contract import Asker

@@ -12,12 +12,12 @@ from PySide6.QtWidgets import QWidget
 from wizard_hands import Hands, opened
 from wizard_rig import FakeSettingsStore
 
+from rhot_app.calibration.registry import calibration
 from rhot_app.project import Rig, load_rig, save_rig
 from rhot_app.simulator.nodes.remote import TwinRemote
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.framework.definition import WIZARDS
 from rhot_app.ui.wizards.launcher import Launcher
 
 
@@ -79,7 +79,7 @@ def open_on_rig(rig_launcher: Launcher) -> Callable[[str], Hands]:
     """Opens a wizard by its module's name, as the Calibrate menu does; returns hands on it."""
 
     def open_(module: str) -> Hands:
-        rig_launcher.open(next(wizard for wizard in WIZARDS if wizard.name == module))
+        rig_launcher.open(calibration(module))
         return Hands(opened(rig_launcher, "wizard"))
 
     return open_

@@ -1,12 +1,11 @@
-"""``rhot calibrate depth``: the power law of disparity from a table of measured distances (RHOT 7.2.3)."""
+"""The depth calibration: the power law of disparity from measured distances, without a board (RHOT 7.2.3)."""
 
 from __future__ import annotations
 
 import argparse
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import require_folder, show
-from rhot_app.calibration.registry import DEPTH
+from rhot_app.calibration.registry import Calibration, Command, InForce, Observed
 from rhot_app.calibration.report import Figure, Report, Table
 from rhot_app.calibration.verdict import with_findings
 from rhot_app.errors import CalibrationError, input_file, positive_number
@@ -15,7 +14,9 @@ from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.calibration.depth.fit import DepthGeometry, DepthReport
+    from rhot_app.calibration.depth.table import DepthTable
     from rhot_app.calibration.proposal import Proposal
+    from rhot_app.progress import Progress
     from rhot_app.project import Rig
 
 
@@ -34,21 +35,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                  "rhot calibrate depth --table distances.csv --rig desk.json --out desk.json")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Fit and report; the rig is written only with ``--out``."""
-    from rhot_app.calibration.depth.fit import fit_depth
+def observe(args: argparse.Namespace, progress: Progress) -> Observed:
+    """The table, and the cameras' geometry by arguments, rig or thesis. The rig is in force where it is written."""
     from rhot_app.calibration.depth.table import read_depth_table
     from rhot_app.project import load_rig
 
     if args.out is not None and args.rig is None:
         raise CalibrationError("--out writes a rig, so --rig must say which one.")
-    require_folder(args.out)
     rig = None if args.rig is None else load_rig(args.rig)
     if rig is not None and len(rig.nodes) != 2:
         raise CalibrationError(f"{args.rig}: disparity needs two cameras, the rig has {len(rig.nodes)}.")
-    result = fit_depth(read_depth_table(args.table), _geometry(args, rig))
-    written = "" if rig is None else propose(result, rig).save(args.out)
-    return show(report(result, rig if written else None), as_json=args.json, written=written)
+    now = None if rig is None or args.out is None else InForce(rig, args.rig)
+    return Observed((read_depth_table(args.table), _geometry(args, rig)), now)
+
+
+def solve(table: DepthTable, geometry: DepthGeometry, now: InForce | None, *, progress: Progress) -> DepthReport:
+    """The law. Raises CalibrationError."""
+    from rhot_app.calibration.depth.fit import fit_depth
+
+    return fit_depth(table, geometry)
 
 
 def _geometry(args: argparse.Namespace, rig: Rig | None) -> DepthGeometry:
@@ -71,14 +76,14 @@ def _geometry(args: argparse.Namespace, rig: Rig | None) -> DepthGeometry:
     return geometry
 
 
-def report(result: DepthReport, rig: Rig | None = None) -> Report:
-    """The law and how well each row obeys it; what of `rig` it takes the place of is in the verdict."""
+def report(result: DepthReport, now: InForce | None) -> Report:
+    """The law and how well each row obeys it; what it takes the place of is in the verdict."""
     import numpy as np
 
     from rhot_app.calibration.depth.fit import replaced_calibration
     from rhot_app.charts import Chart, Curve
 
-    verdict = with_findings(result.verdict, replaced_calibration(rig)) if rig is not None else result.verdict
+    verdict = with_findings(result.verdict, replaced_calibration(now.rig)) if now is not None else result.verdict
     chart, geometry = result.chart, result.geometry
     rows = []
     for row, *metres in zip(result.rows, result.corrected_m, result.theory_m, result.error_m, strict=True):
@@ -111,11 +116,19 @@ def report(result: DepthReport, rig: Rig | None = None) -> Report:
         (Chart(f"D = {100 * result.k_m:.1f} cm · |x|^{result.z:.4f}", "disparity, px", "distance, cm", curves),))
 
 
-def propose(result: DepthReport, rig: Rig) -> Proposal:
+def propose(result: DepthReport, now: InForce) -> Proposal:
     """The rig that takes distances from disparity by this law."""
     import msgspec
 
     from rhot_app.calibration.proposal import proposed
 
-    after = msgspec.structs.replace(rig, depth=result.settings)
-    return proposed(DEPTH.reason, report(result, rig), rig, after)
+    after = msgspec.structs.replace(now.rig, depth=result.settings)
+    return proposed(CALIBRATION.reason, report(result, now), now.rig, after)
+
+
+CALIBRATION = Calibration(
+    "depth", "Depth without a board", "Distance from disparity, from a marker at measured distances.",
+    "depth calibration",
+    Command("depth", "distance from disparity, without a board, from a table of measured distances", add_arguments,
+            observe),
+    solve=solve, report=report, propose=propose)

@@ -1,21 +1,22 @@
-"""``rhot calibrate bones``: the hand's lengths from a recorded minute of movement, or entered by hand."""
+"""The bones calibration: the hand's lengths from a minute of movement, or entered by hand."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import show
-from rhot_app.calibration.registry import BONES
+from rhot_app.calibration.registry import Calibration, Command, InForce, Observed
 from rhot_app.calibration.report import Figure, Report, Table
+from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.errors import CalibrationError, input_file
 from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
+    from rhot_app.calibration.check.health import HealthFigures
     from rhot_app.calibration.hand.bones_report import BonesReport
     from rhot_app.calibration.hand.marker_places import MarkerTracks
     from rhot_app.calibration.proposal import Proposal
@@ -45,29 +46,48 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                  "rhot calibrate bones --set index.proximal=41 middle.proximal=46 --out mine.json")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Solve or enter, report; the hand is written only with ``--out`` and a verdict that allows it."""
-    from rhot_app.hand.anatomy import save_hand
-
+def observe(args: argparse.Namespace, progress: Progress) -> Observed:
+    """The markers of the recording, or what was entered, and the hand to begin from."""
     lengths = _lengths(args.lengths)
     recorded = args.log is not None or args.tsv is not None
     if recorded == bool(lengths):
         raise CalibrationError("give one of --log LOG, --tsv FILE (the hand moves freely for a minute) or "
                                "--set BONE=MM (lengths measured with a ruler).")
-    if args.out is not None and not args.out.parent.is_dir():
-        raise CalibrationError(f"--out {args.out}: the folder {args.out.parent} does not exist; create it first.")
-    result, seats = _move(args) if recorded else (_enter(args, lengths), None)
-    written = ""
-    if args.out is not None and result.verdict.acceptable:
-        try:
-            save_hand(args.out, result.hand)
-        except OSError as exc:
-            raise CalibrationError(f"--out {args.out}: cannot be written ({exc.strerror}).") from exc
-        written = str(args.out)
-    said = report(result)
-    if seats is not None:
-        said = replace(said, notes=(*said.notes, *seats.lines()), fields={**said.fields, **seats.to_json()})
-    return show(said, as_json=args.json, written=written)
+    if not recorded:
+        return Observed((lengths, _base(args, None, "" if args.hand is not None else "measured with a ruler")))
+    progress("reading the recording", 0.0)
+    tracks, seats, worn = _tracks(args)
+    source = args.log or args.tsv
+    return Observed((tracks, _base(args, worn, f"measured from {source.name}")), notes=tuple(seats.lines()),
+                    fields=seats.to_json())
+
+
+def solve(measured: Path | MarkerTracks | Mapping[str, float], base: HandAnatomy, now: InForce | None, *,
+          progress: Progress) -> BonesReport:
+    """The hand from a recording with the rig in force, from markers, or from lengths in mm. Raises CalibrationError."""
+    from rhot_app.calibration.hand.bones import enter_bones, solve_bones
+    from rhot_app.calibration.hand.marker_places import tracks_of
+    from rhot_app.calibration.recorded_observations import read_instants
+
+    if isinstance(measured, Mapping):
+        return enter_bones(base, measured)
+    if isinstance(measured, Path):
+        assert now is not None
+        progress("reading the recording", 0.0)
+        _, instants = read_instants(measured, now.rig)
+        roles, painted = roles_of(now.rig)
+        measured = tracks_of(instants.times_s, instants.positions, now.rig.markers.ids, roles, painted=painted)
+    return solve_bones(measured, base, progress=progress)
+
+
+def write(args: argparse.Namespace, result: BonesReport, now: InForce | None) -> str:
+    """The hand file."""
+    from rhot_app.hand.anatomy import save_hand
+
+    if args.out is None:
+        return ""
+    save_hand(args.out, result.hand)
+    return str(args.out)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,27 +113,6 @@ class _Seats:
         places = {name: {"place": place, "guessed": guessed}
                   for seats, guessed in ((self.given, False), (self.guessed, True)) for name, place in seats.items()}
         return {"places": places, "not_on_hand": list(self.others)}
-
-
-def _move(args: argparse.Namespace) -> tuple[BonesReport, _Seats]:
-    """The hand of a recording."""
-    from rhot_app.calibration.hand.bones import solve_bones
-    from rhot_app.progress import ProgressLine
-
-    line = ProgressLine("reading the recording")
-    line.report("reading the recording", 0.0)
-    tracks, seats, worn = _tracks(args)
-    source = args.log or args.tsv
-    report = solve_bones(tracks, _base(args, worn, f"measured from {source.name}"), progress=line.report)
-    line.finish()
-    return report, seats
-
-
-def _enter(args: argparse.Namespace, lengths: dict[str, float]) -> BonesReport:
-    """The hand of a ruler."""
-    from rhot_app.calibration.hand.bones import enter_bones
-
-    return enter_bones(_base(args, None, "" if args.hand is not None else "measured with a ruler"), lengths)
 
 
 def _tracks(args: argparse.Namespace) -> tuple[MarkerTracks, _Seats, HandAnatomy | None]:
@@ -189,19 +188,6 @@ NAMES = {"movement": "measured by movement", "reach": "measured by movement", "e
 """Of a hand in a rig, by the method."""
 
 
-def solve_log(log: Path, rig: Rig, base: HandAnatomy, *, progress: Progress) -> BonesReport:
-    """The hand from a recording. Raises CalibrationError."""
-    from rhot_app.calibration.hand.bones import solve_bones
-    from rhot_app.calibration.hand.marker_places import tracks_of
-    from rhot_app.calibration.recorded_observations import read_instants
-
-    progress("reading the recording", 0.0)
-    _, instants = read_instants(log, rig)
-    roles, painted = roles_of(rig)
-    tracks = tracks_of(instants.times_s, instants.positions, rig.markers.ids, roles, painted=painted)
-    return solve_bones(tracks, base, progress=progress)
-
-
 def roles_of(rig: Rig) -> tuple[dict[str, str], frozenset[str]]:
     """The places of markers that have one, and the markers that are painted round a finger."""
     markers = rig.markers.markers
@@ -209,7 +195,7 @@ def roles_of(rig: Rig) -> tuple[dict[str, str], frozenset[str]]:
             frozenset(marker.id for marker in markers if marker.shape in ("capsule", "band")))
 
 
-def report(result: BonesReport) -> Report:
+def report(result: BonesReport, now: InForce | None) -> Report:
     """The size of the hand, its bones and reaches, and where its markers sit."""
     bones = tuple((Figure("bone", bone.name), Figure("length", bone.length_mm, "mm", decimals=1, key="length_mm"),
                    Figure("±", bone.std_mm, "mm", decimals=1, key="std_mm"),
@@ -236,11 +222,56 @@ def report(result: BonesReport) -> Report:
             "error_mm": result.error_mm, "seconds": result.seconds, "instants": result.instants})
 
 
-def propose(result: BonesReport, rig: Rig) -> Proposal:
+def propose(result: BonesReport, now: InForce) -> Proposal:
     """The rig with this hand."""
     import msgspec
 
     from rhot_app.calibration.proposal import proposed
 
-    after = msgspec.structs.replace(rig, hand=msgspec.structs.replace(result.hand, name=NAMES[result.method]))
-    return proposed(BONES.reason, report(result), rig, after)
+    after = msgspec.structs.replace(now.rig, hand=msgspec.structs.replace(result.hand, name=NAMES[result.method]))
+    return proposed(CALIBRATION.reason, report(result, now), now.rig, after)
+
+
+RIGID_PART, RIGID_M = 0.03, 3e-3
+"""How far the distance of two markers on one bone may change, and at least."""
+
+REACH_PART = 0.05
+"""By how much a tip may be further from the wrist than all bones in a row."""
+
+
+def check(figures: HealthFigures) -> list[Finding]:
+    """Whether markers on one bone have moved apart, and tips are farther away than the bones are long; this only where
+    the cameras agree."""
+    return [*_rigid(figures), *([] if figures.late or figures.apart else _reach(figures))]
+
+
+def _rigid(figures: HealthFigures) -> list[Finding]:
+    worst = max(figures.rigid, key=lambda one: abs(one.now_m - one.learnt_m), default=None)
+    if worst is None or abs(worst.now_m - worst.learnt_m) <= max(RIGID_PART * worst.learnt_m, RIGID_M):
+        return []
+    figure = (f"{' and '.join(worst.markers)} sit on one bone; they were {1e3 * worst.learnt_m:.1f} mm apart and are "
+              f"{1e3 * worst.now_m:.1f} mm now.")
+    return [Finding("rigid_drift", Grade.FAIR, figure, "A marker slipped, or a camera was moved.",
+                    "Press the markers on and measure the hand again (Calibrate menu).")]
+
+
+def _reach(figures: HealthFigures) -> list[Finding]:
+    far = [one for one in figures.reaches if one.seen_m > (1.0 + REACH_PART) * one.longest_m]
+    if not far:
+        return []
+    worst = max(far, key=lambda one: one.seen_m / one.longest_m)
+    figure = (f"{worst.marker} was {1e3 * worst.seen_m:.0f} mm from the wrist, but the bones between are only "
+              f"{1e3 * worst.longest_m:.0f} mm long in all.")
+    cause = "It sits elsewhere than the rig says, something else has its colour, or a camera was turned."
+    if len(far) > 1:
+        cause = "This hand is larger than the hand file says, or the rig's cameras stand further apart than it says."
+    remedy = "Measure this hand (Calibrate menu)."
+    return [Finding("reach", Grade.FAIR, figure, cause, remedy)]
+
+
+CALIBRATION = Calibration(
+    "bones", "Bones of the hand", "How long the bones are, from a minute of movement or by a ruler.",
+    "bones calibration",
+    Command("bones", "the hand's bones and where the markers sit, from a minute of free movement or a ruler",
+            add_arguments, observe, write=write),
+    solve=solve, report=report, propose=propose, check=check, solver="rhot_app.calibration.hand.bones")

@@ -1,35 +1,29 @@
-"""``rhot calibrate stereo``: two or more cameras from pictures or films of a board that they took together."""
+"""The stereo calibration: how cameras stand to each other, from pictures of a board that they took together."""
 
 from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import (
-    add_board_arguments,
-    board_of,
-    dropped_fields,
-    left_out,
-    require_folder,
-    show,
-)
-from rhot_app.calibration.registry import STEREO
+from rhot_app.calibration.commands.arguments import add_board_arguments, board_of, dropped_fields, left_out
+from rhot_app.calibration.registry import Calibration, Command, InForce, Observed
 from rhot_app.calibration.report import Figure, Report, Table
+from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.errors import CalibrationError, finite, positive_number
 from rhot_app.options import add_json_argument, add_offset_argument, add_out_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.board.shared_views import SharedViews
+    from rhot_app.calibration.board.corners import BoardView
+    from rhot_app.calibration.board.shared_views import Dropped, SharedViews
+    from rhot_app.calibration.check.health import HealthFigures
     from rhot_app.calibration.lens.fit import LensStart
     from rhot_app.calibration.proposal import Proposal
     from rhot_app.calibration.stereo.calibrate import KnownLengths
     from rhot_app.calibration.stereo.report import CameraFigures, PairFigures, StereoReport
-    from rhot_app.calibration.stereo.start import WorldFrame
     from rhot_app.progress import Progress
     from rhot_app.project import Rig
 
@@ -106,8 +100,6 @@ def _split(text: str, option: str, form: str) -> tuple[str, str]:
     return name, rest
 
 
-# -- the command -------------------------------------------------------------------------------------------------------
-
 EPILOG = """Patterns stand in quotes. Pictures of one moment have the same number in their names, such as left07.jpg and
 right07.jpg. Or give one film of each camera, of a board that moves and rests: frames are chosen by themselves. Two
 cameras are --left and --right; more, or others, are --camera NAME=PATTERN, named as in the rig.
@@ -148,47 +140,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "rhot calibrate stereo --left 'left*.jpg' --right 'right*.jpg' --baseline-mm 75 --out desk.json")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Calibrate and report; a rig is written when it may be used and passes its own checks."""
-    from rhot_app.calibration.stereo.calibrate import require_nodes
-    from rhot_app.progress import ProgressLine
-
-    require_folder(args.out)
-    files = files_of(args)
-    base = _base_rig(args)
-    require_nodes(base, list(files))
-    line = ProgressLine("stereo calibration")
-    result, frame = _calibrate(args, files, base, line.report)
-    line.finish()
-    said, proposal, written = report(result, frame), propose(result, base, frame), ""
-    if proposal is not None:
-        said, written = replace(said, verdict=proposal.verdict), proposal.save(args.out)
-    return show(said, as_json=args.json, written=written)
-
-
-def _calibrate(args: argparse.Namespace, files: dict[str, list[Path]], base: Rig,
-               progress: Progress) -> tuple[StereoReport, WorldFrame | None]:
+def observe(args: argparse.Namespace, progress: Progress) -> Observed:
+    """The board in all pictures, the lenses, and where the table is."""
     from rhot_app.calibration.lens.fit import find_lens
-    from rhot_app.calibration.stereo.calibrate import calibrate, lens_of
+    from rhot_app.calibration.stereo.calibrate import lens_of, require_nodes
     from rhot_app.calibration.stereo.reading import read_shared, read_view
-    from rhot_app.calibration.stereo.start import place_world
 
-    board = board_of(args)
+    files, base = files_of(args), _base_rig(args)
     names = list(files)
-    known, given = known_lengths(args, names), _given_lenses(args, names)
+    require_nodes(base, names)
+    board, known, given = board_of(args), known_lengths(args, names), _given_lenses(args, names)
     tables = named_paths(args.table_image, "--table-image", names)
     read = read_shared(files, board, offsets_s=_offsets(args, names), progress=progress)
-    lenses = [given[name] if name in given else find_lens(read.views.of_camera(camera), board, name)
-              for camera, name in enumerate(names)]
     nodes = {node.name: node for node in base.nodes}
-    result = calibrate(
-        read.views, lenses, refine=args.refine_intrinsics, known=known,
-        remembered=[None if nodes[name].intrinsics.nominal else lens_of(nodes[name]) for name in names],
-        dropped=read.dropped, noticed=[] if read.size is None else [read.size], progress=progress)
-    if not tables or result.figures is None:
-        return result, None
-    views = [read_view(tables[name], board) if name in tables else None for name in names]
-    return result, place_world(views, board, result.figures.state, names)
+    shown = StereoViews(
+        read.views, known, tuple(None if nodes[name].intrinsics.nominal else lens_of(nodes[name]) for name in names),
+        tuple(given[name] if name in given else find_lens(read.views.of_camera(camera), board, name)
+              for camera, name in enumerate(names)), args.refine_intrinsics, read.dropped, read.size,
+        tuple(read_view(tables[name], board) if name in tables else None for name in names) if tables else ())
+    return Observed((shown,), InForce(base, args.out))
 
 
 def _given_lenses(args: argparse.Namespace, names: list[str]) -> dict[str, LensStart]:
@@ -225,27 +195,51 @@ def _base_rig(args: argparse.Namespace) -> Rig:
 
 # -- what is said of the result, and what it changes -------------------------------------------------------------------
 
-def solve_shown(views: SharedViews, lenses: Sequence[LensStart | None], *, known: KnownLengths,
-                progress: Progress) -> StereoReport:
-    """Cameras put together by shots of live cameras; `lenses` one per camera, None to find it from the shots. Raises
-    CalibrationError."""
+@dataclass(frozen=True, slots=True)
+class StereoViews:
+    """What is known of cameras to be put together: `views` of the board, a second known length, and each camera's lens
+    in the rig, None for a nominal one.
+
+    `lenses`: those to begin with; without any, the rig's, or those that the views show. `refine`: these may change
+    within their standard deviations. `table`: each camera's view of the board on the table, empty without one.
+    """
+
+    views: SharedViews
+    known: KnownLengths
+    remembered: tuple[LensStart | None, ...]
+    lenses: tuple[LensStart, ...] = ()
+    refine: bool = False
+    dropped: tuple[Dropped, ...] = ()
+    size: Finding | None = None
+    table: tuple[BoardView | None, ...] = ()
+
+
+def solve(shown: StereoViews, now: InForce, *, progress: Progress) -> StereoReport:
+    """Cameras put together. Raises CalibrationError."""
     from rhot_app.calibration.lens.fit import find_lens
     from rhot_app.calibration.stereo.calibrate import calibrate
+    from rhot_app.calibration.stereo.start import place_world
 
-    found = [lens if lens is not None else find_lens(views.of_camera(camera), views.board, views.cameras[camera])
-             for camera, lens in enumerate(lenses)]
-    return calibrate(views, found, known=known, remembered=lenses, progress=progress)
+    views = shown.views
+    lenses = shown.lenses or tuple(
+        lens if lens is not None else find_lens(views.of_camera(camera), views.board, views.cameras[camera])
+        for camera, lens in enumerate(shown.remembered))
+    found = calibrate(views, lenses, refine=shown.refine, known=shown.known, remembered=shown.remembered,
+                      dropped=shown.dropped, noticed=[] if shown.size is None else [shown.size], progress=progress)
+    if not shown.table or found.figures is None:
+        return found
+    return replace(found, table=place_world(shown.table, views.board, found.figures.state, found.cameras))
 
 
-def report(result: StereoReport, frame: WorldFrame | None = None) -> Report:
-    """Distances, lenses and errors; where cameras stand above the table of `frame`. The first pair's figures stand at
+def report(result: StereoReport, now: InForce | None) -> Report:
+    """Distances, lenses and errors; where cameras stand above the table. The first pair's figures stand at
     the top of JSON, too."""
     from rhot_app.calibration.bundle.robust_error import what_is_reported
     from rhot_app.calibration.rig_figures import distance_figure, order_of_distortion
     from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M
     from rhot_app.geometry.camera import rig_intrinsics
 
-    figures, fields = result.figures, dropped_fields(result.dropped)
+    figures, frame, fields = result.figures, result.table, dropped_fields(result.dropped)
     if figures is None:
         names = ("rms_px", "baseline_mm", "rotation_rad", "translation_mm", "square_mm_triangulated", "epipolar_px")
         return Report(result.verdict, notes=tuple(left_out(result.dropped)), fields={
@@ -297,17 +291,17 @@ def report(result: StereoReport, frame: WorldFrame | None = None) -> Report:
             "shots": [{"name": shot.name, "rms_px": shot.rms_px} for shot in figures.shots], **fields})
 
 
-def propose(result: StereoReport, rig: Rig, frame: WorldFrame | None = None) -> Proposal | None:
-    """The rig with these cameras, in the table's `frame` where there is one; judged by the rig's own checks as well.
-    None where the cameras could not be put together."""
+def propose(result: StereoReport, now: InForce) -> Proposal | None:
+    """The rig with these cameras, in the table's frame where there is one; judged by the rig's own checks as well. None
+    where the cameras could not be put together."""
     from rhot_app.calibration.proposal import proposed
     from rhot_app.calibration.stereo.calibrate import calibrated_rig, rig_verdict
 
     if result.figures is None:
         return None
-    after = calibrated_rig(rig, result.figures, frame)
-    judged = replace(report(result, frame), verdict=rig_verdict(result, after, frame))
-    return proposed(STEREO.reason, judged, rig, after)
+    after = calibrated_rig(now.rig, result.figures, result.table)
+    judged = replace(report(result, now), verdict=rig_verdict(result, after, result.table))
+    return proposed(CALIBRATION.reason, judged, now.rig, after)
 
 
 def _lens(camera: CameraFigures) -> tuple[list[Figure], tuple[Figure, ...]]:
@@ -334,3 +328,25 @@ def _pair(pair: PairFigures) -> tuple[Figure, ...]:
                    sd_key="rotation_std_rad"),
             Figure("epipolar", pair.epipolar_px, "px", key="epipolar_px"),
             Figure("shots", pair.shared, decimals=0, key="shared"))
+
+
+POOR_ERROR_PX = 1.5
+"""Median reprojection error from which the rig must not be used."""
+
+
+def check(figures: HealthFigures) -> list[Finding]:
+    """Whether the cameras' rays miss each other."""
+    error = figures.errors_px[0]
+    if not figures.apart:
+        return []
+    return [Finding("stale_geometry", Grade.POOR if error > POOR_ERROR_PX else Grade.FAIR,
+                    f"The cameras' rays miss each other by {error:.1f} px.", figures.misfit,
+                    "Do the stereo calibration with a board (Calibrate menu).")]
+
+
+CALIBRATION = Calibration(
+    "stereo", "Stereo calibration", "Where the cameras stand to each other and to the table, from a board that they "
+    "see at the same time.", "stereo calibration",
+    Command("stereo", "how two or more cameras stand to each other, from pictures of a board that they took together",
+            add_arguments, observe, ("together",)),
+    solve=solve, report=report, propose=propose, check=check, solver="rhot_app.calibration.stereo.calibrate")

@@ -1,13 +1,13 @@
-"""``rhot calibrate filters``: the 1-euro filters' settings from two recordings (RHOT 7.3)."""
+"""The filter calibration: the 1-euro filters' settings from a hand at rest and a fast one (RHOT 7.3)."""
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from rhot_app.calibration.commands.output import show
-from rhot_app.calibration.registry import FILTERS
+from rhot_app.calibration.registry import Calibration, Command, InForce, Observed
 from rhot_app.calibration.report import Figure, Report, Table
 from rhot_app.errors import CalibrationError, input_file, positive_number
 from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
@@ -42,25 +42,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "rhot calibrate filters --log-still still.rhotlog --log-fast wave.rhotlog --rig desk.json --out desk.json")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Tune and report; the rig is written only with ``--out``."""
-    from rhot_app.calibration.filters.tuning import tune_filters
-    from rhot_app.calibration.recorded_observations import read_instants
-    from rhot_app.progress import ProgressLine
+def observe(args: argparse.Namespace, progress: Progress) -> Observed:
+    """The recordings; they are read by `solve`."""
     from rhot_app.project import load_rig
 
-    targets, rig = _targets(args), load_rig(args.rig)
-    still, fast = (read_instants(log, rig)[1] for log in (args.log_still, args.log_fast))
-    line = ProgressLine("filters")
-    result = tune_filters(still, fast, rig, targets, line.report)
-    line.finish()
-    proposal = propose(result, rig, per_marker=args.per_marker)
-    return show(report(result, rig, per_marker=args.per_marker), as_json=args.json, written=proposal.save(args.out))
+    return Observed((args.log_still, args.log_fast, _targets(args), args.per_marker),
+                    InForce(load_rig(args.rig), args.rig))
 
 
 def _targets(args: argparse.Namespace) -> FilterTargets:
-    from dataclasses import replace
-
     from rhot_app.calibration.filters.meters import FilterTargets
     targets = FilterTargets()
     for option, value, field in (("--jitter-mm", args.jitter_mm, "jitter_m"), ("--lag-ms", args.lag_ms, "lag_s")):
@@ -71,23 +61,24 @@ def _targets(args: argparse.Namespace) -> FilterTargets:
     return targets
 
 
-def solve_logs(still: Path, fast: Path, rig: Rig, targets: FilterTargets, *, progress: Progress) -> FilterReport:
-    """The filters from two recordings. Raises CalibrationError."""
+def solve(still: Path, fast: Path, targets: FilterTargets, per_marker: bool, now: InForce, *,
+          progress: Progress) -> FilterReport:
+    """The filters from two recordings. Raises CalibrationError and RecordingError."""
     from rhot_app.calibration.filters.tuning import tune_filters
     from rhot_app.calibration.recorded_observations import read_instants
 
     progress("reading the recordings", 0.0)
-    resting, moving = (read_instants(log, rig)[1] for log in (still, fast))
-    return tune_filters(resting, moving, rig, targets, progress)
+    resting, moving = (read_instants(log, now.rig)[1] for log in (still, fast))
+    return replace(tune_filters(resting, moving, now.rig, targets, progress), per_marker=per_marker)
 
 
 FilterStage = Literal["pixel", "position"]
 UNITS: dict[FilterStage, str] = {"pixel": "px/s", "position": "m/s"}
 
 
-def report(result: FilterReport, rig: Rig, *, per_marker: bool = False, stage: FilterStage = "position") -> Report:
+def report(result: FilterReport, now: InForce, stage: FilterStage = "position") -> Report:
     """Both filters, and what they do to every marker; the charts are of one `stage`."""
-    choice, targets = result.choice(per_marker=per_marker), result.targets
+    choice, targets = result.choice, result.targets
     notes = []
     for name, unit, curves in (("before depth", UNITS["pixel"], result.pixel),
                                ("after depth", UNITS["position"], result.position)):
@@ -99,7 +90,7 @@ def report(result: FilterReport, rig: Rig, *, per_marker: bool = False, stage: F
         notes=tuple(notes), fields={
             "targets": {"jitter_mm": 1e3 * targets.jitter_m, "lag_ms": 1e3 * targets.lag_s},
             "pixel": _filter(result.pixel, result), "position": _filter(result.position, result)},
-        charts=charts_of(result, rig, stage))
+        charts=charts_of(result, now.rig, stage))
 
 
 def _filter(curves: FilterCurves, result: FilterReport) -> dict[str, Any]:
@@ -126,18 +117,17 @@ def _marker(one: MarkerFigures) -> tuple[Figure, ...]:
             Figure("new", 1e3 * one.error_m, "mm", key="error_mm"))
 
 
-def propose(result: FilterReport, rig: Rig, *, per_marker: bool) -> Proposal:
+def propose(result: FilterReport, now: InForce) -> Proposal:
     """The rig with the proposed filters, and what they do to every marker."""
     from rhot_app.calibration.proposal import Row, proposed
 
     rows = []
-    for one in result.choice(per_marker=per_marker).markers:
+    for one in result.choice.markers:
         if one.known:
             *_, jitter_now, jitter, lag_now, lag, _, _ = _marker(one)
             rows += [Row(f"{one.marker_id}: jitter at rest", jitter_now.text, jitter.text),
                      Row(f"{one.marker_id}: lag", lag_now.text, lag.text)]
-    return proposed(FILTERS.reason, report(result, rig, per_marker=per_marker), rig,
-                    result.apply(rig, per_marker=per_marker), rows=tuple(rows))
+    return proposed(CALIBRATION.reason, report(result, now), now.rig, result.apply(now.rig), rows=tuple(rows))
 
 
 def charts_of(result: FilterReport, rig: Rig, stage: FilterStage) -> tuple[Chart, ...]:
@@ -175,3 +165,10 @@ def _marks(x: Array, y: Array, allowed: float, chosen: float) -> tuple[Curve, Cu
     top = max(float(np.nanmax(y, initial=0.0)), 1.2 * allowed)
     return (Curve("allowed", x[[0, -1]], np.full(2, allowed), "dashes"),
             Curve("chosen", np.full(2, chosen), np.array([0.0, top]), "dashes"))
+
+
+CALIBRATION = Calibration(
+    "filters", "Filters", "How much jitter and how much lag, from a hand held still and one that moves fast.",
+    "filter tuning",
+    Command("filters", "the filters' settings, from a hand held still and one that moves fast", add_arguments, observe),
+    solve=solve, report=report, propose=propose, solver="rhot_app.calibration.filters.tuning")

@@ -1,4 +1,4 @@
-"""``rhot calibrate alignment``: another tracker's world in the rig, from two recorded streams of one motion."""
+"""The alignment: another tracker's world in the rig, from two streams of one motion."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import require_folder, show
-from rhot_app.calibration.registry import ALIGNMENT
+from rhot_app.calibration.registry import Calibration, InForce, Observed
+from rhot_app.calibration.registry import Command as CalibrateCommand
 from rhot_app.calibration.report import Figure, Report
 from rhot_app.errors import CalibrationError, input_file, positive_number
 from rhot_app.options import add_json_argument, add_out_argument
@@ -49,34 +49,39 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                  "rhot calibrate alignment --foreign tracker.csv --rig-points tip.csv --check alignment.json")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Solve and report; a file is written only with ``--out``."""
-    from rhot_app.objects.alignment.alignment_file import save_alignment, to_alignment
-    from rhot_app.objects.alignment.motion_stream import read_stream
-    from rhot_app.objects.alignment.report import calibrate_alignment
-    from rhot_app.objects.stream import HEADER
-    from rhot_app.progress import ProgressLine
-
-    require_folder(args.out)
+def instead(args: argparse.Namespace) -> int | None:
+    """With ``--check``: print whether the alignment is stale; 2 when it is."""
     if not 0.0 < args.search <= LONGEST_SEARCH_S:
         raise CalibrationError(f"--search {args.search:g}: give a time from 0 to {LONGEST_SEARCH_S:g} s.")
     if args.check is not None and args.out is not None:
         raise CalibrationError("--check writes nothing; leave --out away, or leave --check away to align anew.")
-    foreign, rig = read_stream(args.foreign, HEADER), read_stream(args.rig_points, HEADER[:4])
-    if args.check is not None:
-        return _check(args.check, foreign, rig, as_json=args.json)
-    line = ProgressLine("alignment")
-    result = calibrate_alignment(foreign, rig, args.search, line.report)
-    line.finish()
-    written = ""
-    if args.out is not None and result.verdict.acceptable:
-        save_alignment(args.out, to_alignment(result))
-        written = str(args.out)
-    return show(report(result), as_json=args.json, written=written)
+    return None if args.check is None else _check(args.check, *_streams(args), as_json=args.json)
+
+
+def _streams(args: argparse.Namespace) -> tuple[MotionStream, MotionStream]:
+    from rhot_app.objects.alignment.motion_stream import read_stream
+    from rhot_app.objects.stream import HEADER
+
+    return read_stream(args.foreign, HEADER), read_stream(args.rig_points, HEADER[:4])
+
+
+def observe(args: argparse.Namespace, progress: Progress) -> Observed:
+    """Both streams."""
+    return Observed((StreamRecording.of(*_streams(args)), args.search))
+
+
+def write(args: argparse.Namespace, result: AlignmentResult, now: InForce | None) -> str:
+    """The alignment's file."""
+    from rhot_app.objects.alignment.alignment_file import save_alignment, to_alignment
+
+    if args.out is None:
+        return ""
+    save_alignment(args.out, to_alignment(result.report, result.created))
+    return str(args.out)
 
 
 def _check(path: Path, foreign: MotionStream, rig: MotionStream, *, as_json: bool) -> int:
-    """Print whether the alignment is stale; 2 when it is. Raises CalibrationError without a file or overlap."""
+    """Raises CalibrationError without a file or overlap."""
     from rhot_app.objects.alignment.alignment_file import load_alignment
     from rhot_app.objects.alignment.drift import DriftMonitor
 
@@ -97,10 +102,11 @@ def _check(path: Path, foreign: MotionStream, rig: MotionStream, *, as_json: boo
 
 # -- what is said of the result, and what it changes -------------------------------------------------------------------
 
-def report(result: AlignmentReport, search: OffsetSearch | None = None) -> Report:
-    """Where the other world is, how well both agree, and how they moved; of `search` the chart."""
+def report(solved: AlignmentResult, now: InForce | None) -> Report:
+    """Where the other world is, how well both agree, and how they moved."""
     from rhot_app.estimation.se3 import quaternion_from_rotation
 
+    result = solved.report
     fit, coverage = result.fit, result.coverage
     return Report(
         result.verdict, (
@@ -117,7 +123,7 @@ def report(result: AlignmentReport, search: OffsetSearch | None = None) -> Repor
             "rig_from_foreign": {"rotation_wxyz": quaternion_from_rotation(fit.rig_from_foreign[:3, :3]),
                                  "translation_m": fit.rig_from_foreign[:3, 3]},
             "inlier_ratio": fit.inlier_ratio, "samples": len(fit.errors)},
-        charts=() if search is None else charts_of(result, search))
+        charts=charts_of(result, solved.search))
 
 
 def _figures(place_mm: Value, point_mm: Value, offset_ms: float | None,
@@ -155,6 +161,16 @@ class StreamRecording:
     rig_s: Array
     places: Array
 
+    @classmethod
+    def of(cls, foreign: MotionStream, rig: MotionStream) -> StreamRecording:
+        """Of two streams."""
+        import numpy as np
+
+        assert foreign.rotations is not None
+        poses = np.tile(np.eye(4), (len(foreign.times_s), 1, 1))
+        poses[:, :3, :3], poses[:, :3, 3] = foreign.rotations, foreign.positions
+        return cls(foreign.times_s, poses, rig.times_s, rig.positions)
+
     @property
     def coverage(self) -> Coverage | None:
         """The motion so far; None of too few samples."""
@@ -173,28 +189,49 @@ class StreamRecording:
 
 @dataclass(frozen=True, eq=False)
 class AlignmentResult:
-    """A solved alignment, its search, the test of the one that was in use, None when there was none, and when it was
-    solved, ISO 8601."""
+    """A solved alignment, its search, the one that was in use `before` and its test, None when there was none, and when
+    it was solved, ISO 8601."""
 
     report: AlignmentReport
     search: OffsetSearch
+    before: Alignment | None
     drift: Drift | None
     created: str
 
 
-def solve_recording(recording: StreamRecording, before: Alignment | None, *, progress: Progress) -> AlignmentResult:
-    """What ``rhot calibrate alignment`` does with two files. Raises CalibrationError as `align` does."""
+def in_use(now: InForce | None) -> Alignment | None:
+    """The alignment beside the rig; one that cannot be read counts as none: the new one replaces it."""
+    from rhot_app.objects.alignment.alignment_file import load_alignment
+
+    path = _path(now)
+    if path is None or not path.exists():
+        return None
+    try:
+        return load_alignment(path)
+    except CalibrationError:
+        return None
+
+
+def _path(now: InForce | None) -> Path | None:
+    from rhot_app.objects.alignment.alignment_file import alignment_path
+
+    return None if now is None or now.path is None else alignment_path(now.path)
+
+
+def solve(recording: StreamRecording, search_s: float, now: InForce | None, *, progress: Progress) -> AlignmentResult:
+    """The alignment, its time offset sought within `search_s` either way. Raises CalibrationError as `align` does."""
     from rhot_app.objects.alignment.drift import DriftMonitor
-    from rhot_app.objects.alignment.fit import SEARCH_S, align
+    from rhot_app.objects.alignment.fit import align
     from rhot_app.objects.alignment.motion_stream import MotionStream
     from rhot_app.objects.alignment.report import judge_alignment
 
     foreign = MotionStream.of_poses(recording.foreign_s, recording.foreign)
     rig = MotionStream(recording.rig_s, recording.places)
-    fit, search = align(foreign, rig, SEARCH_S, progress)
+    fit, search = align(foreign, rig, search_s, progress)
+    before = in_use(now)
     drift = None if before is None else DriftMonitor.test_streams(before, foreign, rig)
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    return AlignmentResult(judge_alignment(fit, search), search, drift, created)
+    return AlignmentResult(judge_alignment(fit, search), search, before, drift, created)
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,20 +269,29 @@ class AlignmentChange:
         return "The alignment in use can be brought back here, until this window closes."
 
 
-def propose(result: AlignmentResult, before: Alignment | None, path: Path | None) -> Proposal:
-    """The new alignment beside the one that is in use, for the file `path` beside the rig."""
+def propose(result: AlignmentResult, now: InForce) -> Proposal:
+    """The new alignment beside the one that was in use, for the file beside the rig."""
     from rhot_app.calibration.proposal import Proposal, Row
     from rhot_app.objects.alignment.alignment_file import to_alignment
 
+    before, path = result.before, _path(now)
     old = _figures(None, None, None, None) if before is None else _figures(
         [1e3 * value for value in before.rig_from_foreign.translation_m],
         [1e3 * value for value in before.tracker_from_body.translation_m], 1e3 * before.time_offset_s,
         None if before.rms_m is None else 1e3 * before.rms_m)
-    said, known = report(result.report), {one.name: one.brief for one in old}
+    said, known = report(result, now), {one.name: one.brief for one in old}
     drift = result.drift
     state = ("none" if before is None else "not tested" if drift is None else
              f"stale: {1e3 * drift.distance_m:.1f} mm off" if drift.stale else "holds")
     rows = tuple(Row(one.name, known.get(one.name, ""), one.brief) for one in said.figures if one.name)
-    return Proposal(ALIGNMENT.reason, said.verdict, (Row("alignment in use", state, "just solved"), *rows),
+    return Proposal(CALIBRATION.reason, said.verdict, (Row("alignment in use", state, "just solved"), *rows),
                     changes=(AlignmentChange(before, to_alignment(result.report, result.created), path),),
                     afterwards="" if path is None else f"It is in {path.name}, beside the rig.")
+
+
+CALIBRATION = Calibration(
+    "alignment", "Alignment with another tracker", "Where a Vive tracker's world is in the rig, from a movement of "
+    "both.", "alignment with another tracker",
+    CalibrateCommand("alignment", "where another tracker's world is in the rig, from two streams of one motion",
+                     add_arguments, observe, ("tracker",), write, instead),
+    solve=solve, report=report, propose=propose, solver="rhot_app.objects.alignment.fit")

@@ -1,18 +1,17 @@
-"""``rhot calibrate colours``: colour models from boxes on the paint in pictures."""
+"""The colour calibration: colour models of the markers from their paint in pictures."""
 
 from __future__ import annotations
 
 import argparse
 import re
-import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhot_app.calibration.commands.output import show
-from rhot_app.calibration.registry import COLOURS
+from rhot_app.calibration.registry import Calibration, Command, InForce, Observed
 from rhot_app.calibration.report import Figure, Report, Table
+from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.errors import CalibrationError, input_file
 from rhot_app.options import add_json_argument, add_out_argument
 from rhot_node.errors import PictureError
@@ -21,12 +20,13 @@ from rhot_node.terminal import add_examples
 if TYPE_CHECKING:
     import numpy as np
 
+    from rhot_app.calibration.check.health import HealthFigures
     from rhot_app.calibration.colour.colours import ColourReport
     from rhot_app.calibration.colour.paint_region import PaintRegion
+    from rhot_app.calibration.colour.samples import MarkedPicture, PaintSamples
     from rhot_app.calibration.proposal import Proposal
-    from rhot_app.calibration.verdict import Finding
     from rhot_app.charts import Chart
-    from rhot_app.project import Rig
+    from rhot_app.progress import Progress
     from rhot_node.detect.image import YuvImage
 
 EPILOG = """Boxes are x,y,w,h in pixels of the picture, (0, 0) at its top-left corner: nothing but paint inside, and as
@@ -77,16 +77,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "rhot calibrate colours --image hand.png --sample wrist=90,40,14,14 --markers rhot6.json --out mine.json")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Learn, judge, print and write. Raises CalibrationError or SettingsError before anything is printed."""
-    from rhot_app.calibration.colour.colours import solve_colours
+def observe(args: argparse.Namespace, progress: Progress) -> Observed:
+    """The boxes' paint. Raises CalibrationError or SettingsError."""
     from rhot_app.calibration.colour.samples import ColourSamples
-    from rhot_app.calibration.verdict import with_findings
-    from rhot_app.progress import ProgressLine
-    from rhot_node.markers import load_markers, save_markers
+    from rhot_node.markers import load_markers
 
-    if not args.out.parent.is_dir():
-        raise CalibrationError(f"--out {args.out}: the folder {args.out.parent} does not exist; create it first.")
     base = load_markers(args.markers) if args.markers else None
     images, unreadable = _read_all(args.image)
     collector = ColourSamples()
@@ -100,19 +95,25 @@ def run(args: argparse.Namespace) -> int:
             collector.keep_view(image)
     skin = _skin([parse_box(f"skin{text}" if text.startswith("@") else f"skin={text}", "--skin") for text in args.skin],
                  images, args.image)
-    line = ProgressLine("colours", sys.stderr)
-    result = solve_colours(collector.samples, collector.views, skin=skin, base=base, progress=line.report)
-    line.finish()
-    said, written = report(result), ""
-    if result.verdict.acceptable:
-        try:
-            save_markers(args.out, result.markers)
-        except OSError as exc:
-            raise CalibrationError(f"--out {args.out}: cannot be written ({exc.strerror}).") from exc
-        written = str(args.out)
-    said = replace(said, verdict=with_findings(said.verdict, [*unreadable, *_note_enlarged(enlarged)]),
-                   fields={**said.fields, "images": [str(path) for path in args.image]})
-    return show(said, as_json=args.json, written=written)
+    return Observed((collector.samples, collector.views, {"skin": skin, "base": base}),
+                    findings=(*unreadable, *_note_enlarged(enlarged)),
+                    fields={"images": [str(path) for path in args.image]})
+
+
+def solve(samples: Sequence[PaintSamples], views: Sequence[MarkedPicture], known: Mapping[str, Any],
+          now: InForce | None, *, progress: Progress) -> ColourReport:
+    """The models; `known` are the further arguments of `solve_colours`. Raises CalibrationError."""
+    from rhot_app.calibration.colour.colours import solve_colours
+
+    return solve_colours(samples, views, progress=progress, **known)
+
+
+def write(args: argparse.Namespace, result: ColourReport, now: InForce | None) -> str:
+    """The marker set."""
+    from rhot_node.markers import save_markers
+
+    save_markers(args.out, result.markers)
+    return str(args.out)
 
 
 def parse_box(text: str, option: str) -> BoxArgument:
@@ -155,7 +156,6 @@ def _enlarged(what: str, image: YuvImage, boxes: list[tuple[int, int, int, int]]
 
 def _note_enlarged(enlarged: list[str]) -> list[Finding]:
     from rhot_app.calibration.colour.paint_region import ENOUGH
-    from rhot_app.calibration.verdict import Finding, Grade
     from rhot_node.detect.colour import SAMPLES_MIN
 
     return [Finding("enlarged", Grade.GOOD, f"{SAMPLES_MIN} colour pixels are needed, so small boxes were enlarged to "
@@ -165,8 +165,6 @@ def _note_enlarged(enlarged: list[str]) -> list[Finding]:
 
 def _read_all(paths: list[Path]) -> tuple[list[YuvImage | PictureError], list[Finding]]:
     """All pictures, or why one cannot be decoded, which the findings tell; some must remain."""
-    from rhot_app.calibration.verdict import Finding, Grade
-
     images = [_read(path) for path in paths]
     damaged = [image for image in images if isinstance(image, PictureError)]
     if len(damaged) == len(paths):
@@ -230,7 +228,7 @@ def _skin(boxes: list[BoxArgument], images: list[YuvImage | PictureError], paths
 
 # -- what is said of the result, and what it changes -------------------------------------------------------------------
 
-def report(result: ColourReport) -> Report:
+def report(result: ColourReport, now: InForce | None) -> Report:
     """Every marker's model, which colours are taken for which, what else in the room has them, and the hues."""
     import msgspec
     import numpy as np
@@ -310,25 +308,66 @@ def hue_chart(result: ColourReport) -> Chart:
                  "pixels per picture", tuple(curves), log_y=True)
 
 
-def propose(result: ColourReport, rig: Rig, node_settings: Mapping[int, dict[str, Any]]) -> Proposal:
+def propose(result: ColourReport, now: InForce) -> Proposal:
     """The rig with the new marker set, and every node whose settings are known with the very same."""
     import msgspec
 
     from rhot_app.calibration.proposal import NodeChange, Row, proposed
 
-    markers = msgspec.to_builtins(result.markers)
+    rig, markers = now.rig, msgspec.to_builtins(result.markers)
     changes: list[NodeChange] = []
     rows: list[Row] = []
     for node in rig.nodes:
-        if node.node_id in node_settings:
-            before = node_settings[node.node_id]["markers"]
+        if node.node_id in now.node_settings:
+            before = now.node_settings[node.node_id]["markers"]
             changes.append(NodeChange(node.node_id, {"markers": before}, {"markers": markers}))
             rows.append(Row(f"colours in camera {node.name}", "the rig's" if before == msgspec.to_builtins(rig.markers)
                             else "not the rig's", "the new ones"))
         elif not node.text_datagrams:
             rows.append(Row(f"colours in camera {node.name}", "not known", "not changed: the node does not answer"))
-    made = proposed(COLOURS.reason, Report(result.verdict), rig, msgspec.structs.replace(rig, markers=result.markers),
-                    changes=tuple(changes), rows=tuple(rows))
+    after = msgspec.structs.replace(rig, markers=result.markers)
+    made = proposed(CALIBRATION.reason, Report(result.verdict), rig, after, changes=tuple(changes), rows=tuple(rows))
     shown = {f"{old.id}: colour": (old.display_rgb, new.display_rgb)
              for old, new in zip(rig.markers.markers, result.markers.markers, strict=True)}
     return replace(made, rows=tuple(replace(row, swatches=shown.get(row.what)) for row in made.rows))
+
+
+WEAK_QUALITY = 0.45
+"""A marker as plain as it should be has 0.8 to 1."""
+
+DOUBLED_PART = 0.3
+"""Of the pictures in which something else may have a marker's colour."""
+
+
+def check(figures: HealthFigures) -> list[Finding]:
+    """Whether a colour is hardly told from its surroundings, or something else has it."""
+    return [*_weak(figures), *_doubled(figures)]
+
+
+def _weak(figures: HealthFigures) -> list[Finding]:
+    weak = [one for one in figures.qualities if one.quality < WEAK_QUALITY]
+    if not weak:
+        return []
+    worst = min(weak, key=lambda one: one.quality)
+    names = ", ".join(dict.fromkeys(one.marker for one in weak))
+    return [Finding("weak_colour", Grade.FAIR, f"The colour of {names} is hardly told from its surroundings (quality "
+                    f"{worst.quality:.2f} in camera {worst.camera}).", "The light has changed, or the paint is dirty.",
+                    "Give more light, or learn the colours again (Calibrate menu).")]
+
+
+def _doubled(figures: HealthFigures) -> list[Finding]:
+    worst = max((one for one in figures.qualities if one.ambiguous > DOUBLED_PART), key=lambda one: one.ambiguous,
+                default=None)
+    if worst is None:
+        return []
+    return [Finding("doubled_colour", Grade.FAIR, f"In {100 * worst.ambiguous:.0f} % of its pictures camera "
+                    f"{worst.camera} sees something else in the colour of {worst.marker}.", "",
+                    "Take it out of the picture, or choose another paint (Calibrate menu).")]
+
+
+CALIBRATION = Calibration(
+    "colours", "Colours of the markers", "Which colour each marker has, and what may be mistaken for it.",
+    "colour calibration",
+    Command("colours", "the markers' colours, from boxes on their paint in pictures", add_arguments, observe,
+            write=write),
+    solve=solve, report=report, propose=propose, check=check, solver="rhot_app.calibration.colour.colours")

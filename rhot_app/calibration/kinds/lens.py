@@ -1,4 +1,4 @@
-"""``rhot calibrate intrinsics``: one camera's lens from pictures or films of a board."""
+"""The calibration of a camera's intrinsics, from pictures, films or live views of a board."""
 
 from __future__ import annotations
 
@@ -7,15 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rhot_app.calibration.commands.output import (
-    add_board_arguments,
-    board_of,
-    dropped_fields,
-    left_out,
-    require_folder,
-    show,
-)
-from rhot_app.calibration.registry import LENS
+from rhot_app.calibration.commands.arguments import add_board_arguments, board_of, dropped_fields, left_out
+from rhot_app.calibration.registry import Calibration, Command, InForce, Observed
 from rhot_app.calibration.report import Figure, Report, Table
 from rhot_app.options import add_json_argument, add_out_argument, add_rig_argument
 from rhot_node.terminal import add_examples
@@ -24,6 +17,7 @@ if TYPE_CHECKING:
     from rhot_app.calibration.board.boards import Board
     from rhot_app.calibration.board.corners import BoardView
     from rhot_app.calibration.lens.intrinsics import IntrinsicsReport
+    from rhot_app.calibration.lens.views import ViewSet
     from rhot_app.calibration.proposal import Proposal
     from rhot_app.progress import Progress
     from rhot_app.project import Rig
@@ -43,45 +37,49 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                  "rhot calibrate intrinsics --images left.mp4 --rig desk.json --node left")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Calibrate and report; files are written only when the verdict allows it."""
-    from rhot_app.calibration.lens.intrinsics import save_intrinsics, solve
+def observe(args: argparse.Namespace, progress: Progress) -> Observed:
+    """The board in all pictures."""
     from rhot_app.calibration.lens.views import matching_files, read_views
     from rhot_app.errors import CalibrationError
-    from rhot_app.progress import ProgressLine, within
 
-    require_folder(args.out)
-    board = board_of(args)
-    rig = _rig(args)
+    board, rig = board_of(args), _rig(args)
     files = list(dict.fromkeys(path for pattern in args.images for path in matching_files(pattern)))
     if not files:
         raise CalibrationError(f"No file matches {' '.join(args.images)}. Put the pattern in quotes and see that the "
                                "folder is right.")
-    line = ProgressLine("intrinsics")
-    read = read_views(files, board, progress=within(line.report, 0.0, 0.5))
-    result = solve(read.views, board, square_pixels=args.square_pixels, dropped=read.dropped,
-                   noticed=[] if read.size is None else [read.size], progress=within(line.report, 0.5, 1.0))
-    line.finish()
+    return Observed((read_views(files, board, progress=progress), board, args.node or "", args.square_pixels),
+                    None if rig is None else InForce(rig, args.rig))
+
+
+def solve(views: ViewSet | Sequence[BoardView], board: Board, camera: str, square_pixels: bool, now: InForce | None, *,
+          progress: Progress) -> IntrinsicsReport:
+    """The lens of `camera`, "" for one without a name, from pictures of a board; or from views of a live camera, which
+    are numbered. Raises CalibrationError."""
+    from rhot_app.calibration.lens import intrinsics
+    from rhot_app.calibration.lens.views import ViewSet
+
+    if not isinstance(views, ViewSet):
+        views = ViewSet(tuple(replace(view, source=f"view {k}") for k, view in enumerate(views, 1)), (), None)
+    found = intrinsics.solve(views.views, board, square_pixels=square_pixels, dropped=views.dropped,
+                             noticed=[] if views.size is None else [views.size], progress=progress)
+    return replace(found, camera=camera)
+
+
+def write(args: argparse.Namespace, result: IntrinsicsReport, now: InForce | None) -> str:
+    """The intrinsics file, and the rig."""
+    from rhot_app.calibration.lens.intrinsics import save_intrinsics
+
     written = []
-    if result.verdict.acceptable and args.out is not None:
+    if args.out is not None:
         save_intrinsics(args.out, result)
         written.append(str(args.out))
-    if rig is not None:
-        written.append(propose(result, rig, args.node).save(args.rig))
-    return show(report(result), as_json=args.json, written=", ".join(filter(None, written)))
+    if now is not None:
+        written.append(propose(result, now).save(now.path))
+    return ", ".join(written)
 
 
-def solve_shown(views: Sequence[BoardView], board: Board, *, square_pixels: bool,
-                progress: Progress) -> IntrinsicsReport:
-    """The lens from views of a live camera, which are numbered. Raises CalibrationError."""
-    from rhot_app.calibration.lens.intrinsics import solve
-
-    numbered = [replace(view, source=f"view {number}") for number, view in enumerate(views, 1)]
-    return solve(numbered, board, square_pixels=square_pixels, progress=progress)
-
-
-def report(result: IntrinsicsReport, camera: str = "") -> Report:
-    """What the lens of `camera` is, how well it is known, and of which views."""
+def report(result: IntrinsicsReport, now: InForce | None) -> Report:
+    """What the lens is, how well it is known, and of which views."""
     from rhot_app.calibration.bundle.robust_error import what_is_reported
     from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
     from rhot_app.calibration.rig_figures import lens_figures, order_of_distortion
@@ -89,7 +87,7 @@ def report(result: IntrinsicsReport, camera: str = "") -> Report:
     std = {name: std for name, (_, std) in result.parameters.items()}
     errors, board, cover = result.errors, result.board_errors, result.coverage
     figures = [
-        *lens_figures(camera, result.intrinsics, std),
+        *lens_figures(result.camera, result.intrinsics, std),
         Figure("corners, rms", result.rms_px, "px", key="rms_px"),
         Figure("views", len(result.views), decimals=0, key="views_used"),
         Figure(f"error expected at {WORKING_DISTANCE_M:g} m", 1e3 * errors.typical_m, "mm",
@@ -114,13 +112,14 @@ def report(result: IntrinsicsReport, camera: str = "") -> Report:
          "expected_error_mm.distance_m": WORKING_DISTANCE_M, "board_errors_mm": None, **dropped_fields(result.dropped)})
 
 
-def propose(result: IntrinsicsReport, rig: Rig, camera: str) -> Proposal:
-    """The rig with this lens of `camera`; poses that were found with the old one are outdated then."""
+def propose(result: IntrinsicsReport, now: InForce) -> Proposal:
+    """The rig with this lens of its camera; poses that were found with the old one are outdated then."""
     from rhot_app.calibration.check.camera_calibration import with_lens
     from rhot_app.calibration.proposal import proposed
 
-    after = with_lens(rig, camera, result.intrinsics)
-    return proposed(f"{LENS.reason} {camera}", report(result, camera), rig, after, afterwards=what_follows(rig, after))
+    after = with_lens(now.rig, result.camera, result.intrinsics)
+    return proposed(f"{CALIBRATION.reason} {result.camera}", report(result, now), now.rig, after,
+                    afterwards=what_follows(now.rig, after))
 
 
 def what_follows(before: Rig, after: Rig) -> str:
@@ -149,3 +148,10 @@ def _rig(args: argparse.Namespace) -> Rig | None:
         raise CalibrationError(f"{args.rig} has no camera {args.node!r}; its cameras are {', '.join(names)}.")
     return rig
 
+
+CALIBRATION = Calibration(
+    "lens", "Intrinsics of a camera", "Focal length, centre and distortion of one camera's lens, from a board that is "
+    "held all over its picture.", "intrinsics of",
+    Command("intrinsics", "focal length, centre and distortion of one camera's lens, from pictures of a board",
+            add_arguments, observe, ("lens",), write),
+    solve=solve, report=report, propose=propose, solver="rhot_app.calibration.lens.intrinsics")
