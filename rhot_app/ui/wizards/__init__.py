@@ -16,12 +16,12 @@ To add one:
 3. test it as a person would: in tests/ui/wizards, `Hands` clicks and `FakeRigAsker` draws pictures. Run it once in
    tests/ui/wizards/on_simulated_rig. ``hands.keep(NAME)`` takes a page's picture for the guide: open it.
 
-A step (`models.step.Step`) knows no widgets: its state, the sentence that says what to do now, the bars, whether it is
-done. `observe` looks at pictures in a worker's thread and changes nothing; `accept_observation` gets what it found. All
-but `observe` is called in the window's thread and must be quick. A page (`framework.page.Page`) hands what a person
-does to its step and emits `changed`; a step without controls needs no class: ``Page(step)``. Movements are recorded by
-`framework.movement_page.Movements`, boards found by `models.board_form.BoardStep`, results computed by
-`models.step.SolveStep`, and `framework.definition.accept_result` makes the last page: before and after.
+A step (`framework.step.Step`) knows no widgets: its state, the sentence that says what to do now, the bars, whether it
+is done. `observe` looks at pictures in a worker's thread and changes nothing; `accept_observation` gets what it found.
+All but `observe` is called in the window's thread and must be quick. A page (`framework.page.Page`) hands what a
+person does to its step and emits `changed`; a step without controls needs no class: ``Page(step)``. Movements are
+recorded by `framework.movement.Movements`, boards found by `framework.board.BoardStep`, results computed by
+`framework.step.SolveStep`, and `framework.definition.accept_result` makes the last page: before and after.
 
 A `SolveStep` has the record's ``solve`` computed in a process of its own (`rhot_app.ui.backend.solver`) with remaining
 time and cancel, while pictures stay live. What `context.connect()` gives is used in workers only: `Job`,
@@ -29,5 +29,5 @@ time and cancel, while pictures stay live. What `context.connect()` gives is use
 
 Live pictures (`rhot_app.ui.backend.feed`) are the nodes' stills in full size;
 `framework.picture_worker.PictureWorker` calls `observe` with the newest of all cameras. What a step draws over them is
-in `models.drawing`, in px of the full frame.
+in `framework.drawing`, in px of the full frame.
 """

@@ -7,15 +7,14 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QLineEdit, QPushButton
 
-from rhot_app.calibration.collect import Bar
+from rhot_app.calibration.collect import Bar, Movement
 from rhot_app.calibration.kinds.alignment import StreamRecording
 from rhot_app.errors import EngineError
 from rhot_app.objects.alignment.fit import LASTING_M, SEARCH_S
@@ -26,8 +25,9 @@ from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext, accept_result
+from rhot_app.ui.wizards.framework.movement import MovementPage, MovementStep
 from rhot_app.ui.wizards.framework.page import ChartPage, Page
-from rhot_app.ui.wizards.models.step import SolveStep, Step, StepView
+from rhot_app.ui.wizards.framework.step import SolveStep, Step, StepView
 
 _KIND, _DETAIL, _TRACKER = "pose source", "pose source detail", "pose tracker"  # as they are remembered
 
@@ -125,28 +125,64 @@ class SourceStep(Step):
         return StepView("Waiting for poses.", bars=bars, hint=self.feed.notice)
 
 
-Phase = Literal["waiting", "recording", "recorded"]
+class MotionGuide:
+    """Gathers the motion of both since it was made, and says what of it is missing."""
+
+    def __init__(self, feed: PoseFeed, marker: int, now_ns: Callable[[], int]) -> None:
+        """`marker` is the number of the fingertip's."""
+        self._feed, self._marker, self._now_ns = feed, marker, now_ns
+        self._began_ns = now_ns()
+        self._places: list[tuple[int, Array]] = []
+        self._coverage: Coverage | None = None
+
+    def watch(self, states: Sequence[HandState]) -> None:
+        """The marker's places, unfiltered: a filter's lag would be taken for the tracker's delay."""
+        now_ns = self._now_ns()
+        last_ns = self._places[-1][0] if self._places else self._began_ns
+        for state in states:
+            place = state.marker_raw_positions[self._marker]
+            if last_ns < state.t_master_ns <= now_ns and np.isfinite(place).all():
+                self._places.append((state.t_master_ns, np.array(place)))
+                last_ns = state.t_master_ns
+        self._coverage = self.recording.coverage
+
+    @property
+    def recording(self) -> StreamRecording:
+        """What was gathered."""
+        # the other clock may be off by as much as is searched
+        poses = self._feed.between(self._began_ns - round(1e9 * SEARCH_S), self._now_ns())
+        return StreamRecording(np.array([1e-9 * (pose.t_master_ns - self._began_ns) for pose in poses]),
+                               np.array([pose.world_from_body for pose in poses]).reshape(-1, 4, 4),
+                               np.array([1e-9 * (t_ns - self._began_ns) for t_ns, _ in self._places]),
+                               np.array([place for _, place in self._places]).reshape(-1, 3))
+
+    def bars(self) -> tuple[Bar, ...]:
+        """How much of what an alignment needs the motion shows."""
+        return bars_of(self._coverage)
+
+    def sentence(self) -> str:
+        """What is missing most."""
+        return advice(self._coverage) or "Good, go on."
+
+    def shortfall(self) -> str:
+        """The same; "" when nothing is."""
+        return advice(self._coverage)
 
 
-class TogetherStep(Step):
-    """Tracker and fingertip are moved together; Space begins and ends. `marker` is the number of the fingertip's."""
-
-    title = "Move both"
-    captures = True
+class TogetherStep(MovementStep):
+    """Tracker and fingertip are moved together. Both streams are gathered here; no log is written."""
 
     def __init__(self, markers: Sequence[str], feed: PoseFeed, recent: Callable[[float], Sequence[HandState]],
                  now_ns: Callable[[], int] = time.monotonic_ns) -> None:
         """`recent` gives the hand's states of the last seconds."""
+        super().__init__(
+            Movement("Move both", "Tie the tracker to the finger. Press Record, then move and turn both, irregularly.",
+                     SECONDS, lambda: MotionGuide(feed, self.marker, now_ns), "Moves and turns."),
+            Path(), lambda: recent(4.0), lambda: 1e-9 * now_ns())
         self.markers, self.feed = tuple(markers), feed
         self.marker = self.markers.index("index") if "index" in self.markers else 0
-        self.seconds = SECONDS
-        self.phase: Phase = "waiting"
         self.recording: StreamRecording | None = None
-        self.problem = ""
-        self._recent, self._now_ns = recent, now_ns
-        self._began_ns = self._ended_ns = 0
-        self._places: list[tuple[int, Array]] = []
-        self._coverage: Coverage | None = None
+        self._now_ns, self._last_second = now_ns, lambda: recent(1.0)
 
     @property
     def keeps(self) -> bool:
@@ -155,21 +191,21 @@ class TogetherStep(Step):
 
     def capture(self) -> bool:
         """Begin, or end."""
-        now_ns = self._now_ns()
         if self.phase == "recording":
-            self._gather(now_ns)
-            self.phase, self._ended_ns, self.recording = "recorded", now_ns, self._recorded(now_ns)
+            assert isinstance(self._guide, MotionGuide)
+            self._guide.watch(self._recent())
+            self.phase, self.recording = "recorded", self._guide.recording
             return True
         self.problem = self._missing()
         if self.problem:
             return False
-        self.phase, self._began_ns, self.recording = "recording", now_ns, None
-        self._places, self._coverage = [], None
+        self.phase, self.recording, self._guide = "recording", None, self._make_guide()
+        self._number, self._began_s = self._number + 1, self._clock()
         return True
 
     def seen(self) -> bool:
         """Whether the marker was measured within the last second."""
-        return any(np.isfinite(state.marker_raw_positions[self.marker]).all() for state in self._recent(1.0))
+        return any(np.isfinite(state.marker_raw_positions[self.marker]).all() for state in self._last_second())
 
     def _missing(self) -> str:
         if not self.feed.between(self._now_ns() - _RECENT_NS, self._now_ns()):
@@ -179,46 +215,12 @@ class TogetherStep(Step):
                     "choose another one.")
         return ""
 
-    def _gather(self, now_ns: int) -> None:
-        """The marker's places, unfiltered: a filter's lag would be taken for the tracker's delay."""
-        last_ns = self._places[-1][0] if self._places else self._began_ns
-        for state in self._recent(4.0):
-            place = state.marker_raw_positions[self.marker]
-            if last_ns < state.t_master_ns <= now_ns and np.isfinite(place).all():
-                self._places.append((state.t_master_ns, np.array(place)))
-                last_ns = state.t_master_ns
-
-    def _recorded(self, now_ns: int) -> StreamRecording:
-        # the other clock may be off by as much as is searched
-        poses = self.feed.between(self._began_ns - round(1e9 * SEARCH_S), now_ns)
-        return StreamRecording(np.array([1e-9 * (pose.t_master_ns - self._began_ns) for pose in poses]),
-                               np.array([pose.world_from_body for pose in poses]).reshape(-1, 4, 4),
-                               np.array([1e-9 * (t_ns - self._began_ns) for t_ns, _ in self._places]),
-                               np.array([place for _, place in self._places]).reshape(-1, 3))
-
     def view(self) -> StepView:
-        """Coverage and what is missing."""
-        now_ns = self._now_ns()
-        if self.phase == "recording":
-            self._gather(now_ns)
-            self._coverage = self._recorded(now_ns).coverage
-            if now_ns - self._began_ns >= 1e9 * self.seconds:
-                self.capture()
-        elapsed_s = 1e-9 * ((now_ns if self.phase == "recording" else self._ended_ns) - self._began_ns)
-        recorded = self.phase == "recorded"
-        missing = advice(self._coverage)
-        return StepView(self._say(elapsed_s, missing), done=recorded and not missing, passable=recorded,
-                        hint=self.problem or ("" if self.phase != "recording" or self.seen() else self._missing()),
-                        bars=(Bar("time", min(elapsed_s / self.seconds, 1.0) if self._began_ns else 0.0,
-                                  f"of {self.seconds:.0f} s recorded"), *bars_of(self._coverage)),
-                        kept=int(recorded))
-
-    def _say(self, elapsed_s: float, missing: str) -> str:
-        if self.phase == "recording":
-            return f"{missing or 'Good, go on.'} {max(0.0, self.seconds - elapsed_s):.0f} s left."
-        if self.phase == "recorded":
-            return f"{missing} Record again." if missing else "Recorded. Go on, or record again."
-        return "Tie the tracker to the finger. Press Record, then move and turn both, irregularly."
+        """With what is not seen while it is recorded."""
+        view = super().view()
+        if self.phase != "recording" or view.hint or self.seen():
+            return view
+        return replace(view, hint=self._missing())
 
 
 def bars_of(coverage: Coverage | None) -> tuple[Bar, ...]:
@@ -299,47 +301,37 @@ class SourcePage(Page):
         self.changed.emit()
 
 
-class TogetherPage(Page):
+class TogetherPage(MovementPage):
     """Records both."""
 
     def __init__(self, step: TogetherStep, states: StateFeed, context: WizardContext) -> None:
-        super().__init__(step)
-        self.together, self._states, self._connect = step, states, context.connect
+        super().__init__(step, context.connect, states, "What both show is kept until this window closes.")
         self._job: Job | None = None
+        self._connect = context.connect
         self.marker = QComboBox()
         self.marker.addItems(list(step.markers))
         self.marker.setCurrentIndex(step.marker)
         self.marker.setToolTip("The marker that the tracker is tied to.")
         self.marker.currentIndexChanged.connect(self._choose)
-        self.button = QPushButton()
-        self.button.setAutoDefault(False)
-        self.button.setToolTip("Space. Begins or ends; it ends by itself when the time is over.")
-        self.button.clicked.connect(self._press)
+        self.together = step
         form = QFormLayout()
         form.addRow("Marker", self.marker)
-        self.column.addLayout(form)
-        self.column.addWidget(self.button)
-        self.column.addStretch(1)
+        self.column.insertLayout(0, form)
         self.first_field = self.button
         self.twin_facts = "Moves and turns."
 
     def entered(self) -> None:
         """Hear the hand from now on; have a resting engine track."""
-        self._states.start()
+        super().entered()
         self._job = Job(lambda progress: self._start_tracking(), lambda _: None, self._refused, None, self).start()
 
     def show_view(self, view: StepView) -> None:
         """The button's word."""
-        words = {"waiting": "Record", "recording": "Stop", "recorded": "Record again"}
-        self.button.setText(words[self.together.phase])
+        super().show_view(view)
         self.marker.setEnabled(self.together.phase != "recording")
 
     def _choose(self, index: int) -> None:
         self.together.marker = index
-        self.changed.emit()
-
-    def _press(self) -> None:
-        self.together.capture()
         self.changed.emit()
 
     def _refused(self, sentence: str) -> None:

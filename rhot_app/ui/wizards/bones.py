@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
@@ -21,12 +22,12 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import BONES, FINGERS
 from rhot_app.project import Rig
 from rhot_app.state import HandState
+from rhot_app.ui.common.record_table import RecordTable
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
-from rhot_app.ui.wizards.framework.movement_page import Movements
-from rhot_app.ui.wizards.framework.page import FigureTable, Page
-from rhot_app.ui.wizards.models.movement import QuietGuide
-from rhot_app.ui.wizards.models.step import Done, SolveStep, Step, StepView
+from rhot_app.ui.wizards.framework.movement import Movements, QuietGuide
+from rhot_app.ui.wizards.framework.page import Page, figure_columns
+from rhot_app.ui.wizards.framework.step import Done, SolveStep, Step, StepView
 
 if TYPE_CHECKING:
     from rhot_app.calibration.hand.bones_collector import BonesCollector
@@ -308,7 +309,8 @@ class HandPage(Page):
         self._hand = step
         self._scheme = scheme
         self._shown: BonesReport | None = None
-        self.table = FigureTable()
+        self.table: RecordTable[tuple[str, ...]] = RecordTable((), selectable=False)
+        self.table.setShowGrid(False)
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.centre = self.table
         self.reaches = QLabel()
@@ -328,13 +330,23 @@ class HandPage(Page):
         if result is self._shown:
             return
         self._shown = result
-        self.table.show_table(None if self._hand.report is None else self._hand.report.tables[0])
-        for column in range(1, self.table.columnCount() - 1):
-            self.table.horizontalHeader().setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
-        for r, bone in enumerate(result.bones if result is not None else ()):
-            self.table.cell(r, self.table.columnCount() - 1).setBackground(self._brush(knowledge_of(bone)))
+        self._show_bones()
         self.reaches.setText("" if result is None else "Reach: " + ", ".join(
             f"{reach.finger} {reach.length_mm:.0f} ± {reach.std_mm:.0f}" for reach in result.reaches) + " mm")
+
+    def _show_bones(self) -> None:
+        result, report = self._shown, self._hand.report
+        if result is None or report is None:
+            self.table.show_records((), ())
+            return
+        brushes = {bone.name: self._brush(knowledge_of(bone)) for bone in result.bones}
+        *columns, last = figure_columns(report.tables[0].heads)
+        last = replace(last, roles=lambda row: {Qt.ItemDataRole.BackgroundRole: brushes[row[0]]})
+        self.table.show_records(report.tables[0].texts, (*columns, last))
+        header = self.table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        for column in range(1, len(columns)):
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
 
     def _brush(self, knowledge: str) -> QBrush:
         guessed = knowledge == "guessed"

@@ -22,10 +22,9 @@ from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
-from rhot_app.ui.wizards.framework.movement_page import MovementPage, Movements
+from rhot_app.ui.wizards.framework.movement import MovementPage, Movements, MovementStep, QuietGuide, Request
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
-from rhot_app.ui.wizards.models.movement import MovementStep, QuietGuide, Request
-from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep, StepView
+from rhot_app.ui.wizards.framework.step import AcceptStep, SolveStep, StepView
 
 _FLASH_STEP_MS = 4  # a quarter of a 60 Hz screen's frame
 _SEED = 7
@@ -326,8 +325,7 @@ class KeepPage(AcceptPage):
     """The lines in a table, and the way to delete what was written."""
 
     def __init__(self, step: KeepStep, scheme: Scheme) -> None:
-        super().__init__(step, scheme)
-        self.table.setHorizontalHeaderLabels(["", "verdict", "measured"])
+        super().__init__(step, scheme, ("", "verdict", "measured"))
         self.restore_button.setText("Delete it again")
         self.restore_button.setToolTip("Removes the folder that was written.")
 

@@ -7,18 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QComboBox,
-    QDoubleSpinBox,
-    QFormLayout,
-    QHeaderView,
-    QLabel,
-    QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
-)
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFormLayout, QHeaderView, QLabel, QPushButton
 
 from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthReport, fit_depth, geometry_of, replaced_calibration
 from rhot_app.calibration.depth.table import DepthRow, DepthTable
@@ -26,10 +15,11 @@ from rhot_app.errors import CalibrationError, EngineError
 from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.backend.feed import Picture, StateFeed
+from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
+from rhot_app.ui.wizards.framework.drawing import Callout, Dots
 from rhot_app.ui.wizards.framework.page import ChartPage, Page, shrinkable
-from rhot_app.ui.wizards.models.drawing import Callout, Dots
-from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Done, Pictures, SolveStep, Step, StepView
+from rhot_app.ui.wizards.framework.step import AnnotatedPicture, Bar, Done, Pictures, SolveStep, Step, StepView
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
 from rhot_node.wire.messages import MarkerObservation
@@ -173,7 +163,10 @@ class DistanceStep(Step):
 
 # -- the page of the distances -----------------------------------------------------------------------------------------
 
-_HEADS = ("cm", "px", "± px")
+_COLUMNS: tuple[Column[DepthRow], ...] = (
+    Column("cm", lambda row: f"{100 * row.distance_m:.1f}", number=True),
+    Column("px", lambda row: f"{row.disparity_px:.2f}", number=True),
+    Column("± px", lambda row: f"{row.sd_px:.2f}", number=True))
 
 
 class DistancePage(Page):
@@ -204,17 +197,13 @@ class DistancePage(Page):
         form.addRow("Marker", self.marker)
         form.addRow("Distance", self.distance)
         form.addRow("Disparity", self.seen)
-        self.table = QTableWidget(0, len(_HEADS))
-        self.table.setHorizontalHeaderLabels(list(_HEADS))
+        self.table = RecordTable(_COLUMNS)
         self.table.setToolTip("Distance, mean disparity and its spread within the second.")
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        self.table.verticalHeader().setVisible(False)
-        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.remove_button = QPushButton("Remove the chosen row")
         self.remove_button.setAutoDefault(False)
         self.remove_button.clicked.connect(self._remove)
-        self.table.itemSelectionChanged.connect(self._show_removable)
+        self.table.chosen_changed.connect(self._show_removable)
         self.column.addLayout(form)
         self.column.addWidget(self.take_button)
         self.column.addWidget(self.table, 1)
@@ -234,17 +223,9 @@ class DistancePage(Page):
         self.seen.setText(f"{seen.mean():.2f} ± {seen.std():.2f} px" if len(seen) else "not seen by both cameras")
         if self.distances.rows != self._shown:
             self._shown = list(self.distances.rows)
-            self._fill()
-
-    def _fill(self) -> None:
-        self.table.setRowCount(len(self._shown))
-        for r, row in enumerate(self._shown):
-            for c, text in enumerate((f"{100 * row.distance_m:.1f}", f"{row.disparity_px:.2f}", f"{row.sd_px:.2f}")):
-                item = QTableWidgetItem(text)
-                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-                self.table.setItem(r, c, item)
-        self.table.clearSelection()
-        self._show_removable()
+            self.table.show_records(self._shown)
+            self.table.clearSelection()
+            self._show_removable()
 
     def _choose(self, index: int) -> None:
         self.distances.marker = index
@@ -258,8 +239,8 @@ class DistancePage(Page):
         self.changed.emit()
 
     def _remove(self) -> None:
-        self.distances.remove(self.table.currentRow())
+        self.distances.remove(self.table.chosen_rows[0])
         self.changed.emit()
 
     def _show_removable(self) -> None:
-        self.remove_button.setEnabled(bool(self.table.selectedItems()))
+        self.remove_button.setEnabled(self.table.chosen is not None)

@@ -5,22 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QCheckBox,
-    QComboBox,
-    QDoubleSpinBox,
-    QFormLayout,
-    QHeaderView,
-    QLabel,
-    QTableWidget,
-    QTableWidgetItem,
-)
+from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox, QFormLayout, QHeaderView, QLabel
 
 from rhot_app.calibration.collect import Bar, Movement
 from rhot_app.calibration.filters.meters import BRISK_M_S, MOVING_M_S, FilterMeter, FilterTargets, MeterReading
@@ -30,12 +20,12 @@ from rhot_app.calibration.report import Report
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
+from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
-from rhot_app.ui.wizards.framework.movement_page import MovementPage, Movements
+from rhot_app.ui.wizards.framework.movement import MovementPage, Movements, MovementStep
 from rhot_app.ui.wizards.framework.page import ChartPage, shrinkable
-from rhot_app.ui.wizards.models.movement import MovementStep
-from rhot_app.ui.wizards.models.step import SolveStep, StepView
+from rhot_app.ui.wizards.framework.step import SolveStep, StepView
 
 STILL_S, FAST_S = 10.0, 15.0
 
@@ -265,14 +255,10 @@ class MeterPage(MovementPage):
         super().__init__(step, connect, states)
         self._feed = states
         self._meters = meters
-        self.table = QTableWidget(0, len(_HEADS))
-        self.table.setHorizontalHeaderLabels(list(_HEADS))
+        self.table: RecordTable[tuple[str, ...]] = RecordTable(
+            [Column(head, itemgetter(cell), number=cell > 0) for cell, head in enumerate(_HEADS)], selectable=False)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        self.table.verticalHeader().setVisible(False)
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
-        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        self.table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.table.setShowGrid(False)
         self.table.setToolTip("Of the last two seconds: jitter without filters and, at rest, with those in force, mm "
                               "rms; and how far the filters lag behind, ms, while a marker moves.")
@@ -286,14 +272,7 @@ class MeterPage(MovementPage):
         """The newest figures."""
         super().show_view(view)
         self._meters.watch(self._feed.recent())
-        rows = self._meters.rows()
-        self.table.setRowCount(len(rows))
-        for r, row in enumerate(rows):
-            for c, text in enumerate(row):
-                item = QTableWidgetItem(text)
-                if c:
-                    item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-                self.table.setItem(r, c, item)
+        self.table.show_records(self._meters.rows())
 
 
 class TunePage(ChartPage):

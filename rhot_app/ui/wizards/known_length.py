@@ -9,9 +9,9 @@ from rhot_app.calibration.stereo.calibrate import KnownLengths
 from rhot_app.calibration.stereo.ruler import RulerReading
 from rhot_app.simulator.scene.scene_description import RulerShow
 from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.wizards.framework.drawing import Dots, Line, Overlay
 from rhot_app.ui.wizards.framework.page import Page
-from rhot_app.ui.wizards.models.drawing import Dots, Line, Overlay
-from rhot_app.ui.wizards.models.step import Pictures, Step, StepView
+from rhot_app.ui.wizards.framework.step import Pictures, Step, StepView
 
 ENDS = 2
 NEEDED = ("The scale comes from the board's squares alone; a second length finds a wrong number. Next waits for one, "

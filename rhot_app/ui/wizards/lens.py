@@ -15,21 +15,19 @@ from rhot_app.calibration.lens.coverage import CaptureGuide, Coverage
 from rhot_app.calibration.lens.intrinsics import IntrinsicsReport
 from rhot_app.project import Intrinsics
 from rhot_app.ui.backend.feed import Image, Picture
-from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
-from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext, accept_result
-from rhot_app.ui.wizards.framework.films_page import FilmsPage
-from rhot_app.ui.wizards.framework.page import FigureTable, Page, shrinkable
-from rhot_app.ui.wizards.models.board_form import (
-    OTHER_BOARD,
+from rhot_app.ui.wizards.framework.board import (
+    MEMORY,
     BoardFields,
     BoardObservation,
-    BoardSearch,
+    BoardPage,
     BoardStep,
     fields_from,
 )
-from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Mark, Overlay, Tag
-from rhot_app.ui.wizards.models.films import FilmedStep, Films
-from rhot_app.ui.wizards.models.step import Bar, Pictures, SolveStep, StepView
+from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext, accept_result
+from rhot_app.ui.wizards.framework.drawing import Cells, Dots, Line, Mark, Overlay, Tag
+from rhot_app.ui.wizards.framework.films import FilmedStep, Films, FilmsPage
+from rhot_app.ui.wizards.framework.page import FigureTable, Page, shrinkable
+from rhot_app.ui.wizards.framework.step import Bar, Pictures, SolveStep, StepView
 
 LAST = "lens camera"
 
@@ -90,10 +88,10 @@ class LensShowStep(FilmedStep):
     watches = captures = True
 
     def __init__(self, board_step: LensBoardStep) -> None:
+        super().__init__()
         self._board_step = board_step
         self._guide: CaptureGuide | None = None
         self._of: tuple[str, Board] | None = None
-        self._search = BoardSearch()
         self._seen: tuple[BoardView | None, float] = (None, 0.0)
         self._sentence = ""
         self.films = Films(())
@@ -118,8 +116,7 @@ class LensShowStep(FilmedStep):
         assert board is not None, "the first step is not done without a board"
         self._of, self._guide = (camera, board), CaptureGuide(board)
         self._seen, self._sentence, self._covered = (None, 0.0), "", None
-        self._search.forget()
-        self.films.forget_read()
+        super().begin()
 
     def keep(self, shot: BoardShot) -> None:
         """Take what a film shows at one moment."""
@@ -156,23 +153,23 @@ class LensShowStep(FilmedStep):
     def observe(self, pictures: Pictures) -> tuple[str, BoardObservation, float]:
         """The board in the picture, and when that was taken, s of the node's clock."""
         camera = self.camera
-        return (camera, self._search.look({camera: pictures[camera]}, self.board),
+        return (camera, self.search.look({camera: pictures[camera]}, self.board),
                 1e-9 * pictures[camera].t_node_ns)
 
     def accept_observation(self, seen: tuple[str, BoardObservation, float]) -> None:
         """Offer what is seen; the guide decides and says what to do."""
         camera, look, t_s = seen
         if self._guide is not None and (camera, look.board) == self._of and not self.films.paths:
-            self._search.accept_observation(look)
+            self.search.accept_observation(look)
             view = look.views[camera]
             self._seen = view, t_s
-            if self._search.size_finding(self.board) is None:
+            if self.other_board is None:
                 self._sentence = self._guide.offer(view, t_s).sentence
 
     def capture(self) -> bool:
         """Space: take what is seen now, unless it adds nothing or is blurred."""
         view, t_s = self._seen
-        if self._guide is None or view is None or self.films.paths or self._search.size_finding(self.board) is not None:
+        if self._guide is None or view is None or self.films.paths or self.other_board is not None:
             return False
         decision = self._guide.offer(view, t_s + _VOUCHED_S)
         self._sentence = decision.sentence
@@ -185,12 +182,8 @@ class LensShowStep(FilmedStep):
         self._guide.discard_last()
         return True
 
-    def view(self) -> StepView:
+    def shown(self) -> StepView:
         """What to do with the board, and what is covered."""
-        shown = self._live_view()
-        return self.films.view(shown) if self.films.paths else shown
-
-    def _live_view(self) -> StepView:
         if self._guide is None:
             return StepView("Show the whole board to the camera.")
         count = len(self.views)
@@ -200,14 +193,10 @@ class LensShowStep(FilmedStep):
         bars = [Bar(_BARS[key][0], share, _BARS[key][1]) for key, share in coverage.bars.items()]
         bars.append(Bar("picture", min(coverage.share / 0.7, 1.0), "parts of the picture in which corners were seen"))
         overlay: Overlay = (Cells(coverage.cells / _CELL_FULL),)
-        annotated = self._search.annotated(self.board)
-        wrong = self._search.size_finding(self.board)
-        if wrong is not None:
-            return StepView(OTHER_BOARD, hint=f"{wrong.figure} {wrong.cause}", bars=tuple(bars),
-                            annotated=annotated, overlays={self.camera: overlay}, kept=count)
+        annotated = self.search.annotated(self.board)
         sentence = "Enough: press Next." if complete else self._sentence or "Show the whole board to the camera."
         taken = f"{count} pictures taken." if count else ""
-        return StepView(sentence, done=complete, hint=self._search.missing or taken, bars=tuple(bars),
+        return StepView(sentence, done=complete, hint=self.search.missing or taken, bars=tuple(bars),
                         annotated=annotated, overlays={self.camera: overlay}, kept=count, passable=count >= FEWEST)
 
 

@@ -16,15 +16,20 @@ from rhot_app.calibration.stereo.collector import Guidance, Offer, StereoCollect
 from rhot_app.calibration.stereo.report import StereoReport
 from rhot_app.calibration.stereo.start import WorldFrame, place_world
 from rhot_app.errors import CalibrationError
-from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
+from rhot_app.ui.wizards.framework.board import (
+    MEMORY,
+    BoardObservation,
+    BoardPage,
+    BoardSearch,
+    BoardStep,
+    fields_from,
+)
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
-from rhot_app.ui.wizards.framework.films_page import FilmsPage
+from rhot_app.ui.wizards.framework.drawing import Dots, Overlay
+from rhot_app.ui.wizards.framework.films import FilmedStep, Films, FilmsPage
 from rhot_app.ui.wizards.framework.page import Page
+from rhot_app.ui.wizards.framework.step import AnnotatedPicture, Bar, Pictures, SolveStep, Step, StepView
 from rhot_app.ui.wizards.known_length import LengthsPage, LengthsStep
-from rhot_app.ui.wizards.models.board_form import OTHER_BOARD, BoardObservation, BoardSearch, BoardStep, fields_from
-from rhot_app.ui.wizards.models.drawing import Dots, Overlay
-from rhot_app.ui.wizards.models.films import FilmedStep, Films
-from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Pictures, SolveStep, Step, StepView
 
 
 def make_wizard(context: WizardContext) -> Definition:
@@ -105,8 +110,7 @@ class ShowStep(BoardFinder, FilmedStep):
         """Forget what was kept."""
         self._of, self._collector = self.board, StereoCollector(self.cameras or (), self.board)
         self._offer, self._guidance = Offer(False, ""), None
-        self.search.forget()
-        self.films.forget_read()
+        super().begin()
 
     def keep(self, shot: BoardShot) -> None:
         """Take what films show at one moment."""
@@ -135,7 +139,7 @@ class ShowStep(BoardFinder, FilmedStep):
         return not self.films.paths and self._put(still=True)
 
     def _put(self, *, still: bool) -> bool:
-        if self._collector is None or self.search.size_finding(self.board) is not None:
+        if self._collector is None or self.other_board is not None:
             return False
         self._offer = self._collector.offer([self.seen[name] for name in self.cameras or ()], still=still)
         return self._offer.taken
@@ -147,19 +151,11 @@ class ShowStep(BoardFinder, FilmedStep):
         self._collector.discard_last()
         return True
 
-    def view(self) -> StepView:
+    def shown(self) -> StepView:
         """What to do with the board, and how far it is."""
-        shown = self._live_view()
-        return self.films.view(shown) if self.films.paths else shown
-
-    def _live_view(self) -> StepView:
         if self._collector is None:
             return StepView("Show the board to both cameras.")
         shots = self.views.shots
-        wrong = self.search.size_finding(self.board)
-        if wrong is not None:
-            return StepView(OTHER_BOARD, hint=f"{wrong.figure} {wrong.cause}", annotated=self._annotated(),
-                            overlays=self._overlays(shots), kept=len(shots))
         if self._guidance is None or len(shots) != self._guided:
             self._guidance, self._guided = self._collector.guidance(), len(shots)
         guidance = self._guidance

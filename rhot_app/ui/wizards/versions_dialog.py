@@ -83,11 +83,11 @@ class VersionsDialog(QDialog):
         try:
             rows = rows_of(self._rig, rig_history.load_version(self._path, self._versions[number]))
         except RhotError as exc:
-            self.table.show_rows(())
+            self.table.show_records(())
             self.sentence.setText(str(exc))
             self.back_button.setEnabled(False)
             return
-        self.table.show_rows(rows)
+        self.table.show_records(rows)
         self.back_button.setEnabled(bool(rows))
         self.sentence.setText("" if rows else "This version says the same as the rig does now.")
 

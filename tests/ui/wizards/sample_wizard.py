@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QSpinBox
 from rhot_app.calibration.proposal import Proposal, Row
 from rhot_app.calibration.verdict import Finding, Grade, judge
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
+from rhot_app.ui.wizards.framework.drawing import Cells, Dots, Line, Tag
 from rhot_app.ui.wizards.framework.page import Page
-from rhot_app.ui.wizards.models.drawing import Cells, Dots, Line, Tag
-from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Step, StepView, Task
+from rhot_app.ui.wizards.framework.step import AnnotatedPicture, Bar, Step, StepView, Task
 
 
 class FormStep(Step):

@@ -25,7 +25,7 @@ from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.models.proposal import use_all
 from rhot_app.ui.wizards import alignment
 from rhot_app.ui.wizards.alignment import TogetherStep
-from rhot_app.ui.wizards.models.step import AcceptStep
+from rhot_app.ui.wizards.framework.step import AcceptStep
 
 MARKERS = synthetic_rig().markers.ids
 
@@ -62,7 +62,7 @@ def test_from_another_tracker_to_a_file_beside_the_rig_and_back(open_wizard):
     hands.keep("alignment-result")
     hands.next()
     hands.keep("alignment-accept", 8)
-    assert hands.window.page.table.item(0, 1).text() == "none" and not path.exists()
+    assert hands.window.page.table.text(0, 1) == "none" and not path.exists()
     hands.use()
     check(load_alignment(path))
     hands.restore()

@@ -18,9 +18,15 @@ from wizard_rig import FakeSettingsStore
 from rhot_app.__main__ import main
 from rhot_app.calibration.board.boards import STANDARD_BOARD, AprilGrid, CharucoBoard, Chessboard, CircleGrid
 from rhot_app.calibration.board.size_check import Beyond
-from rhot_app.ui.wizards.framework.board_page import MEMORY, BoardPage
-from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep, fields_from, remembered_fields
-from rhot_app.ui.wizards.models.drawing import Dots
+from rhot_app.ui.wizards.framework.board import (
+    MEMORY,
+    BoardFields,
+    BoardPage,
+    BoardStep,
+    fields_from,
+    remembered_fields,
+)
+from rhot_app.ui.wizards.framework.drawing import Dots
 
 MEASURED = BoardFields(square_mm=25.0)
 

@@ -23,8 +23,8 @@ from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import load_rig
 from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
 from rhot_app.ui.wizards.bones import SweepGuide, make_guide
-from rhot_app.ui.wizards.models.movement import QuietGuide
-from rhot_app.ui.wizards.models.step import Bar
+from rhot_app.ui.wizards.framework.movement import QuietGuide
+from rhot_app.ui.wizards.framework.step import Bar
 
 SECONDS = 8.0
 SIZE = 1.06
@@ -60,10 +60,10 @@ def test_from_a_movement_to_a_rig_with_that_hand(hands):
     hands.record()
     hands.next()
     report, page = hands.solved(), hands.window.page
-    assert page.table.rowCount() == 15
-    words = {page.table.item(row, 3).text() for row in range(15)}
+    assert page.table.records_model.rowCount() == 15
+    words = {page.table.text(row, 3) for row in range(15)}
     assert "observed" not in words, "six markers show no single phalanx"
-    styles = {page.table.item(row, 3).background().style() for row in range(15)}
+    styles = {page.table.records_model.index(row, 3).data(Qt.ItemDataRole.BackgroundRole).style() for row in range(15)}
     assert Qt.BrushStyle.BDiagPattern in styles, "what is only usual is hatched"
     assert "index" in page.reaches.text()
     before = load_rig(hands.path).hand

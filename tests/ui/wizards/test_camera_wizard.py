@@ -14,10 +14,9 @@ from wizard_rig import FakeRigAsker, FakeSettingsStore
 from rhot_app.calibration.registry import InForce, calibration
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.palette import DARK
-from rhot_app.ui.wizards.camera import make_wizard
+from rhot_app.ui.wizards.camera import CONTROLS, CameraChoices, CameraEye, SettingsStep, make_wizard
 from rhot_app.ui.wizards.framework.definition import WizardContext
-from rhot_app.ui.wizards.models.drawing import Layer
-from rhot_app.ui.wizards.steps.camera_steps import CONTROLS, CameraChoices, CameraEye, SettingsStep
+from rhot_app.ui.wizards.framework.drawing import Layer
 from rhot_node.config import CameraSettings
 
 EXPOSURE, RED = CONTROLS[0], CONTROLS[5]
@@ -84,7 +83,7 @@ def test_from_a_dark_picture_to_saved_settings(hands, asker):
     hands.until(lambda: exposures(asker) == [5000.0, 5000.0])
     hands.until(lambda: hands.verdict is not None)
     hands.next()
-    assert hands.window.page.table.item(0, 2).text() == "5.00 ms"
+    assert hands.window.page.table.text(0, 2) == "5.00 ms"
     assert "any time" not in hands.window.page.note.text(), "nodes keep no earlier settings"
     hands.use()
     assert asker.saved == [1, 2] and exposures(asker) == [5000.0, 5000.0]
@@ -108,7 +107,7 @@ def test_a_good_check_is_a_result_and_ticks_the_menu(hands, asker):
     told = []
     hands.window.used.connect(lambda proposal, on: told.append((proposal.reason, proposal.rig, on)))
     hands.next()
-    assert hands.window.page.table.rowCount() > 0
+    assert hands.window.page.table.records_model.rowCount() > 0
     hands.use()
     assert told == [("camera settings", None, True)] and asker.saved == []
 

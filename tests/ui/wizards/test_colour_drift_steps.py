@@ -17,8 +17,9 @@ from rhot_app.calibration.registry import InForce, calibration
 from rhot_app.calibration.verdict import Grade
 from rhot_app.project import Rig
 from rhot_app.ui.backend.feed import Picture
-from rhot_app.ui.wizards.steps.colour_pick import PickStep
-from rhot_app.ui.wizards.steps.colour_result import BoundsStep, SeparationStep
+from rhot_app.ui.wizards.colours.bounds import BoundsStep
+from rhot_app.ui.wizards.colours.pick import PickStep
+from rhot_app.ui.wizards.colours.separation import SeparationStep
 from rhot_node.detect.illuminant import gains_of
 from rhot_node.detect.image import to_bgr
 

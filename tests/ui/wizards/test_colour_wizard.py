@@ -19,11 +19,12 @@ from rhot_app.calibration.registry import InForce, calibration
 from rhot_app.project import load_rig
 from rhot_app.ui.common.theme import apply_theme
 from rhot_app.ui.models.palette import DARK, SCHEMES, contrast
-from rhot_app.ui.wizards.colours import MaskChoice
+from rhot_app.ui.wizards.colours.bounds import BoundsStep
+from rhot_app.ui.wizards.colours.masks import MaskChoice
+from rhot_app.ui.wizards.colours.pick import PickStep
+from rhot_app.ui.wizards.colours.separation import SeparationStep
+from rhot_app.ui.wizards.framework.drawing import Callout, Layer
 from rhot_app.ui.wizards.framework.picture_painter import callout_boxes, fit
-from rhot_app.ui.wizards.models.drawing import Callout, Layer
-from rhot_app.ui.wizards.steps.colour_pick import PickStep
-from rhot_app.ui.wizards.steps.colour_result import BoundsStep, SeparationStep
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
 
@@ -117,7 +118,7 @@ def learnt(step):
     step.enter()
     task = step.task()
     if task is not None:
-        step.take_result(task.function(*task.arguments, progress=lambda text, fraction: None, **task.options))
+        step.take_result(task.function(*task.arguments, progress=lambda text, fraction: None))
     return step
 
 
@@ -134,8 +135,8 @@ def test_from_clicks_to_a_rig_and_nodes_with_the_new_colours(hands, scene):
     scene.moving = True
     hands.until(lambda: hands.window.step.view().done)
     page = hands.window.page
-    assert [page.list.item(row, 1).text() for row in range(7)] == [*PAINTS, SKIN]
-    hands.until(lambda: int(page.list.item(0, 2).text()) >= 10)
+    assert [page.list.text(row, 1) for row in range(7)] == [*PAINTS, SKIN]
+    hands.until(lambda: int(page.list.text(0, 2)) >= 10)
     scene.moving = False
     hands.next()
     hands.solved()
@@ -144,10 +145,11 @@ def test_from_clicks_to_a_rig_and_nodes_with_the_new_colours(hands, scene):
     hands.solved()
     assert hands.verdict.acceptable
     page = hands.window.page
-    assert page.table.rowCount() == 6 and page.table.horizontalHeaderItem(6).text() == SKIN
-    assert int(page.table.item(0, 0).text()) >= 90 and page.charts.plots
+    assert page.table.records_model.rowCount() == 6 and page.table.heads()[7] == SKIN
+    assert int(page.table.text(0, 1)) >= 90 and page.charts.plots
     hands.next()
-    assert not any(hands.window.page.table.item(0, column).icon().isNull() for column in (1, 2))
+    model = hands.window.page.table.records_model
+    assert not any(model.index(0, column).data(Qt.ItemDataRole.DecorationRole).isNull() for column in (1, 2))
     hands.use()
     saved = load_rig(hands.path).markers
     assert all(settings.markers == saved for settings in hands.asker.settings.values())
@@ -173,7 +175,7 @@ def move_a_bound(hands):
         QTest.keyClick(box, Qt.Key.Key_Tab)
 
     enter(7.0)
-    assert step.model("thumb").hue_tolerance_deg == 7.0 and "by hand" in page.list.item(0, 2).text()
+    assert step.model("thumb").hue_tolerance_deg == 7.0 and "by hand" in page.list.text(0, 2)
     hands.undo()
     assert step.model("thumb").hue_tolerance_deg == learnt and box.value() == pytest.approx(learnt, abs=0.05)
     enter(7.0)

@@ -17,7 +17,7 @@ from rhot_app.project import CameraCalibration, load_rig
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.wizards import depth
 from rhot_app.ui.wizards.depth import DistanceStep
-from rhot_app.ui.wizards.models.drawing import Dots
+from rhot_app.ui.wizards.framework.drawing import Dots
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
 
@@ -70,13 +70,13 @@ def test_from_distances_to_a_rig_that_uses_them(open_wizard, marker):
     assert page.distances.rows == [] and not hands.frame.next_button.isEnabled()
     for distance_cm in DISTANCES_CM:
         measure(distance_cm)
-    assert page.table.rowCount() == len(DISTANCES_CM)
+    assert page.table.records_model.rowCount() == len(DISTANCES_CM)
     hands.next()
     assert hands.title == "The law" and hands.window.page.charts.plots
     assert "replaces_calibration" in hands.verdict.codes
     hands.next()
     assert "replaces_calibration" in hands.verdict.codes and hands.verdict.grade is Grade.FAIR
-    assert "distance from" in hands.window.page.table.item(0, 0).text()
+    assert "distance from" in hands.window.page.table.text(0, 0)
     hands.use()
     saved = load_rig(hands.path).depth
     assert saved.mode == "disparity"

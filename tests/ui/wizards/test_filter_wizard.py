@@ -60,7 +60,7 @@ def hands(open_wizard):
 
 
 def test_from_two_movements_to_a_rig_with_other_filters(hands):
-    hands.until(lambda: hands.window.page.table.rowCount() == 6)
+    hands.until(lambda: hands.window.page.table.records_model.rowCount() == 6)
     hands.record()
     hands.next()
     hands.record()
@@ -90,7 +90,7 @@ def test_from_two_movements_to_a_rig_with_other_filters(hands):
 def test_a_hand_that_moved_is_no_hand_held_still(hands):
     """Sentence, bar and tick say the same."""
     hands.hand.shake_m = 0.1
-    hands.until(lambda: hands.window.page.table.rowCount() == 6)
+    hands.until(lambda: hands.window.page.table.records_model.rowCount() == 6)
     hands.key(Qt.Key.Key_Space)
     hands.until(lambda: hands.window.step.phase == "recording" and "moves" in hands.sentence)
     hands.key(Qt.Key.Key_Space)

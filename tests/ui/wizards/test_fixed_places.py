@@ -26,9 +26,9 @@ from rhot_app.ui.simulated_rig_menus import FIRST, THINGS
 from rhot_app.ui.wizards import framework, models, steps
 from rhot_app.ui.wizards.framework.definition import WizardContext
 from rhot_app.ui.wizards.framework.frame import WizardFrame
+from rhot_app.ui.wizards.framework.step import StepView
 from rhot_app.ui.wizards.framework.work import Work
 from rhot_app.ui.wizards.launcher import make_wizard
-from rhot_app.ui.wizards.models.step import StepView
 from rhot_node.files import resource_path
 
 SIZES = ((1280, 800), (1024, 700))

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from fake_engine import synthetic_rig
 from patience import PATIENCE_S, eventually, settled
+from rhot_app.ui.wizards.steps import foreground_steps
 from wizard_rig import FakeRigAsker
 
 from rhot_app.errors import EngineError
 from rhot_app.ui.models.proposal import restore_all, use_all
-from rhot_app.ui.wizards.steps import foreground_steps
-from rhot_app.ui.wizards.steps.foreground_steps import EmptyStep, SceneWatch, SkinStep, findings_of, mask_of, propose
+from rhot_app.ui.wizards.foreground import EmptyStep, SceneWatch, SkinStep, findings_of, mask_of, propose
 from rhot_node.foreground_store import ForegroundStore
 from rhot_node.network.pictures import PictureBox, encode_still
 
@@ -97,7 +97,7 @@ def test_from_an_empty_scene_to_what_the_nodes_keep(hands, nodes):
         assert not store.path.exists(), "nothing is kept before the last step"
     hands.keep("foreground-hand")
     hands.next()
-    assert hands.window.page.table.rowCount() == 4
+    assert hands.window.page.table.records_model.rowCount() == 4
     hands.use()
     assert nodes.saved == [1, 2]
     assert all(ForegroundStore(store.path).report(640, 480)["background"] for store in nodes.stores.values())

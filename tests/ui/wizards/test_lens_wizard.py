@@ -12,9 +12,9 @@ from wizard_rig import FakeRigAsker
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.calibration.kinds.lens import what_follows
 from rhot_app.project import Intrinsics, Rig, RigNode, load_rig
+from rhot_app.ui.wizards.framework.board import BoardFields
+from rhot_app.ui.wizards.framework.drawing import Cells, Line
 from rhot_app.ui.wizards.lens import LAST, LensBoardStep, LensShowStep, straightened
-from rhot_app.ui.wizards.models.board_form import BoardFields
-from rhot_app.ui.wizards.models.drawing import Cells, Line
 
 TRUE_F = 530.0
 PLACES = [((0.0, 0.0, 0.0), (0.0, 0.0, 0.417)), ((0.0, 0.0, 0.0), (-0.142, -0.083, 0.417)),
@@ -63,9 +63,9 @@ def test_from_the_board_to_a_saved_lens(hands, scene):
     hands.solved()
     assert hands.verdict.acceptable, hands.verdict
     assert any(isinstance(mark, Line) for mark in wall["left"].overlay), "residuals are drawn"
-    assert hands.window.page.table.rowCount() >= 10
+    assert hands.window.page.table.records_model.rowCount() >= 10
     hands.next()
-    assert hands.window.page.table.item(0, 1).text() == "572.0, 572.0 px"
+    assert hands.window.page.table.text(0, 1) == "572.0, 572.0 px"
     hands.use()
     assert "then stereo" in hands.hint
     left, right = load_rig(hands.path).nodes

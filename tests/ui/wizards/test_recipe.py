@@ -46,7 +46,7 @@ def test_it_is_in_the_menu_and_its_wizard_works(toy, make_bench, tmp_path):
     level = hands.solved()
     hands.next()
     table = hands.window.page.table
-    assert [table.item(0, column).text() for column in (0, 2)] == ["grey level", f"{level:.0f}"], "the report's figure"
+    assert [table.text(0, column) for column in (0, 2)] == ["grey level", f"{level:.0f}"], "the report's figure"
     hands.use()
     hands.next()
     bench.until(lambda: window.wizards.wizard is None)

@@ -22,9 +22,9 @@ from rhot_app.calibration.stereo.calibrate import lens_of
 from rhot_app.estimation.se3 import rotation_from_quaternion
 from rhot_app.project import CameraPose, load_rig
 from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.wizards.framework.board import BoardFields, BoardStep
 from rhot_app.ui.wizards.framework.definition import Definition
 from rhot_app.ui.wizards.known_length import LengthsPage, LengthsStep
-from rhot_app.ui.wizards.models.board_form import BoardFields, BoardStep
 from rhot_app.ui.wizards.stereo import ShowStep
 
 CAMERAS = ("left", "right")
@@ -91,7 +91,7 @@ def test_from_the_board_to_a_saved_rig(hands, scene):
     hands.key(Qt.Key.Key_Space)
     hands.until(lambda: hands.window.step.view().done)
     hands.next()
-    texts = [hands.window.page.table.item(0, column).text() for column in range(3)]
+    texts = [hands.window.page.table.text(0, column) for column in range(3)]
     assert load_rig(hands.path).calibration == EXACT, "nothing is written yet"
     assert texts[0] == "left to right: distance" and texts[1] == "60.00 mm"
     assert float(texts[2].split(" ± ")[0]) == pytest.approx(75.0, abs=0.2)

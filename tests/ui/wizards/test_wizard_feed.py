@@ -22,7 +22,7 @@ from rhot_app.ui.backend.reader import Reader
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.backend.solver_process import NICENESS as SOLVER_NICENESS
 from rhot_app.ui.wizards.framework.picture_worker import PictureWorker
-from rhot_app.ui.wizards.models.step import Step
+from rhot_app.ui.wizards.framework.step import Step
 
 
 @pytest.fixture

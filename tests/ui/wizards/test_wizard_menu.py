@@ -89,7 +89,7 @@ def test_an_earlier_version_is_brought_back_and_that_is_undone(bench):
     bench.until(lambda: bench.window.wizards.versions is not None)
     dialog = bench.window.wizards.versions
     assert "before time calibration" in dialog.list.item(0).text()
-    assert [dialog.table.item(0, c).text() for c in range(3)] == [
+    assert [dialog.table.text(0, c) for c in range(3)] == [
         "right: time offset", "2.00 ms, not measured", "0.00 ms, not measured"]
     check("earlier-calibrations", dialog.grab().toImage(), 8)
     bench.click(dialog.back_button)

@@ -18,8 +18,8 @@ from rhot_app.errors import EngineError, RigError
 from rhot_app.project import load_rig, save_rig
 from rhot_app.ui.models.proposal import RigChange, changes_of, use_all, ways_back
 from rhot_app.ui.models.words import Remaining
+from rhot_app.ui.wizards.framework.step import AcceptStep, SolveStep, StepView
 from rhot_app.ui.wizards.launcher import age_text
-from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep, StepView
 
 
 @pytest.fixture

@@ -6,11 +6,10 @@ from typing import Any
 
 from rhot_app.calibration.collect import Bar, Measurements, Movement, WhileTracking
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
-from rhot_app.ui.wizards.framework.movement_page import Movements
+from rhot_app.ui.wizards.framework.movement import Movements, MovementStep
 from rhot_app.ui.wizards.framework.page import ChartPage, Page
+from rhot_app.ui.wizards.framework.step import Pictures, SolveStep, Step, StepView
 from rhot_app.ui.wizards.framework.while_tracking import ask_engine
-from rhot_app.ui.wizards.models.movement import MovementStep
-from rhot_app.ui.wizards.models.step import Pictures, SolveStep, Step, StepView
 
 
 def make_wizard(context: WizardContext) -> Definition:

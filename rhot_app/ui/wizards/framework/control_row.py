@@ -1,14 +1,36 @@
-"""One camera setting on the screen: told or left to the camera, a number to type and a slider to move."""
+"""One setting on the screen: told or left to the camera, a number to type and a slider to move."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QGridLayout, QSlider, QWidget
 
-from rhot_app.ui.wizards.steps.camera_steps import Control, Value
+Value = float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """One setting: its field in `CameraSettings`, its name, what it does. `low`..`high` is what the slider covers, in
+    units of the field divided by `scale`; typed numbers may go to `most`. `optional`: it may be left to the camera."""
+
+    field: str
+    name: str
+    meaning: str
+    low: float
+    high: float
+    most: float
+    neutral: float
+    unit: str = ""
+    scale: float = 1.0
+    decimals: int = 2
+    optional: bool = True
+    logarithmic: bool = False
+    least: float = 0.0
+
 
 _STEPS = 400
 

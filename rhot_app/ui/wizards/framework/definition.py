@@ -13,7 +13,7 @@ from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
-from rhot_app.ui.wizards.models.step import AcceptStep, SolveStep
+from rhot_app.ui.wizards.framework.step import AcceptStep, SolveStep
 
 # -- What wizards remember between runs --------------------------------------------------------------------------------
 

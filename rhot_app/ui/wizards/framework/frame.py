@@ -26,8 +26,8 @@ from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import Definition
 from rhot_app.ui.wizards.framework.page import Page, VerdictView
 from rhot_app.ui.wizards.framework.picture_view import PictureGrid
+from rhot_app.ui.wizards.framework.step import AcceptStep, Bar, Step, StepView
 from rhot_app.ui.wizards.framework.work import Work
-from rhot_app.ui.wizards.models.step import AcceptStep, Bar, Step, StepView
 
 SENTENCE_PT, SMALLEST_PT = 21.0, 13.0
 """Letters 5 mm high on a usual screen, readable from two metres; a sentence of more than four lines gets smaller ones.

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+from operator import attrgetter, itemgetter
+from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt, Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QGridLayout,
     QHeaderView,
     QLabel,
@@ -18,8 +21,6 @@ from PySide6.QtWidgets import (
     QSizePolicy,
     QStyledItemDelegate,
     QStyleOptionViewItem,
-    QTableWidget,
-    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -30,13 +31,14 @@ from rhot_app.calibration.verdict import Finding, Verdict
 from rhot_app.charts import Chart, Curve, Span, ticks
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.disposal import plot_widget
+from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.common.theme import CELL_PADDING_PX, app_font
 from rhot_app.ui.models.palette import Scheme, visible_on
 from rhot_app.ui.models.proposal import ways_back
 from rhot_app.ui.models.words import GRADES
-from rhot_app.ui.wizards.framework.colour_list import swatch
-from rhot_app.ui.wizards.models.step import AcceptStep, ChartedStep, Step, StepView
+from rhot_app.ui.wizards.framework.step import AcceptStep, ChartedStep, Step, StepView
+from rhot_app.ui.wizards.framework.swatches import swatch
 
 
 class Page(QWidget):
@@ -83,11 +85,11 @@ class AcceptPage(Page):
 
     restore_asked = Signal()
 
-    def __init__(self, step: AcceptStep, scheme: Scheme) -> None:
+    def __init__(self, step: AcceptStep, scheme: Scheme, heads: tuple[str, str, str] = HEADS) -> None:
         super().__init__(step)
         self.accept = step
         self._rows: tuple[Row, ...] | None = None
-        self.table = RowTable(scheme)
+        self.table = RowTable(scheme, heads)
         self.centre = self.table
         self.restore_button = QPushButton("Restore the old one")
         self.restore_button.setAutoDefault(False)
@@ -109,7 +111,7 @@ class AcceptPage(Page):
         rows = proposal.rows if proposal is not None else ()
         if rows != self._rows:
             self._rows = rows
-            self.table.show_rows(rows)
+            self.table.show_records(rows)
         self.note.setText(f"Nothing was saved so far. {ways_back(self.accept.changes)}" if proposal is not None else
                           "")
         self.note.setVisible(self.accept.state == "proposed")
@@ -132,74 +134,52 @@ class _WrappedCell(QStyledItemDelegate):
         return super().sizeHint(left, index)
 
 
-class RowTable(QTableWidget):
+class RowTable(RecordTable[Row]):
     """Rows of before and after; what changes is bold."""
 
     def __init__(self, scheme: Scheme, heads: tuple[str, str, str] = HEADS) -> None:
-        super().__init__(0, len(heads))
-        self._scheme = scheme
-        self.setHorizontalHeaderLabels(list(heads))
-        self.verticalHeader().setVisible(False)
+        def roles(cell: int, row: Row) -> Mapping[int, Any]:
+            found: dict[int, Any] = {
+                Qt.ItemDataRole.FontRole: app_font(13.0, bold=cell == 2 and row.changed),
+                Qt.ItemDataRole.ForegroundRole: QColor(scheme.text if cell else scheme.muted)}
+            if row.swatches is not None and cell:
+                found[Qt.ItemDataRole.DecorationRole] = swatch(row.swatches[cell - 1], scheme)
+            return found
+
+        texts = (attrgetter("what"), attrgetter("before"), attrgetter("after"))
+        super().__init__([Column(head, text, roles=partial(roles, cell))
+                          for cell, (head, text) in enumerate(zip(heads, texts, strict=True))], selectable=False)
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setShowGrid(False)
-        self.setWordWrap(True)
         self.setItemDelegate(_WrappedCell(self))
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        self.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-
-    def show_rows(self, rows: tuple[Row, ...]) -> None:
-        """Show these instead of the last ones."""
-        self.setRowCount(len(rows))
-        for r, row in enumerate(rows):
-            for c, text in enumerate((row.what, row.before, row.after)):
-                item = QTableWidgetItem(text)
-                item.setFont(app_font(13.0, bold=c == 2 and row.changed))
-                item.setForeground(QColor(self._scheme.muted if c == 0 else self._scheme.text))
-                if row.swatches is not None and c:
-                    item.setIcon(swatch(row.swatches[c - 1], self._scheme))
-                self.setItem(r, c, item)
 
 
-class FigureTable(QTableWidget):
+class FigureTable(RecordTable[tuple[str, ...]]):
     """The first `columns` of a report's table, by default all; what its figures are of stands first."""
 
     def __init__(self, columns: int | None = None) -> None:
-        super().__init__()
-        self._columns = columns
-        self.verticalHeader().setVisible(False)
-        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        super().__init__((), selectable=False)
+        self._count = columns
+        self._shown: Table | None = None
         self.setShowGrid(False)
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        self._shown: Table | None = None
-
-    def cell(self, row: int, column: int) -> QTableWidgetItem:
-        """A cell that is filled."""
-        item = self.item(row, column)
-        assert item is not None
-        return item
 
     def show_table(self, table: Table | None) -> None:
         """Show it instead of the last one; the same object is not filled in again."""
-        if table is self._shown:
-            return
-        self._shown = table
-        heads, texts = (table.heads, table.texts) if table is not None else ((), [])
-        heads, texts = heads[:self._columns], [row[:self._columns] for row in texts]
-        self.setColumnCount(len(heads))
-        self.setHorizontalHeaderLabels(list(heads))
-        self.setRowCount(len(texts))
-        for r, row in enumerate(texts):
-            for c, text in enumerate(row):
-                item = QTableWidgetItem(text)
-                is_number = text[:1] in "-–0123456789"
-                item.setTextAlignment((Qt.AlignmentFlag.AlignRight if is_number else Qt.AlignmentFlag.AlignLeft)
-                                      | Qt.AlignmentFlag.AlignVCenter)
-                self.setItem(r, c, item)
+        if table is not self._shown:
+            self._shown = table
+            heads, texts = (table.heads, table.texts) if table is not None else ((), [])
+            self.show_records(texts, figure_columns(heads[:self._count]))
+
+
+def figure_columns(heads: Sequence[str]) -> list[Column[tuple[str, ...]]]:
+    """Columns of a row of texts: names at the left, numbers at the right."""
+    def alignment(cell: int, row: tuple[str, ...]) -> Mapping[int, Any]:
+        side = Qt.AlignmentFlag.AlignRight if row[cell][:1] in "-–0123456789" else Qt.AlignmentFlag.AlignLeft
+        return {Qt.ItemDataRole.TextAlignmentRole: side | Qt.AlignmentFlag.AlignVCenter}
+
+    return [Column(head, itemgetter(cell), roles=partial(alignment, cell)) for cell, head in enumerate(heads)]
 
 
 # -- Charts of a result in the middle of a wizard, one below the other -------------------------------------------------

@@ -1,4 +1,4 @@
-"""Paints what a step wants drawn over a picture (`models.drawing`)."""
+"""Paints what a step wants drawn over a picture (`framework.drawing`)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygo
 from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.label_layout import Box, place_at_sides
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.wizards.models.drawing import Array, Callout, Cells, Dots, Layer, Line, Mark, Overlay, Tag
+from rhot_app.ui.wizards.framework.drawing import Array, Callout, Cells, Dots, Layer, Line, Mark, Overlay, Tag
 
 _CELL_ALPHA = 60
 _SHADE_ALPHA = 60

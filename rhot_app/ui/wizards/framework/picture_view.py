@@ -12,9 +12,9 @@ from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 from rhot_app.ui.backend.feed import LiveFeed, Picture
 from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.wizards.framework.drawing import Callout, Overlay
 from rhot_app.ui.wizards.framework.picture_painter import FramePlacement, fit, paint_overlay
-from rhot_app.ui.wizards.models.drawing import Callout, Overlay
-from rhot_app.ui.wizards.models.step import StepView
+from rhot_app.ui.wizards.framework.step import StepView
 
 ANNOTATED_NS = 1_000_000_000
 """A picture that was looked at is shown while it is no more behind the newest one."""

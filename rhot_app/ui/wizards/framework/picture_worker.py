@@ -8,7 +8,7 @@ from typing import Any
 
 from rhot_app.ui.backend.feed import LiveFeed, Picture
 from rhot_app.ui.backend.reader import Reader
-from rhot_app.ui.wizards.models.step import Step
+from rhot_app.ui.wizards.framework.step import Step
 
 log = logging.getLogger(__name__)
 

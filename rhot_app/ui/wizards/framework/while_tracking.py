@@ -14,7 +14,7 @@ from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.reader import Reader
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
 from rhot_app.ui.wizards.framework.page import Page
-from rhot_app.ui.wizards.models.step import Step, StepView
+from rhot_app.ui.wizards.framework.step import Step, StepView
 
 ASK_S = 1.0
 

@@ -16,8 +16,8 @@ from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.frame import WizardFrame
 from rhot_app.ui.wizards.framework.page import AcceptPage
 from rhot_app.ui.wizards.framework.picture_worker import PictureWorker
+from rhot_app.ui.wizards.framework.step import AcceptStep, State, Step
 from rhot_app.ui.wizards.framework.work import Work
-from rhot_app.ui.wizards.models.step import AcceptStep, State, Step
 
 TICK_MS = 16
 SHOW_S = 0.1

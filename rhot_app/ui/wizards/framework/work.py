@@ -11,7 +11,7 @@ from rhot_app.errors import CalibrationError
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
 from rhot_app.ui.models.words import Remaining
-from rhot_app.ui.wizards.models.step import Step, Task
+from rhot_app.ui.wizards.framework.step import Step, Task
 
 CANCELLED = "Stopped. Go on with Begin again, or go back."
 
@@ -89,7 +89,7 @@ class Work(QObject):
 
     def _compute(self, task: Task, progress: Progress) -> Any:
         try:
-            return self.solver.run(task.function, task.arguments, progress.report, task.options)
+            return self.solver.run(task.function, task.arguments, progress.report)
         except StoppedError as exc:
             if progress.cancelled:
                 raise CancelledError("Cancelled.") from exc

@@ -19,7 +19,7 @@ from rhot_app.calibration.verdict import Verdict
 from rhot_app.charts import Chart
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.models.proposal import changes_of, restore_all, use_all
-from rhot_app.ui.wizards.models.drawing import Overlay
+from rhot_app.ui.wizards.framework.drawing import Overlay
 
 Pictures = Mapping[str, Picture]
 """One picture per camera's name, taken as nearly at the same time as the nodes deliver them."""
@@ -27,7 +27,7 @@ Pictures = Mapping[str, Picture]
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """Long work: ``function(*arguments, progress=..., **options)`` runs in a process of its own, so all must pickle.
+    """Long work: ``function(*arguments, progress=...)`` runs in a process of its own, so all must pickle.
 
     `function` stands in a module without Qt and takes a `rhot_app.progress.Progress`.
     """
@@ -35,7 +35,6 @@ class Task:
     title: str
     function: Callable[..., Any]
     arguments: tuple[Any, ...] = ()
-    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

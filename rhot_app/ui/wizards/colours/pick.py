@@ -1,133 +1,23 @@
-"""The step in which a person shows which paint is which marker, and moves the hand until enough of it was seen."""
+"""The first page: a person shows which paint is which marker, and moves the hand until enough of it was seen."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
-
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
-from rhot_app.calibration.colour.cause import Cause, Explainer
 from rhot_app.calibration.colour.gathering import ColourGathering
 from rhot_app.calibration.colour.identity import Identity, identify
-from rhot_app.calibration.colour.illuminant import DriftReport, IlluminantDrift, drift_findings
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.backend.feed import Picture
-from rhot_app.ui.wizards.models.drawing import Callout, Dots, Layer, Overlay
-from rhot_app.ui.wizards.models.step import AnnotatedPicture, Bar, Pictures, Step, StepView
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.wizards.colours.masks import MaskChoice, MaskedPictures, MaskMaker, Show, annotated_by_masks, drift_of
+from rhot_app.ui.wizards.colours.paint_list import PaintList, PaintRow, paint_button
+from rhot_app.ui.wizards.framework.page import Page, shrinkable
+from rhot_app.ui.wizards.framework.step import AnnotatedPicture, Bar, Pictures, Step, StepView
 from rhot_node.detect.colour import learn_chroma_from_colours
-from rhot_node.detect.fast import FastDetector
-from rhot_node.detect.image import YuvImage, from_bgr
+from rhot_node.detect.image import from_bgr
 from rhot_node.markers import MarkerSet
-from rhot_node.wire.messages import MarkerObservation
-
-# -- Live detection with masks -----------------------------------------------------------------------------------------
-
-_DIMMED = 150  # alpha of the black over everything that is taken for no marker
-_FAINT = 70  # alpha of a marker's colour where it was not asked for
-
-Show = Literal["all", "chosen", "none"]
-"""Whose mask lies over the pictures."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MaskedPicture:
-    """One camera's `picture` as its detector sees it: `labels` (H/2, W/2) 1 + index of the marker, 0 for none; `drift`:
-    how the light of the last pictures stands to the one that the marker set was learnt in; `causes`: by index, why the
-    markers that were asked for are not found, or found in doubt."""
-
-    picture: Picture
-    image: YuvImage
-    labels: NDArray[np.uint8]
-    seen: tuple[MarkerObservation, ...]
-    drift: DriftReport
-    causes: Mapping[int, Cause]
-
-    def why(self, index: int) -> str:
-        """In words, why a marker is not found or in doubt; empty for one in plain view."""
-        cause = self.causes.get(index)
-        return "" if cause is None else f"{'doubtful' if self.seen[index].found else 'not found'}. {cause.sentence}"
-
-
-MaskedPictures = dict[str, MaskedPicture]
-
-
-class MaskMaker:
-    """Detectors of all cameras for one marker set after the other. One thread only."""
-
-    def __init__(self) -> None:
-        self._markers: MarkerSet | None = None
-        self._detectors: dict[str, FastDetector] = {}
-        self._drifts: dict[str, IlluminantDrift] = {}
-        self._explainer: Explainer | None = None
-
-    def look(self, pictures: Pictures, markers: MarkerSet, asked: Sequence[str] = ()) -> MaskedPictures:
-        """What every camera's detector finds with `markers`, and why it does not find those that are `asked` for."""
-        if markers is not self._markers:
-            self._markers, self._detectors, self._drifts, self._explainer = markers, {}, {}, None
-        masked = {}
-        for name, picture in pictures.items():
-            detector = self._detectors.setdefault(name, FastDetector(markers))
-            image = from_bgr(picture.bgr)
-            seen = detector.detect(image)
-            drift = self._drifts.setdefault(name, IlluminantDrift(markers, detector))
-            drift.update(image, seen)
-            causes = self._causes(detector, image, seen, [marker for marker in asked if marker in markers.ids])
-            masked[name] = MaskedPicture(picture, image, detector.labels(image), seen, drift.report(), causes)
-        return masked
-
-    def _causes(self, detector: FastDetector, image: YuvImage, seen: tuple[MarkerObservation, ...],
-                asked: Sequence[str]) -> dict[int, Cause]:
-        """Why those of the markers `asked` for that are not in plain view are not, by index."""
-        assert self._markers is not None
-        causes: dict[int, Cause] = {}
-        for index in map(self._markers.ids.index, asked):
-            if seen[index].found:
-                cause = Explainer.doubt(seen, index)
-            else:
-                self._explainer = self._explainer or Explainer(self._markers)
-                cause = self._explainer.why_lost(detector, image, seen, index)
-            if cause is not None:
-                causes[index] = cause
-        return causes
-
-
-def drift_of(masked: MaskedPictures) -> tuple[Finding, ...]:
-    """What is to be said of the light."""
-    return drift_findings({name: picture.drift for name, picture in masked.items()})
-
-
-def annotated_by_masks(masked: MaskedPictures, markers: MarkerSet, chosen: int | None,
-                       show: Show) -> dict[str, AnnotatedPicture]:
-    """The pictures with the masks that `show` asks for."""
-    return {name: AnnotatedPicture(one.picture, () if show == "none" else mask_overlay(one, markers, chosen))
-            for name, one in masked.items()}
-
-
-def mask_overlay(picture: MaskedPicture, markers: MarkerSet, chosen: int | None) -> Overlay:
-    """The mask over a dimmed picture, every marker in its own colour, those found with a ring and their name.
-
-    `chosen`: the only marker that is shown in full; None shows all so.
-    """
-    palette = np.zeros((len(markers.markers) + 1, 4), np.uint8)
-    palette[0, 3] = _DIMMED
-    for index, marker in enumerate(markers.markers):
-        palette[index + 1] = (*marker.display_rgb, 255 if chosen in (None, index) else _FAINT)
-    marks: list[Layer | Dots | Callout] = [Layer(palette[picture.labels])]
-    for number, mark in enumerate(picture.seen):
-        if mark.found and chosen in (None, mark.index):
-            marks.append(Dots(np.array([[mark.x, mark.y]]), "text", radius=3.0))
-            further = "" if number < len(markers.markers) else "?"  # something else of the marker's colour
-            marks.append(Callout(mark.x, mark.y, markers.ids[mark.index] + further))
-    return tuple(marks)
-
-
-# -- Step: gather the paints -------------------------------------------------------------------------------------------
 
 _CLICK_PX = 5.0  # a drag that is smaller was a click
 _PARTS = 10  # of a marker's variety after which its colour is learnt anew
@@ -323,3 +213,66 @@ class PickStep(Step):
     def _annotated(self) -> dict[str, AnnotatedPicture]:
         chosen = self.base.ids.index(self.chosen) if self.show == "chosen" and self.chosen != SKIN else None
         return annotated_by_masks(self._masked, self._markers, chosen, self.show)
+
+
+class PickPage(Page):
+    """Choose a marker in the list, click its paint in a picture."""
+
+    def __init__(self, step: PickStep, scheme: Scheme) -> None:
+        super().__init__(step)
+        self._picks = step
+        self.pickable = self.one_large = True
+        self.list = PaintList(scheme, ("marker", "pictures"))
+        self.list.setToolTip("Choose what to click next. The patches are the rig's colour and the one picked. A tick: "
+                             "enough places and angles were seen; a cross: the colour is another marker's or the "
+                             "skin's. Ctrl+Z takes the last click back; clicking a marker anew replaces what was "
+                             "gathered for it.")
+        self.mask_choice = MaskChoice()
+        self.hold = paint_button("Hold the pictures", "Space. Then click at leisure; Space again lets them go on.")
+        self.undo_button = paint_button("Undo", "Ctrl+Z. The last click back.")
+        for widget in (self.list, self.mask_choice, self.hold, self.undo_button):
+            self.column.addWidget(widget, 1 if widget is self.list else 0)
+        shrinkable(self.list)
+        self.list.picked.connect(self._choose)
+        self.mask_choice.currentIndexChanged.connect(self._show)
+        self.hold.clicked.connect(self._hold)
+        self.undo_button.clicked.connect(self._undo)
+
+    def _choose(self, name: str) -> None:
+        self._picks.chosen = name
+        self.changed.emit()
+
+    def _show(self) -> None:
+        self._picks.show = self.mask_choice.currentData()
+        self.changed.emit()
+
+    def _hold(self) -> None:
+        self._picks.capture()
+        self.changed.emit()
+
+    def _undo(self) -> None:
+        self._picks.undo()
+        self.changed.emit()
+
+    def pick(self, picture: Picture, x: float, y: float, width: float, height: float) -> None:
+        """The chosen marker is there."""
+        self._picks.pick(picture, x, y, width, height)
+
+    def show_view(self, view: StepView) -> None:
+        """The list; the button says what it would do."""
+        self.list.show_rows(tuple(self._row(name) for name in self._picks.names), self._picks.chosen)
+        self.hold.setText("Let the pictures go on" if view.pictures else "Hold the pictures")
+        self.undo_button.setEnabled(self._picks.undoable)
+
+    def _row(self, name: str) -> PaintRow:
+        gathering = self._picks.gathering
+        if name == SKIN:
+            count = len(gathering.skin)
+            return PaintRow(name, None, "tick" if count else "ring", "picked" if count else "not picked")
+        index = self._picks.base.ids.index(name)
+        before, now = (markers.markers[index].display_rgb for markers in (self._picks.base, self._picks.markers))
+        if name not in gathering.names:
+            return PaintRow(name, None, "ring", "not picked", before)
+        doubt = self._picks.doubt(name)
+        state = "cross" if doubt else "tick" if gathering.variety(name) >= 1.0 else "half"
+        return PaintRow(name, now, state, doubt or str(gathering.pictures(name)), before)

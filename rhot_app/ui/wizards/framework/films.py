@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
 import cv2
 import numpy as np
+from PySide6.QtWidgets import QComboBox, QFileDialog, QPushButton, QWidget
 
 from rhot_app.calibration.board.boards import Board
 from rhot_app.calibration.board.shared_views import BoardShot
@@ -18,9 +20,11 @@ from rhot_app.calibration.verdict import Finding
 from rhot_app.progress import Progress, within
 from rhot_app.sources.film_offset import FilmOffset, offset_sentence, offsets_of
 from rhot_app.ui.backend.feed import Picture
-from rhot_app.ui.wizards.models.board_form import OTHER_BOARD
-from rhot_app.ui.wizards.models.drawing import board_marks
-from rhot_app.ui.wizards.models.step import AnnotatedPicture, Step, StepView, Task
+from rhot_app.ui.wizards.framework.board import OTHER_BOARD, BoardSearch
+from rhot_app.ui.wizards.framework.drawing import board_marks
+from rhot_app.ui.wizards.framework.page import Page
+from rhot_app.ui.wizards.framework.step import AnnotatedPicture, Step, StepView, Task
+from rhot_node.pictures import VIDEO_SUFFIXES
 
 Began = Literal["together", "sound", "flash"]
 """How it is known when films of several cameras began."""
@@ -126,6 +130,10 @@ class FilmedStep(Step):
     """Base of the steps that show a board to live cameras, or take `films` of it in their place."""
 
     films: Films
+    _started = False
+
+    def __init__(self) -> None:
+        self.search = BoardSearch()
 
     @property
     def board(self) -> Board:
@@ -134,7 +142,26 @@ class FilmedStep(Step):
 
     def begin(self) -> None:
         """Forget what was taken."""
+        self._started = True
+        self.search.forget()
+        self.films.forget_read()
+
+    def shown(self) -> StepView:
+        """What to do with the board, and what was taken so far."""
         raise NotImplementedError
+
+    @property
+    def other_board(self) -> Finding | None:
+        """What live pictures say against the board's size."""
+        return self.search.size_finding(self.board) if self._started else None
+
+    def view(self) -> StepView:
+        """The same of films; a board of another size is said first."""
+        if self.films.paths:
+            return self.films.view(self.shown())
+        wrong = self.other_board
+        return self.shown() if wrong is None else replace(
+            self.shown(), sentence=OTHER_BOARD, hint=f"{wrong.figure} {wrong.cause}", done=False, passable=False)
 
     def keep(self, shot: BoardShot) -> None:
         """Take what films show at one moment."""
@@ -159,3 +186,79 @@ class FilmedStep(Step):
     def take_failure(self, sentence: str) -> None:
         """Why the films cannot be used."""
         self.films.problem = sentence
+
+
+# -- the controls ------------------------------------------------------------------------------------------------------
+
+_BEGAN = (("together", "Films began together"), ("sound", "Align by sound"), ("flash", "Align by a flash"))
+_FILTER = f"Films ({' '.join(f'*{suffix}' for suffix in sorted(VIDEO_SUFFIXES))});;All files (*)"
+
+
+class FilmsPage(Page):
+    """A button for the film of each camera, how they are aligned, and the way back."""
+
+    def __init__(self, step: FilmedStep, parent: QWidget | None = None) -> None:
+        super().__init__(step, parent)
+        self._shows = step
+        self.buttons: dict[str, QPushButton] = {}
+        self.began = QComboBox()
+        for value, text in _BEGAN:
+            self.began.addItem(text, value)
+        self.began.setToolTip("How it is known by how much one film began later than the other: by what all cameras "
+                              "heard, or by a light that went on once.")
+        self.began.currentIndexChanged.connect(self._align)
+        self.live = _button("Live cameras", "Films are left out; views are taken of the live cameras again.")
+        self.live.clicked.connect(self._use_live)
+        self.column.addWidget(self.began)
+        self.column.addWidget(self.live)
+        self.column.addStretch(1)
+
+    def entered(self) -> None:
+        """A button for each of the step's cameras."""
+        cameras = self._shows.films.cameras
+        if tuple(self.buttons) != cameras:
+            for button in self.buttons.values():
+                self.column.removeWidget(button)
+                button.deleteLater()
+            self.buttons = {}
+            for place, camera in enumerate(cameras):
+                button = _button("", "A recorded film of the board in place of the live camera: move the board, rest "
+                                 "it for half a second, and move it on. Frames are chosen by themselves.")
+                button.clicked.connect(partial(self._choose, camera))
+                self.column.insertWidget(place, button)
+                button.show()
+                self.buttons[camera] = button
+        self.began.setCurrentIndex(self.began.findData(self._shows.films.began))
+        self.show_view(StepView(""))
+
+    def show_view(self, view: StepView) -> None:
+        """The names of the films."""
+        films = self._shows.films
+        for camera, button in self.buttons.items():
+            path = films.paths.get(camera)
+            button.setText(f"Use a film of {camera} …" if path is None else f"{camera}: {path.name}")
+        self.began.setVisible(len(films.cameras) > 1 and bool(films.paths))
+        self.live.setVisible(bool(films.paths))
+
+    def _choose(self, camera: str) -> None:
+        chosen = self._shows.films.paths
+        folder = next((path.parent for path in chosen.values()), Path.home())
+        name, _ = QFileDialog.getOpenFileName(self, f"Film of {camera}", str(folder), _FILTER)
+        if name:
+            self._shows.films.choose(camera, Path(name))
+            self.changed.emit()
+
+    def _align(self) -> None:
+        self._shows.films.set_began(self.began.currentData())
+        self.changed.emit()
+
+    def _use_live(self) -> None:
+        self._shows.use_live()
+        self.changed.emit()
+
+
+def _button(text: str, meaning: str) -> QPushButton:
+    button = QPushButton(text)
+    button.setAutoDefault(False)
+    button.setToolTip(meaning)
+    return button

@@ -1,29 +1,21 @@
-"""How far the colours can be told apart: bounds that a person moves, and the judged result."""
+"""The second page: bounds of the colours that a person moves."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import msgspec
+from PySide6.QtWidgets import QHBoxLayout
 
-from rhot_app.calibration.colour.colours import ColourReport
 from rhot_app.calibration.registry import Calibration, InForce
-from rhot_app.calibration.verdict import Finding, with_findings
-from rhot_app.ui.wizards.models.step import Done, Pictures, SolveStep, StepView
-from rhot_app.ui.wizards.steps.camera_steps import Control
-from rhot_app.ui.wizards.steps.colour_pick import (
-    MaskedPictures,
-    MaskMaker,
-    PickStep,
-    Show,
-    annotated_by_masks,
-    drift_of,
-)
+from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.wizards.colours.masks import MaskChoice, MaskedPictures, MaskMaker, Show, annotated_by_masks, drift_of
+from rhot_app.ui.wizards.colours.paint_list import PaintList, PaintRow, paint_button
+from rhot_app.ui.wizards.colours.pick import PickStep
+from rhot_app.ui.wizards.framework.control_row import Control, ControlRow, Value
+from rhot_app.ui.wizards.framework.page import Page, shrinkable
+from rhot_app.ui.wizards.framework.step import Pictures, SolveStep, StepView
 from rhot_node.markers import ChromaModel, MarkerSet
-
-# -- Step: move the bounds of the colours ------------------------------------------------------------------------------
 
 BOUNDS: tuple[Control, ...] = (
     Control("hue_tolerance_deg", "Hue, either way", "How far a pixel's hue may be from the marker's. Wider bears more "
@@ -164,48 +156,68 @@ def observations(picks: PickStep, given: dict[str, ChromaModel]) -> tuple[Any, .
                                                 "before": gathering.earlier}
 
 
-# -- Step: separability of the colours, and what is proposed -----------------------------------------------------------
+class BoundsPage(Page):
+    """Choose a marker in the list, move its bounds."""
 
-class SeparationStep(SolveStep):
-    """The verdict on the colours with the bounds that a person has left them, and on the light since then."""
+    def __init__(self, step: BoundsStep, scheme: Scheme) -> None:
+        super().__init__(step)
+        self._bounds = step
+        self.one_large = True
+        self.list = PaintList(scheme, ("marker", "hue"))
+        self.mask_choice = MaskChoice()
+        self.rows = {control.field: ControlRow(control) for control in BOUNDS}
+        self.again = paint_button("As learnt", "The chosen marker's bounds as they were learnt from the samples.")
+        self.undo_button = paint_button("Undo", "Ctrl+Z. The last change back.")
+        self.column.addWidget(self.list, 1)
+        shrinkable(self.list)
+        for row in self.rows.values():
+            self.column.addWidget(row)
+            row.changed.connect(lambda value, goes_on, row=row: self._move(row.control, value, goes_on=goes_on))
+        self.list.horizontalHeader().setVisible(False)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.again)
+        buttons.addWidget(self.undo_button)
+        self.column.addWidget(self.mask_choice)
+        self.column.addLayout(buttons)
+        self.list.picked.connect(self._choose)
+        self.mask_choice.currentIndexChanged.connect(self._show)
+        self.again.clicked.connect(self._learn_again)
+        self.undo_button.clicked.connect(self._undo)
 
-    watches = True
-    advice = "Read what may be mistaken for a marker, then go on."
+    def _choose(self, name: str) -> None:
+        self._bounds.chosen = name
+        self.changed.emit()
 
-    def __init__(self, calibration: Calibration, now: InForce, bounds: BoundsStep) -> None:
-        super().__init__(calibration, now, self._judging, "Trying the new bounds …", "Tell them apart",
-                         "Go back and pick a colour.")
-        self.cameras = bounds.cameras
-        self._bounds = bounds
-        self._learnt: ColourReport | None = None
-        self._given: Mapping[str, ChromaModel] = {}
-        self._maker = MaskMaker()
+    def _show(self) -> None:
+        self._bounds.show = self.mask_choice.currentData()
+        self.changed.emit()
 
-    def _judging(self) -> tuple[Any, ...] | Done | None:
-        """Untouched bounds were judged as they were learnt."""
-        if self._learnt is None:
-            return None
-        return observations(self._bounds.picks, dict(self._given)) if self._given else Done(self._learnt)
+    def _move(self, control: Control, value: Value, *, goes_on: bool) -> None:
+        if value is not None:
+            self._bounds.change(control, value, goes_on=goes_on)
+            self.changed.emit()
 
-    def enter(self) -> None:
-        """Other bounds, another judgement."""
-        if self._learnt is not self._bounds.result or self._given != self._bounds.given:
-            self._learnt, self._given = self._bounds.result, dict(self._bounds.given)
-            self.begin()
+    def _learn_again(self) -> None:
+        self._bounds.learn_again()
+        self.changed.emit()
 
-    def observe(self, pictures: Pictures) -> tuple[Finding, ...] | None:
-        """How the light stands to the one of the samples; None before they are learnt."""
-        result = self.result
-        return None if result is None else drift_of(self._maker.look(pictures, result.markers))
+    def _undo(self) -> None:
+        self._bounds.undo()
+        self.changed.emit()
 
-    def accept_observation(self, seen: tuple[Finding, ...]) -> None:
-        """What is said of the light."""
-        if self.report is not None:
-            self.report = replace(self.report, verdict=with_findings(self.result.verdict, seen))
+    def show_view(self, view: StepView) -> None:
+        """The list, and the bounds of the marker chosen."""
+        step = self._bounds
+        self.list.show_rows(tuple(self._row(name) for name in step.names), step.chosen)
+        for row in self.rows.values():
+            row.fill(step.value(row.control))
+            row.setEnabled(step.result is not None)
+        self.again.setEnabled(step.chosen in step.given)
+        self.undo_button.setEnabled(step.undoable)
 
-    def view(self) -> StepView:
-        """The verdict, with what to do about it."""
-        if self.result is None:
-            return super().view()
-        apart = self.result.separability.sentences
-        return replace(super().view(), hint="; ".join(apart[:3]) + "." if apart else "No two colours overlap.")
+    def _row(self, name: str) -> PaintRow:
+        step = self._bounds
+        marker = step.markers.markers[step.markers.ids.index(name)]
+        text = f"± {marker.chroma.hue_tolerance_deg:.0f}°"
+        return PaintRow(name, marker.display_rgb, "half" if name in step.given else "tick",
+                        f"{text}, by hand" if name in step.given else text)

@@ -1,1 +1,0 @@
-"""What the steps of all wizards share, without Qt."""
