@@ -20,10 +20,10 @@ SOURCES = [HERE.parents[1] / "rhot_app" / name for name in ("ui", "engine")]
 
 def of_other_rooms() -> list[str]:
     """What records of other rooms are called, which the window shows and translates: calibrations, motions."""
+    from rhot_app.calibration.registry import calibrations
     from rhot_app.ui.models.words import shipped_motions
-    from rhot_app.ui.wizards.framework.definition import WIZARDS
 
-    return [*(text for wizard in WIZARDS for text in (wizard.title, wizard.meaning)),
+    return [*(text for wizard in calibrations() for text in (wizard.title, wizard.meaning)),
             *(text for motion in shipped_motions() for text in (motion.name, motion.description))]
 
 

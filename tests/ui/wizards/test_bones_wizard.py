@@ -89,7 +89,7 @@ def test_bones_entered_by_hand_need_no_movement(hands):
     assert "entered" in hands.sentence
     hands.next()
     table = hands.window.page.table
-    known = {table.item(row, 0).text(): table.item(row, 3).text() for row in range(15)}
+    known = {table.text(row, 0): table.text(row, 3) for row in range(15)}
     assert known["index.proximal"] == "entered" and known["ring.medial"].startswith(("not observed", "partly"))
     hands.next()
     hands.use()

@@ -205,8 +205,8 @@ def test_a_click_beside_the_paint_is_refused_and_undo_takes_the_last_one_back(ha
     hands.click(hands.window.page.undo_button)
     assert step.gathering.names == () and not hands.frame.next_button.isEnabled()
     table = hands.window.page.list
-    row = [table.item(row, 1).text() for row in range(table.rowCount())].index("ring")
-    hands.click(table.viewport(), table.visualItemRect(table.item(row, 1)).center())
+    row = [one.name for one in table.records].index("ring")
+    hands.click(table.viewport(), table.visualRect(table.records_model.index(row, 1)).center())
     assert step.chosen == "ring", "a click on a line chooses it"
 
 

@@ -78,7 +78,7 @@ def test_from_two_movements_to_a_rig_with_other_filters(hands):
     page.own.setChecked(True)
     hands.next()
     table = hands.window.page.table
-    words = [table.item(row, 0).text() for row in range(table.rowCount())]
+    words = [one.what for one in table.records]
     assert "filter of positions" in words and "index: jitter at rest" in words and "index: lag" in words
     hands.use()
     saved = load_rig(hands.path).filters
